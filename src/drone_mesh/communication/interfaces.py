@@ -1,0 +1,202 @@
+"""The interfaces between the mesh software and what it stands on (SDD 2.2 and 3.2.2).
+
+Everything here is driven from outside: time comes in as `now_s`, seconds of whatever clock the
+caller lives by. One thread at a time works in a component; the getters of IMeshDebugInfo are
+snapshots and may be read from any thread.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import FrozenSet
+
+PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
+MAX_NODE_ID = 253  # reference, section 3
+BROADCAST = 254  # final addressee: everybody who hears it
+NO_ROUTE = 255  # "no such route", "no such node"
+
+
+class IMeshNetwork(abc.ABC):
+    """What an antenna knows of the mesh component above it (SDD 2.2.4)."""
+
+    @abc.abstractmethod
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        """Handle one packet from the air; it is handled when this returns. Any bytes are allowed."""
+
+    @abc.abstractmethod
+    def get_node_id(self) -> int:
+        """This node's id, 0..253."""
+
+    @abc.abstractmethod
+    def on_antenna_power(self, on: bool, now_s: float) -> None:
+        """The antenna was switched on or off."""
+
+    @abc.abstractmethod
+    def on_antenna_registered(self, now_s: float) -> None:
+        """The antenna's medium came back and knows the antenna anew (a simulator restarted)."""
+
+
+class IMeshDebugInfo(abc.ABC):
+    """Read-only snapshots of a component, for people (SDD 3.2.2)."""
+
+    @abc.abstractmethod
+    def get_node_id(self) -> int:
+        """This node's id, 0..253."""
+
+    @abc.abstractmethod
+    def get_connected_to_gateway(self) -> bool:
+        """Whether a gateway answered last time; stays true while an answer is being waited for."""
+
+    @abc.abstractmethod
+    def get_total_message_sent(self) -> int:
+        """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
+
+    @abc.abstractmethod
+    def get_preferred_gateway(self) -> int:
+        """Id of the gateway this node uses, or NO_ROUTE while it knows none."""
+
+    @abc.abstractmethod
+    def get_hops_from_gateway_away(self) -> int:
+        """Hops to the preferred gateway; 0 for a gateway, 255 while not known."""
+
+    @abc.abstractmethod
+    def get_last_good_known_location_id(self) -> int:
+        """Id of the node whose place this one would fly to, or NO_ROUTE."""
+
+    @abc.abstractmethod
+    def get_router_tech_table_size(self) -> int:
+        """Known nodes; one that is known through two neighbours counts twice."""
+
+
+class IGatewayCommands(abc.ABC):
+    """What the world outside may ask of a gateway (SDD 2.2.2)."""
+
+    @abc.abstractmethod
+    def send_goal_request_to_drone(
+        self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
+    ) -> bool:
+        """Send a drone to a place (metres). True: there was a route and the next hop took the order.
+
+        Nothing is told back about its arrival. Raises ValueError for numbers that are no place.
+        """
+
+
+class IWirelessCommunication(abc.ABC):
+    """A radio for 32-byte packets (SDD 2.2.3). Nothing here raises for a packet that is lost."""
+
+    @abc.abstractmethod
+    def start_antenna(self, mesh: IMeshNetwork) -> None:
+        """Start to receive, handing each packet to `mesh`, and to be reachable as its node id."""
+
+    @abc.abstractmethod
+    def stop_antenna(self) -> None:
+        """Stop and release what start_antenna took. A second call changes nothing."""
+
+    @abc.abstractmethod
+    def send_message_to(self, payload: bytes) -> bool:
+        """Send to the node in byte 3. True: that node has it."""
+
+    @abc.abstractmethod
+    def broadcast_message(self, payload: bytes) -> None:
+        """Send to every node in range; each of them finds its own id in byte 3."""
+
+    @abc.abstractmethod
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        """Show `info`, together with the antenna's own state, to people; or stop doing so."""
+
+    @abc.abstractmethod
+    def on(self) -> bool:
+        """Whether the antenna has power."""
+
+
+class IInternetConnection(abc.ABC):
+    """A gateway's way to the world outside the mesh (SDD 2.2.1)."""
+
+    @abc.abstractmethod
+    def connect(self, commands: IGatewayCommands) -> None:
+        """Connect, and hand what comes in to `commands`."""
+
+    @abc.abstractmethod
+    def disconnect(self) -> None:
+        """Disconnect. A second call changes nothing."""
+
+
+class IRoutingEssentials(abc.ABC):
+    """What a routing technique may ask of the component that it serves (SDD 3.2.2)."""
+
+    @abc.abstractmethod
+    def search_other_nodes_in_range(self) -> None:
+        """Introduce this node to everybody who hears it."""
+
+    @abc.abstractmethod
+    def send_heartbeat(self, other: int) -> bool:
+        """Send a heartbeat towards node `other`. False: there is no route, or nobody took it."""
+
+
+class IRoutingTechnique(abc.ABC):
+    """Which neighbour leads to which node (SDD 2.2.9, reference section 8).
+
+    A node in direct reach is a "child"; nodes behind it are its "grandchildren".
+    """
+
+    @abc.abstractmethod
+    def get_direction_to_node(self, node: int) -> int:
+        """The neighbour to hand a packet for `node` to, or NO_ROUTE."""
+
+    @abc.abstractmethod
+    def start_routing(self, essentials: IRoutingEssentials) -> None:
+        """Begin to find routes, by means of `essentials`."""
+
+    @abc.abstractmethod
+    def maintain_routing(self) -> None:
+        """Called once a check period: look after the routes."""
+
+    @abc.abstractmethod
+    def node_moved_location(self) -> None:
+        """This node moved: what was known of the neighbourhood no longer holds."""
+
+    @abc.abstractmethod
+    def cant_communicate_with_node(self, node: int) -> int:
+        """A packet could not be handed to neighbour `node`.
+
+        Returns 1 if that removed something and `node` can no longer be reached in any way, else 0.
+        """
+
+    @abc.abstractmethod
+    def other_cant_communicate_with_node(self, other: int, node: int) -> int:
+        """`other` says that it cannot reach `node`; the return value is as above."""
+
+    @abc.abstractmethod
+    def can_communicate_with_node(self, node: int) -> None:
+        """`node` is in direct reach."""
+
+    @abc.abstractmethod
+    def other_can_communicate_with_node(self, other: int, node: int) -> None:
+        """Neighbour `other` can reach `node`."""
+
+    @abc.abstractmethod
+    def get_table_size(self) -> int:
+        """Children and all their grandchildren; a node under two children counts twice."""
+
+    @abc.abstractmethod
+    def get_amount_of_children(self) -> int:
+        """Number of nodes in direct reach."""
+
+    @abc.abstractmethod
+    def get_set_of_children(self) -> FrozenSet[int]:
+        """Ids of the nodes in direct reach."""
+
+    @abc.abstractmethod
+    def empty(self) -> bool:
+        """Whether no node is known."""
+
+    def proven_path_to_node(self, other: int, node: int) -> None:
+        """A packet made by `node` just came through `other`: from now on that is the way to it.
+
+        Whatever else was believed about the way to `node` is forgotten, except that it may be in
+        direct reach itself (reference, section 8: heartbeats prove a path).
+        """
+        for child in self.get_set_of_children():
+            if child not in (other, node):
+                self.other_cant_communicate_with_node(child, node)
+        self.other_can_communicate_with_node(other, node)

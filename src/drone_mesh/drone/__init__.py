@@ -1,0 +1,5 @@
+"""What the mesh software knows of the drone that carries it (SDD 2.2.8)."""
+
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+
+__all__ = ["IDroneEngine", "Location"]
