@@ -9,15 +9,17 @@ whether an id makes sense is judged by the component that receives it (reference
 from __future__ import annotations
 
 import enum
+import math
 import struct
-from dataclasses import astuple, dataclass
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import ClassVar, Dict, Tuple, Type, Union
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.errors import PacketError
 
 CREATOR, FROM, TYPE, TO, FORWARD = range(5)  # places of the header bytes
 HEADER_BYTES = 5
+MAX_HOPS = 254  # of a heartbeat (reference, section 8)
 
 
 class MessageType(enum.IntEnum):
@@ -47,8 +49,11 @@ class Message:
     forward: int  # final addressee, 254 = everybody in range
 
     def to_payload(self) -> bytes:
-        """The 32 bytes."""
-        return bytes(astuple(self)).ljust(PAYLOAD_BYTES, b"\0")
+        """The 32 bytes. Raises PacketError for a value that is no byte."""
+        try:
+            return packet(self.type, self.creator, self.from_, self.to, self.forward)
+        except ValueError as error:
+            raise PacketError(f"{self} does not fit a packet: {error}") from error
 
     @classmethod
     def from_payload(cls, payload: bytes) -> Message:
@@ -58,78 +63,67 @@ class Message:
 
 
 @dataclass(frozen=True)
-class _TypedMessage:
-    """Shared by the messages with a body: a fixed type, and a struct for header and body."""
+class LocationMessage:
+    """Where its creator is."""
 
-    TYPE: ClassVar[MessageType]
-    WIRE: ClassVar[struct.Struct]
+    TYPE: ClassVar[MessageType] = MessageType.LOCATION
+    BODY: ClassVar[struct.Struct] = struct.Struct("<ffhI")
 
     creator: int  # who made it
     from_: int  # who sends this hop
     to: int  # receiver of this hop
     forward: int  # final addressee, 254 = everybody in range
-
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
-        creator, from_, to, forward, *body = astuple(self)
-        try:
-            packed = self.WIRE.pack(creator, from_, self.TYPE, to, forward, *body)
-        except (struct.error, OverflowError) as error:
-            raise PacketError(f"{self} does not fit its packet: {error}") from error
-        return packed.ljust(PAYLOAD_BYTES, b"\0")
-
-    @classmethod
-    def _fields(cls, payload: bytes) -> tuple:  # type: ignore[type-arg]
-        """Constructor arguments found in `payload`."""
-        _check_length(payload)
-        creator, from_, kind, to, forward, *body = cls.WIRE.unpack_from(payload)
-        if kind != cls.TYPE:
-            raise PacketError(f"type {kind} is not {cls.TYPE.name} ({cls.TYPE.value})")
-        return (creator, from_, to, forward, *body)
-
-
-@dataclass(frozen=True)
-class LocationMessage(_TypedMessage):
-    """Where its creator is."""
-
-    TYPE = MessageType.LOCATION
-    WIRE = struct.Struct("<5BffhI")
-
     latitude: float  # y, metres
     longitude: float  # x, metres
     height: int  # whole metres
     time_since_posix: int  # whole seconds of the creator's clock
 
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
+        return _packed(self, self.latitude, self.longitude, self.height, self.time_since_posix)
+
     @classmethod
     def from_payload(cls, payload: bytes) -> LocationMessage:
         """Decode. Raises PacketError for another length or type."""
-        return cls(*cls._fields(payload))
+        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
 
 
 @dataclass(frozen=True)
-class IntroduceMessage(_TypedMessage):
+class IntroduceMessage:
     """PRESENT: "I am here"."""
 
-    TYPE = MessageType.PRESENT
-    WIRE = struct.Struct("<5BB?")
+    TYPE: ClassVar[MessageType] = MessageType.PRESENT
+    BODY: ClassVar[struct.Struct] = struct.Struct("<B?")
 
+    creator: int  # who made it
+    from_: int  # who sends this hop
+    to: int  # receiver of this hop
+    forward: int  # final addressee, 254 = everybody in range
     hops_until_gateway: int  # 255 while not known
-    know_gateway: bool
+    know_gateway: bool  # whether its creator is connected
+
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
+        return _packed(self, self.hops_until_gateway, self.know_gateway)
 
     @classmethod
     def from_payload(cls, payload: bytes) -> IntroduceMessage:
         """Decode. Raises PacketError for another length or type."""
-        return cls(*cls._fields(payload))
+        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
 
 
 @dataclass(frozen=True)
-class HeartbeatMessage(_TypedMessage):
+class HeartbeatMessage:
     """Proof of a path; each node that forwards it adds a hop."""
 
-    TYPE = MessageType.HEARTBEAT
-    WIRE = struct.Struct("<5B?BB")
+    TYPE: ClassVar[MessageType] = MessageType.HEARTBEAT
+    BODY: ClassVar[struct.Struct] = struct.Struct("<?BB")
 
-    know_gateway: bool
+    creator: int  # who made it
+    from_: int  # who sends this hop
+    to: int  # receiver of this hop
+    forward: int  # final addressee, 254 = everybody in range
+    know_gateway: bool  # whether its creator is connected
     preferred_gateway: int  # 255 while not known
     hops: int  # how often it was forwarded
 
@@ -138,85 +132,163 @@ class HeartbeatMessage(_TypedMessage):
         """Whether its creator is a gateway: only a gateway prefers itself."""
         return self.creator == self.preferred_gateway
 
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
+        return _packed(self, self.know_gateway, self.preferred_gateway, self.hops)
+
     @classmethod
     def from_payload(cls, payload: bytes) -> HeartbeatMessage:
         """Decode. Raises PacketError for another length or type."""
-        return cls(*cls._fields(payload))
+        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
 
 
 @dataclass(frozen=True)
-class MissingMessage(_TypedMessage):
+class MissingMessage:
     """Its creator can no longer reach a node."""
 
-    TYPE = MessageType.MISSING
-    WIRE = struct.Struct("<5BB")
+    TYPE: ClassVar[MessageType] = MessageType.MISSING
+    BODY: ClassVar[struct.Struct] = struct.Struct("<B")
 
+    creator: int  # who made it
+    from_: int  # who sends this hop
+    to: int  # receiver of this hop
+    forward: int  # final addressee, 254 = everybody in range
     missing: int  # id of that node
+
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
+        return _packed(self, self.missing)
 
     @classmethod
     def from_payload(cls, payload: bytes) -> MissingMessage:
         """Decode. Raises PacketError for another length or type."""
-        return cls(*cls._fields(payload))
+        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
 
 
 @dataclass(frozen=True)
-class GoToLocationMessage(_TypedMessage):
+class GoToLocationMessage:
     """MOVE_TO_LOCATION: an order to fly to a place."""
 
-    TYPE = MessageType.MOVE_TO_LOCATION
-    WIRE = struct.Struct("<5Bffh")
+    TYPE: ClassVar[MessageType] = MessageType.MOVE_TO_LOCATION
+    BODY: ClassVar[struct.Struct] = struct.Struct("<ffh")
 
+    creator: int  # who made it
+    from_: int  # who sends this hop
+    to: int  # receiver of this hop
+    forward: int  # final addressee, 254 = everybody in range
     latitude: float  # y, metres
     longitude: float  # x, metres
     height: int  # whole metres
 
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
+        return _packed(self, self.latitude, self.longitude, self.height)
+
     @classmethod
     def from_payload(cls, payload: bytes) -> GoToLocationMessage:
         """Decode. Raises PacketError for another length or type."""
-        return cls(*cls._fields(payload))
+        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
 
 
 @dataclass(frozen=True)
-class MovementNegotiationMessage(_TypedMessage):
+class MovementNegotiationMessage:
     """What its creator bids for flying."""
 
-    TYPE = MessageType.MOVEMENT_NEGOTIATION
-    WIRE = struct.Struct("<5Bf")
+    TYPE: ClassVar[MessageType] = MessageType.MOVEMENT_NEGOTIATION
+    BODY: ClassVar[struct.Struct] = struct.Struct("<f")
 
+    creator: int  # who made it
+    from_: int  # who sends this hop
+    to: int  # receiver of this hop
+    forward: int  # final addressee, 254 = everybody in range
     cost: float  # its distance to the gateway in metres; negative: it does not fly
+
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
+        return _packed(self, self.cost)
 
     @classmethod
     def from_payload(cls, payload: bytes) -> MovementNegotiationMessage:
         """Decode. Raises PacketError for another length or type."""
-        return cls(*cls._fields(payload))
+        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
 
 
-_CLASS_OF_TYPE = {
-    cls.TYPE: cls
-    for cls in (
-        LocationMessage,
-        IntroduceMessage,
-        HeartbeatMessage,
-        MissingMessage,
-        GoToLocationMessage,
-        MovementNegotiationMessage,
-    )
+_TypedMessage = Union[
+    LocationMessage,
+    IntroduceMessage,
+    HeartbeatMessage,
+    MissingMessage,
+    GoToLocationMessage,
+    MovementNegotiationMessage,
+]
+AnyMessage = Union[Message, _TypedMessage]
+
+_CLASS_OF_TYPE: Dict[int, Type[AnyMessage]] = {
+    MessageType.LOCATION: LocationMessage,
+    MessageType.PRESENT: IntroduceMessage,
+    MessageType.HEARTBEAT: HeartbeatMessage,
+    MessageType.MISSING: MissingMessage,
+    MessageType.MOVE_TO_LOCATION: GoToLocationMessage,
+    MessageType.MOVEMENT_NEGOTIATION: MovementNegotiationMessage,
+}
+_NUMBERS: Dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
+    MessageType.LOCATION: struct.Struct("<ff"),
+    MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
+    MessageType.MOVEMENT_NEGOTIATION: struct.Struct("<f"),
 }
 
 
-def parse(payload: bytes) -> Message | _TypedMessage:
+def parse(payload: bytes) -> AnyMessage:
     """The message in `payload`, of the class that its type calls for; Message for all others.
 
     Raises PacketError unless there are 32 bytes.
     """
     _check_length(payload)
-    cls = _CLASS_OF_TYPE.get(payload[TYPE], Message)
-    return cls.from_payload(payload)
+    return _CLASS_OF_TYPE.get(payload[TYPE], Message).from_payload(payload)
 
 
-def next_hop(payload: bytes, from_: int, to: int) -> bytes:
-    """The same packet, sent on by `from_` to `to`."""
-    return bytes((payload[CREATOR], from_, payload[TYPE], to)) + payload[FORWARD:]
+def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: bytes = b"") -> bytes:
+    """The 32 bytes of header and body."""
+    return (bytes((creator, from_, kind, to, forward)) + body).ljust(PAYLOAD_BYTES, b"\0")
+
+
+def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
+    """The same packet, sent on by `from_` to `to`; a heartbeat counts the hop.
+
+    None for a heartbeat that has made as many hops as it may.
+    """
+    header = bytes((payload[CREATOR], from_, payload[TYPE], to, payload[FORWARD]))
+    if payload[TYPE] != MessageType.HEARTBEAT:
+        return header + payload[HEADER_BYTES:]
+    know, preferred, hops = HeartbeatMessage.BODY.unpack_from(payload, HEADER_BYTES)
+    if hops >= MAX_HOPS:
+        return None
+    body = HeartbeatMessage.BODY.pack(know, preferred, hops + 1)
+    return header + body + payload[HEADER_BYTES + len(body) :]
+
+
+def is_finite(payload: bytes) -> bool:
+    """Whether the numbers of a packet are numbers; True for types without any."""
+    numbers = _NUMBERS.get(payload[TYPE])
+    return numbers is None or all(map(math.isfinite, numbers.unpack_from(payload, HEADER_BYTES)))
+
+
+def _packed(message: _TypedMessage, *values: float) -> bytes:
+    try:
+        body = message.BODY.pack(*values)
+        return packet(
+            message.TYPE, message.creator, message.from_, message.to, message.forward, body
+        )
+    except (struct.error, OverflowError, ValueError) as error:
+        raise PacketError(f"{message} does not fit its packet: {error}") from error
+
+
+def _unpacked(kind: MessageType, body: struct.Struct, payload: bytes) -> Tuple:  # type: ignore[type-arg]
+    _check_length(payload)
+    creator, from_, found, to, forward = payload[:HEADER_BYTES]
+    if found != kind:
+        raise PacketError(f"type {found} is not {kind.name} ({kind.value})")
+    return (creator, from_, to, forward, *body.unpack_from(payload, HEADER_BYTES))
 
 
 def _check_length(payload: bytes) -> None:

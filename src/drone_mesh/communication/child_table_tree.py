@@ -1,0 +1,110 @@
+"""ChildTableTree: each neighbour and the set of nodes behind it (SDD 3.2.1, reference section 8)."""
+
+from __future__ import annotations
+
+from typing import Dict, FrozenSet, Optional, Set
+
+from drone_mesh.communication.interfaces import NO_ROUTE, IRoutingEssentials, IRoutingTechnique
+
+
+class ChildTableTree(IRoutingTechnique):
+    """Direct neighbours ("children"), and per child the nodes that it can reach ("grandchildren")."""
+
+    def __init__(self) -> None:
+        self._children: Dict[int, Set[int]] = {}
+        # The same table the other way round, so that no packet has to search it.
+        self._children_with: Dict[int, Set[int]] = {}
+        self._essentials: Optional[IRoutingEssentials] = None
+
+    def get_direction_to_node(self, node: int) -> int:
+        """The node itself if it is a child, else the child with the lowest id that has it."""
+        if node in self._children:
+            return node
+        holders = self._children_with.get(node)
+        return min(holders) if holders else NO_ROUTE
+
+    def start_routing(self, essentials: IRoutingEssentials) -> None:
+        """Introduce this node to its surroundings."""
+        self._essentials = essentials
+        essentials.search_other_nodes_in_range()
+
+    def maintain_routing(self) -> None:
+        """Introduce this node again, and check each child with a heartbeat.
+
+        Raises RuntimeError before start_routing.
+        """
+        if self._essentials is None:
+            raise RuntimeError("maintain_routing before start_routing")
+        self._essentials.search_other_nodes_in_range()
+        for child in sorted(self._children):
+            if child in self._children:  # a failed heartbeat may have cost more than one child
+                self._essentials.send_heartbeat(child)
+
+    def node_moved_location(self) -> None:
+        """Forget everything."""
+        self._children.clear()
+        self._children_with.clear()
+
+    def cant_communicate_with_node(self, node: int) -> int:
+        """Remove child `node` with all that is behind it."""
+        grandchildren = self._children.pop(node, None)
+        if grandchildren is None:
+            return 0
+        for grandchild in grandchildren:
+            self._forget_holder(grandchild, node)
+        return int(node not in self._children_with)
+
+    def other_cant_communicate_with_node(self, other: int, node: int) -> int:
+        """Remove `node` from behind `other`."""
+        if other == node:
+            return self.cant_communicate_with_node(node)
+        grandchildren = self._children.get(other)
+        if grandchildren is None or node not in grandchildren:
+            return 0
+        grandchildren.remove(node)
+        self._forget_holder(node, other)
+        return int(node not in self._children_with and node not in self._children)
+
+    def can_communicate_with_node(self, node: int) -> None:
+        """`node` becomes a child."""
+        if node not in self._children:
+            self._children[node] = set()
+
+    def other_can_communicate_with_node(self, other: int, node: int) -> None:
+        """`other` becomes a child and `node` its grandchild."""
+        self.can_communicate_with_node(other)
+        if other != node:
+            self._children[other].add(node)
+            self._children_with.setdefault(node, set()).add(other)
+
+    def proven_path_to_node(self, other: int, node: int) -> None:
+        """List `node` under `other` and under no other child."""
+        holders = self._children_with.get(node)
+        if holders is not None:
+            if other in holders and len(holders) == 1:
+                return
+            for child in holders - {other}:
+                self.other_cant_communicate_with_node(child, node)
+        self.other_can_communicate_with_node(other, node)
+
+    def get_table_size(self) -> int:
+        """Children and all their grandchildren; a node under two children counts twice."""
+        return len(self._children) + sum(map(len, tuple(self._children.values())))
+
+    def get_amount_of_children(self) -> int:
+        """Number of nodes in direct reach."""
+        return len(self._children)
+
+    def get_set_of_children(self) -> FrozenSet[int]:
+        """Ids of the nodes in direct reach."""
+        return frozenset(self._children)
+
+    def empty(self) -> bool:
+        """Whether no node is known."""
+        return not self._children
+
+    def _forget_holder(self, node: int, child: int) -> None:
+        holders = self._children_with[node]
+        holders.remove(child)
+        if not holders:
+            del self._children_with[node]

@@ -1,0 +1,476 @@
+"""MeshnetworkComponent: what a router and a gateway have in common (reference, section 8).
+
+A component has no thread, no clock and no randomness of its own. One thread at a time calls into
+it; the getters of IMeshDebugInfo may be read from any other.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+import random
+from collections import deque
+from typing import Deque, Dict, List, Optional, Tuple
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.circulation import CirculationGuard
+from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.flight import Flight
+from drone_mesh.communication.interfaces import (
+    BROADCAST,
+    MAX_NODE_ID,
+    NO_ROUTE,
+    PAYLOAD_BYTES,
+    IMeshDebugInfo,
+    IMeshNetwork,
+    IRoutingEssentials,
+    IRoutingTechnique,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.observer import (
+    MeshEvent,
+    MeshEventKind,
+    MeshObserver,
+    ignore_events,
+)
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import LocationUnknown
+
+INTRODUCE_AFTER_POWER_S = 0.2  # our choice: the medium has to hear of the antenna first
+INTRODUCE_SPREAD_S = 1.0  # our choice: after an outage not everybody speaks at once
+
+_HEARTBEAT = int(MessageType.HEARTBEAT)
+_TYPES_WITH_NUMBERS = frozenset(
+    (MessageType.LOCATION, MessageType.MOVE_TO_LOCATION, MessageType.MOVEMENT_NEGOTIATION)
+)
+
+
+class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
+    """Receives, learns, forwards and sends for one node."""
+
+    def __init__(
+        self,
+        node_id: int,
+        antenna: IWirelessCommunication,
+        engine: IDroneEngine,
+        routing: IRoutingTechnique,
+        rng: random.Random,
+        timing: Optional[MeshTiming] = None,
+        observer: MeshObserver = ignore_events,
+        debug: bool = True,
+    ) -> None:
+        """`rng` spreads what many nodes would do at once; with debug on the antenna shows the node.
+
+        Raises ValueError for a node id outside 0..253.
+        """
+        if not 0 <= node_id <= MAX_NODE_ID:
+            raise ValueError(f"node id {node_id}: must be 0..{MAX_NODE_ID}")
+        self._node_id = node_id
+        self._antenna = antenna
+        self._engine = engine
+        self._routing = routing
+        self._rng = rng
+        self._timing = timing or MeshTiming()
+        self._observer = observer
+        self._debug = debug
+        self._now_s = 0.0
+        self._connected = False
+        self._preferred_gateway = NO_ROUTE
+        self._hops = NO_ROUTE
+        self._gateway_location: Optional[Location] = None
+        self._good_location: Optional[Location] = None
+        self._good_location_id = NO_ROUTE
+        self._total_sent = 0
+        self._heard_s: Dict[int, float] = {}
+        self._check_due_s = math.inf
+        self._introduce_due_s = math.inf
+        self._flight: Optional[Flight] = None
+        self._circulation = CirculationGuard()
+        self._missing_to_tell: Deque[Tuple[int, int, int]] = deque()
+        self._telling = False
+        self.complaints = Complaints(node_id)
+
+    # Driven from outside ---------------------------------------------------------------------
+
+    def start(self, now_s: float) -> None:
+        """Antenna on, debugging on if asked, then look for others. The first check comes later."""
+        self._now_s = now_s
+        self._antenna.start_antenna(self)
+        if self._debug:
+            self._antenna.debugging_mode(self, True)
+        self._check_due_s = now_s + self._rng.random() * self._timing.check_period_s
+        self._report(MeshEventKind.STARTED)
+        self._begin()
+        self._routing.start_routing(self)
+
+    def stop(self) -> None:
+        """Antenna and debugging off; nothing is due any more."""
+        self._check_due_s = self._introduce_due_s = math.inf
+        self._flight = None
+        if self._debug:
+            self._antenna.debugging_mode(self, False)
+        self._antenna.stop_antenna()
+
+    @property
+    def next_tick_s(self) -> float:
+        """When `tick` wants to be called next. May change with every call into the component."""
+        flight = self._flight
+        ask_s = flight.next_ask_s if flight is not None else math.inf
+        return min(self._check_due_s, self._introduce_due_s, ask_s)
+
+    def tick(self, now_s: float) -> None:
+        """Do what is due."""
+        self._now_s = now_s
+        if now_s >= self._introduce_due_s:
+            self._introduce_due_s = math.inf
+            self.search_other_nodes_in_range()
+        if self._flight is not None and now_s >= self._flight.next_ask_s:
+            if self._flight.is_over(self._own_location(), now_s):
+                self._flight = None
+                self._landed()
+        if now_s >= self._check_due_s:
+            period_s = self._timing.check_period_s
+            self._check_due_s += period_s * max(1, math.ceil((now_s - self._check_due_s) / period_s))
+            if self._antenna.on():
+                self._check()
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        """Learn from a packet, then process it or send it on. Bad packets are dropped and counted."""
+        self._now_s = now_s
+        if len(payload) != PAYLOAD_BYTES:
+            self._drop(f"want {PAYLOAD_BYTES} bytes, got {len(payload)}", payload)
+            return
+        creator, from_, kind, to, forward = payload[: messages.HEADER_BYTES]
+        me = self._node_id
+        if creator > MAX_NODE_ID or from_ > MAX_NODE_ID or from_ == me or forward > BROADCAST:
+            self._drop("bad ids", payload)
+            return
+        if to != me:
+            self._drop("not for this node", payload)
+            return
+        if kind in _TYPES_WITH_NUMBERS and not messages.is_finite(payload):
+            self._drop("not a finite number", payload)
+            return
+        self._learn(creator, from_, kind)
+        if forward == me or forward == BROADCAST:
+            self._process(payload, creator, from_, kind)
+        else:
+            self._forward(payload, creator, from_, kind, forward)
+
+    def on_antenna_power(self, on: bool, now_s: float) -> None:
+        """Switched on: introduce soon."""
+        self._now_s = now_s
+        self._report(MeshEventKind.POWER_ON if on else MeshEventKind.POWER_OFF)
+        self._introduce_due_s = now_s + INTRODUCE_AFTER_POWER_S if on else math.inf
+
+    def on_antenna_registered(self, now_s: float) -> None:
+        """The medium came back: introduce soon, each node at its own moment."""
+        self._now_s = now_s
+        if self._antenna.on():
+            wait_s = INTRODUCE_AFTER_POWER_S + self._rng.random() * INTRODUCE_SPREAD_S
+            self._introduce_due_s = now_s + wait_s
+
+    # Snapshots -------------------------------------------------------------------------------
+
+    def get_node_id(self) -> int:
+        """This node's id, 0..253."""
+        return self._node_id
+
+    def get_connected_to_gateway(self) -> bool:
+        """Whether a gateway answered last time, or may still answer."""
+        return self._connected
+
+    def get_total_message_sent(self) -> int:
+        """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
+        return self._total_sent
+
+    def get_preferred_gateway(self) -> int:
+        """Id of the gateway this node uses, or NO_ROUTE while it knows none."""
+        return self._preferred_gateway
+
+    def get_hops_from_gateway_away(self) -> int:
+        """Hops to the preferred gateway; 255 while not known."""
+        return self._hops
+
+    def get_last_good_known_location_id(self) -> int:
+        """Id of the node whose place this one would fly to, or NO_ROUTE."""
+        return self._good_location_id
+
+    def get_router_tech_table_size(self) -> int:
+        """Known nodes; one that is known through two neighbours counts twice."""
+        return self._routing.get_table_size()
+
+    def get_neighbours(self) -> Dict[int, float]:
+        """Direct neighbours, and when each was last heard (seconds of the core's clock)."""
+        return dict(self._heard_s)
+
+    def get_route_to_gateway(self) -> int:
+        """The neighbour that leads to the preferred gateway; the own id for a gateway itself."""
+        if self._preferred_gateway in (self._node_id, NO_ROUTE):
+            return self._preferred_gateway
+        return self._routing.get_direction_to_node(self._preferred_gateway)
+
+    def get_goal(self) -> Optional[Location]:
+        """Where the drone is flying to; None while it is not."""
+        flight = self._flight
+        return flight.goal if flight is not None else None
+
+    # What a routing technique may ask for ----------------------------------------------------
+
+    def search_other_nodes_in_range(self) -> None:
+        """PRESENT, to everybody who hears it."""
+        me = self._node_id
+        body = messages.IntroduceMessage.BODY.pack(self._hops, self._knows_gateway())
+        self._antenna.broadcast_message(
+            messages.packet(MessageType.PRESENT, me, me, BROADCAST, BROADCAST, body)
+        )
+
+    def send_heartbeat(self, other: int) -> bool:
+        """A heartbeat towards `other`."""
+        return self._send_own(_HEARTBEAT, other, self._heartbeat_body())
+
+    # For the router and the gateway to fill in -----------------------------------------------
+
+    @abc.abstractmethod
+    def _begin(self) -> None:
+        """The start of this kind of node, before routing starts."""
+
+    @abc.abstractmethod
+    def _check(self) -> None:
+        """What is to be done once a period while the antenna is on."""
+
+    @abc.abstractmethod
+    def _on_present(self, hello: messages.IntroduceMessage) -> None:
+        """A neighbour introduced itself."""
+
+    @abc.abstractmethod
+    def _on_heartbeat(self, heartbeat: messages.HeartbeatMessage) -> None:
+        """A heartbeat for this node arrived."""
+
+    @abc.abstractmethod
+    def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
+        """A neighbour says what it bids for flying."""
+
+    @abc.abstractmethod
+    def _flight_started(self) -> None:
+        """The drone leaves its place."""
+
+    def _knows_gateway(self) -> bool:
+        """What the packets of this node say of its connection."""
+        return self._connected
+
+    # Receiving -------------------------------------------------------------------------------
+
+    def _learn(self, creator: int, from_: int, kind: int) -> None:
+        if from_ not in self._heard_s:
+            self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
+        self._heard_s[from_] = self._now_s
+        routing = self._routing
+        routing.can_communicate_with_node(from_)
+        if creator == from_ or creator == self._node_id:
+            return
+        if kind == _HEARTBEAT:
+            routing.proven_path_to_node(from_, creator)
+        elif routing.get_direction_to_node(creator) == NO_ROUTE:
+            routing.other_can_communicate_with_node(from_, creator)
+
+    def _process(self, payload: bytes, creator: int, from_: int, kind: int) -> None:
+        if kind == _HEARTBEAT:
+            self._on_heartbeat(messages.HeartbeatMessage.from_payload(payload))
+        elif kind == MessageType.PRESENT:
+            self._on_present(messages.IntroduceMessage.from_payload(payload))
+        elif kind == MessageType.LOCATION:
+            self._on_location(messages.LocationMessage.from_payload(payload))
+        elif kind == MessageType.REQUESTLOCATION:
+            self._tell_location(creator)
+        elif kind == MessageType.MISSING:
+            missing = messages.MissingMessage.from_payload(payload).missing
+            if missing != self._node_id:
+                self._forget_route(creator, missing, told_by=from_)
+        elif kind == MessageType.MOVE_TO_LOCATION:
+            order = messages.GoToLocationMessage.from_payload(payload)
+            goal = Location(order.latitude, order.longitude, order.height)
+            self._report(MeshEventKind.FLIGHT_ORDERED, creator, _in_words(goal))
+            self._fly_to(goal)
+        elif kind == MessageType.MOVEMENT_NEGOTIATION:
+            self._on_negotiation(messages.MovementNegotiationMessage.from_payload(payload))
+        else:
+            self._drop("a type that is not processed", payload)
+
+    def _on_location(self, message: messages.LocationMessage) -> None:
+        location = Location(message.latitude, message.longitude, message.height)
+        if message.creator != self._preferred_gateway:
+            self._set_good_location(message.creator, location)
+            return
+        self._gateway_location = location
+        if self.get_route_to_gateway() == message.creator:
+            self._set_good_location(message.creator, location)
+
+    def _forward(self, payload: bytes, creator: int, from_: int, kind: int, forward: int) -> None:
+        routing = self._routing
+        identity = b""
+        if creator == self._node_id:
+            self._drop_circulating(payload, forward, routing.get_direction_to_node(forward))
+            return
+        if kind != _HEARTBEAT:
+            identity = payload[:1] + payload[2:3] + payload[4:]
+            first = self._circulation.came_round(identity, from_, self._now_s)
+            if first is not None:
+                self._drop_circulating(payload, forward, first.went_to)
+                return
+        for _attempt in range(2):
+            to = routing.get_direction_to_node(forward)
+            if to == NO_ROUTE or to == from_:
+                self._tell_missing(forward, first=from_)
+                return
+            sent_on = messages.next_hop(payload, self._node_id, to)
+            if sent_on is None:
+                self._drop("a heartbeat with too many hops", payload)
+                return
+            if identity:
+                self._circulation.passed(identity, from_, to, self._now_s)
+            if self._send(sent_on, to):
+                return
+
+    def _drop_circulating(self, payload: bytes, forward: int, used: int) -> None:
+        self._drop("a packet that goes round in circles", payload)
+        if used not in (forward, NO_ROUTE):
+            self._routing.other_cant_communicate_with_node(used, forward)
+
+    def _drop(self, reason: str, payload: bytes) -> None:
+        self.complaints.add(f"dropped {reason}", payload.hex(), self._now_s)
+
+    # Sending ---------------------------------------------------------------------------------
+
+    def _send(self, payload: bytes, to: int) -> bool:
+        """Hand a packet to neighbour `to`, more than once if need be. The routes learn from it."""
+        for _attempt in range(self._timing.send_attempts):
+            if self._antenna.send_message_to(payload):
+                self._total_sent += 1
+                self._routing.can_communicate_with_node(to)
+                return True
+        self._neighbour_lost(to)
+        return False
+
+    def _send_own(self, kind: int, other: int, body: bytes = b"") -> bool:
+        """Send a packet of our own towards `other`, over one route after the other."""
+        me = self._node_id
+        tried: List[int] = []
+        while True:
+            to = self._routing.get_direction_to_node(other)
+            if to == NO_ROUTE or to in tried:
+                return False
+            if self._send(messages.packet(kind, me, me, to, other, body), to):
+                return True
+            tried.append(to)
+
+    def _heartbeat_body(self) -> bytes:
+        return messages.HeartbeatMessage.BODY.pack(
+            self._knows_gateway(), self._preferred_gateway, 0
+        )
+
+    def _tell_location(self, asker: int) -> None:
+        location = self._own_location()
+        if location is not None:
+            body = messages.LocationMessage.BODY.pack(
+                *_on_the_wire(location), int(self._now_s) % 2**32
+            )
+            self._send_own(MessageType.LOCATION, asker, body)
+
+    # Lost nodes ------------------------------------------------------------------------------
+
+    def _neighbour_lost(self, node: int) -> None:
+        if self._heard_s.pop(node, None) is not None:
+            self._report(MeshEventKind.NEIGHBOUR_LOST, node)
+        if self._routing.cant_communicate_with_node(node):
+            self._report(MeshEventKind.NODE_MISSING, node)
+            self._tell_missing(node)
+
+    def _forget_route(self, other: int, node: int, told_by: int) -> None:
+        """`other` cannot reach `node`; if that was the last route, the others have to know."""
+        if other == node:
+            self._heard_s.pop(node, None)
+        if self._routing.other_cant_communicate_with_node(other, node):
+            self._report(MeshEventKind.NODE_MISSING, node)
+            self._tell_missing(node, told_by=told_by)
+
+    def _drop_routes_to(self, node: int) -> None:
+        """Forget every way to `node`, one after the other."""
+        while True:
+            to = self._routing.get_direction_to_node(node)
+            if to == NO_ROUTE:
+                return
+            if to == node:
+                self._heard_s.pop(node, None)
+                self._routing.cant_communicate_with_node(node)
+            else:
+                self._routing.other_cant_communicate_with_node(to, node)
+
+    def _tell_missing(self, missing: int, first: int = NO_ROUTE, told_by: int = NO_ROUTE) -> None:
+        """MISSING to every neighbour, `first` before the others and `told_by` not at all.
+
+        A neighbour that cannot be told is lost itself: that is told after this, not within it, so
+        that the depth of the call does not grow with the number of neighbours.
+        """
+        self._missing_to_tell.append((missing, first, told_by))
+        if self._telling:
+            return
+        self._telling = True
+        try:
+            while self._missing_to_tell:
+                missing, first, told_by = self._missing_to_tell.popleft()
+                body = bytes((missing,))
+                neighbours = self._routing.get_set_of_children() - {missing, told_by}
+                for neighbour in sorted(neighbours, key=lambda n: (n != first, n)):
+                    if self._routing.get_direction_to_node(neighbour) == neighbour:
+                        self._send_own(MessageType.MISSING, neighbour, body)
+        finally:
+            self._telling = False
+
+    # Flight ----------------------------------------------------------------------------------
+
+    def _fly_to(self, goal: Location) -> None:
+        if self._flight is not None and self._flight.goal == goal:
+            return  # a second gateway orders the same flight (reference 14.11)
+        self._flight = Flight(goal, self._now_s)
+        self._engine.set_goal(*goal)
+        self._flight_started()
+
+    def _landed(self) -> None:
+        """The neighbourhood is another one now."""
+        self._forget_neighbourhood()
+        self._report(MeshEventKind.LANDED)
+        self.search_other_nodes_in_range()
+
+    def _forget_neighbourhood(self) -> None:
+        self._heard_s.clear()
+        self._routing.node_moved_location()
+
+    def _own_location(self) -> Optional[Location]:
+        try:
+            location = self._engine.get_location()
+            if not all(map(math.isfinite, location)):
+                raise LocationUnknown(f"the drone says it is at {location}")
+            return location
+        except LocationUnknown as error:
+            self.complaints.add("own location unknown", str(error), self._now_s)
+            return None
+
+    def _set_good_location(self, node: int, location: Optional[Location]) -> None:
+        self._good_location = location
+        self._good_location_id = NO_ROUTE if location is None else node
+
+    def _report(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
+        self._observer(MeshEvent(kind, self._node_id, self._now_s, peer, detail))
+
+
+def _in_words(place: Location) -> str:
+    return f"to x {place.longitude:.2f} m, y {place.latitude:.2f} m, z {place.height:.0f} m"
+
+
+def _on_the_wire(location: Location) -> Tuple[float, float, int]:
+    """Heights travel as int16, whole metres (reference, section 11)."""
+    height = max(-(2**15), min(2**15 - 1, round(location.height)))
+    return location.latitude, location.longitude, height

@@ -1,0 +1,96 @@
+"""MeshnetworkGateway: the mesh's way to the world outside (reference, section 10; SDD 3.2.4)."""
+
+from __future__ import annotations
+
+import logging
+import math
+import random
+from typing import Optional
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.interfaces import (
+    MAX_NODE_ID,
+    IGatewayCommands,
+    IInternetConnection,
+    IRoutingTechnique,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+
+_log = logging.getLogger(__name__)
+
+
+class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
+    """A node that answers heartbeats and brings orders from outside into the mesh."""
+
+    def __init__(
+        self,
+        node_id: int,
+        antenna: IWirelessCommunication,
+        engine: IDroneEngine,
+        routing: IRoutingTechnique,
+        internet: IInternetConnection,
+        rng: random.Random,
+        timing: Optional[MeshTiming] = None,
+        observer: MeshObserver = ignore_events,
+        debug: bool = True,
+    ) -> None:
+        """As MeshnetworkComponent; orders come in over `internet`."""
+        super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
+        self._internet = internet
+        self._connected = True
+        self._preferred_gateway = node_id
+        self._hops = 0
+
+    def stop(self) -> None:
+        """Internet, antenna and debugging off."""
+        self._internet.disconnect()
+        super().stop()
+
+    def send_goal_request_to_drone(
+        self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
+    ) -> bool:
+        """Send a drone to a place (metres). True: there was a route and the next hop took it.
+
+        Raises ValueError for an id that no node has and for numbers that are no place.
+        """
+        self._now_s = now_s
+        if not 0 <= node_id <= MAX_NODE_ID:
+            raise ValueError(f"drone {node_id}: ids are 0..{MAX_NODE_ID}")
+        if not (math.isfinite(latitude) and math.isfinite(longitude)):
+            raise ValueError(f"drone {node_id}: ({latitude}, {longitude}) is not a place")
+        if not -(2**15) <= height < 2**15:
+            raise ValueError(f"drone {node_id}: height {height} m does not fit a packet")
+        if node_id == self._node_id:
+            self._fly_to(Location(latitude, longitude, height))
+            return True
+        body = messages.GoToLocationMessage.BODY.pack(latitude, longitude, height)
+        if self._send_own(MessageType.MOVE_TO_LOCATION, node_id, body):
+            return True
+        _log.warning("gateway %d: no route to drone %d, it stays", self._node_id, node_id)
+        self._report(MeshEventKind.NO_ROUTE, node_id)
+        return False
+
+    def _begin(self) -> None:
+        self._internet.connect(self)
+
+    def _check(self) -> None:
+        self._routing.maintain_routing()
+
+    def _on_present(self, hello: messages.IntroduceMessage) -> None:
+        if not hello.know_gateway:
+            self.send_heartbeat(hello.creator)
+
+    def _on_heartbeat(self, heartbeat: messages.HeartbeatMessage) -> None:
+        if not heartbeat.is_from_gateway:
+            self.send_heartbeat(heartbeat.creator)
+
+    def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
+        """A gateway does not fly for the mesh."""
+
+    def _flight_started(self) -> None:
+        """A gateway stays connected wherever it is."""

@@ -1,0 +1,301 @@
+"""MeshnetworkRouter: keeps a connection to a gateway, and flies back when it is lost for too long.
+
+Reference, section 9; SDD 3.2.4.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import NamedTuple, Optional
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.interfaces import (
+    MAX_NODE_ID,
+    NO_ROUTE,
+    IRoutingTechnique,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.negotiation import NO_BID, Negotiation
+from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
+from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S, MeshTiming
+from drone_mesh.drone.interfaces import IDroneEngine
+
+
+class Shortcut(NamedTuple):
+    """A neighbour that presented itself with fewer hops than the way in use."""
+
+    neighbour: int
+    hops: int
+
+
+class MeshnetworkRouter(MeshnetworkComponent):
+    """A node that forwards for others and is not itself a gateway."""
+
+    def __init__(
+        self,
+        node_id: int,
+        antenna: IWirelessCommunication,
+        engine: IDroneEngine,
+        routing: IRoutingTechnique,
+        rng: random.Random,
+        timing: Optional[MeshTiming] = None,
+        observer: MeshObserver = ignore_events,
+        debug: bool = True,
+    ) -> None:
+        """As MeshnetworkComponent."""
+        super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
+        # Connected, but for the moment between a heartbeat to the gateway and its answer.
+        self._awaiting_answer = False
+        self._answer_due_s = math.inf
+        self._heartbeat_sent_s = -math.inf
+        self._answered_s = -math.inf
+        # False from the moment a check finds the connection gone: the next answer is a new start.
+        self._settled = False
+        self._shown_connected = False
+        self._lost_since_s: Optional[float] = None
+        self._shortcut: Optional[Shortcut] = None
+        self._negotiation = Negotiation(self._timing.check_period_s)
+
+    @property
+    def next_tick_s(self) -> float:
+        """When `tick` wants to be called next."""
+        return min(super().next_tick_s, self._answer_due_s, self._negotiation.due_s)
+
+    def tick(self, now_s: float) -> None:
+        """Do what is due."""
+        if now_s >= self._answer_due_s:
+            self._now_s = now_s
+            self._stop_awaiting()
+        super().tick(now_s)
+        if self._negotiation.running:
+            self._decide_negotiation()
+
+    def get_connected_to_gateway(self) -> bool:
+        """Whether a gateway answered last time, or may still answer."""
+        return self._connected or self._awaiting_answer
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        """As MeshnetworkComponent; what was lost or heard may decide a negotiation."""
+        super().on_msg(payload, now_s)
+        if self._negotiation.running:
+            self._decide_negotiation()
+
+    def on_antenna_power(self, on: bool, now_s: float) -> None:
+        """Switched off: not connected at once."""
+        super().on_antenna_power(on, now_s)
+        if not on:
+            self._disconnect()
+            self._lost_since_s = None
+            self._negotiation.clear()
+
+    def send_heartbeat(self, other: int) -> bool:
+        """A heartbeat towards `other`; the one to the preferred gateway wants an answer."""
+        if other == self._preferred_gateway:
+            return self._send_heartbeat_to_gateway()
+        return super().send_heartbeat(other)
+
+    # The periodic check ----------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        pass
+
+    def _check(self) -> None:
+        was_connected = self._knows_gateway()
+        self._routing.maintain_routing()
+        if was_connected:
+            self._lost_since_s = None
+            self._ask_for_locations()
+            self._send_heartbeat_to_gateway()
+        elif self._flight is None:
+            self._lost_connection()
+
+    def _ask_for_locations(self) -> None:
+        next_hop = self.get_route_to_gateway()
+        if self._gateway_location is None or next_hop == self._preferred_gateway:
+            self._send_own(MessageType.REQUESTLOCATION, self._preferred_gateway)
+        if next_hop not in (self._preferred_gateway, NO_ROUTE):
+            self._send_own(MessageType.REQUESTLOCATION, next_hop)
+
+    # Connection ------------------------------------------------------------------------------
+
+    def _knows_gateway(self) -> bool:
+        return self._connected or self._awaiting_answer
+
+    def _send_heartbeat_to_gateway(self) -> bool:
+        now_s = self._now_s
+        if now_s - self._heartbeat_sent_s < HEARTBEAT_ANSWER_S:
+            return True  # one is under way
+        gateway = self._preferred_gateway
+        body = self._heartbeat_body()
+        self._connected = False
+        self._awaiting_answer = True
+        self._answer_due_s = now_s + HEARTBEAT_ANSWER_S
+        self._heartbeat_sent_s = now_s
+        shortcut, self._shortcut = self._shortcut, None
+        me = self._node_id
+        if shortcut is not None and shortcut.hops + 1 < self._hops:
+            to = shortcut.neighbour
+            packet = messages.packet(MessageType.HEARTBEAT, me, me, to, gateway, body)
+            if self._send(packet, to):
+                return True
+        if self._send_own(MessageType.HEARTBEAT, gateway, body):
+            return True
+        self._heartbeat_sent_s = -math.inf
+        self._stop_awaiting()
+        return False
+
+    def _stop_awaiting(self) -> None:
+        self._awaiting_answer = False
+        self._answer_due_s = math.inf
+        self._show_connection()
+
+    def _show_connection(self) -> None:
+        connected = self._knows_gateway()
+        if connected != self._shown_connected:
+            self._shown_connected = connected
+            kind = MeshEventKind.CONNECTED if connected else MeshEventKind.DISCONNECTED
+            detail = f"{self._hops} hops" if connected else ""
+            self._report(kind, self._preferred_gateway, detail)
+
+    def _disconnect(self) -> None:
+        """Not connected, and hop counts of the past must not look good (reference 14.8)."""
+        self._connected = False
+        self._settled = False
+        self._hops = NO_ROUTE
+        self._heartbeat_sent_s = self._answered_s = -math.inf
+        self._stop_awaiting()
+
+    def _prefer(self, gateway: int) -> None:
+        if gateway != self._preferred_gateway:
+            if self._preferred_gateway != NO_ROUTE:
+                self._report(MeshEventKind.GATEWAY_CHANGED, gateway)
+            self._preferred_gateway = gateway
+            self._gateway_location = None
+
+    def _on_present(self, hello: messages.IntroduceMessage) -> None:
+        neighbour = hello.creator
+        knows = self._knows_gateway()
+        if hello.know_gateway != knows:
+            self.send_heartbeat(neighbour)
+        elif knows and hello.hops_until_gateway + 1 < self._hops:
+            if self._shortcut is None or hello.hops_until_gateway < self._shortcut.hops:
+                self._shortcut = Shortcut(neighbour, hello.hops_until_gateway)
+
+    def _on_heartbeat(self, heartbeat: messages.HeartbeatMessage) -> None:
+        if heartbeat.is_from_gateway:
+            self._on_gateway_answer(heartbeat.creator, heartbeat.hops + 1)
+            return
+        knows = self._knows_gateway()
+        if knows and not heartbeat.know_gateway:
+            self.send_heartbeat(heartbeat.creator)
+        elif heartbeat.know_gateway and not knows:
+            self._take_gateway(heartbeat.preferred_gateway, heartbeat.from_)
+
+    def _take_gateway(self, gateway: int, neighbour: int) -> None:
+        """Try the gateway of a neighbour; other ways to it did not work."""
+        if gateway > MAX_NODE_ID or gateway == self._node_id:
+            return
+        self._prefer(gateway)
+        self._drop_routes_to(gateway)
+        self._routing.other_can_communicate_with_node(neighbour, gateway)
+        self._send_heartbeat_to_gateway()
+
+    def _on_gateway_answer(self, gateway: int, hops: int) -> None:
+        if gateway != self._preferred_gateway:
+            recent = self._now_s - self._answered_s <= self._timing.check_period_s
+            if (self._knows_gateway() or recent) and hops >= self._hops:
+                return
+            self._prefer(gateway)
+        self._connected = True
+        self._hops = min(hops, NO_ROUTE)
+        self._answered_s = self._now_s
+        self._lost_since_s = None
+        self._stop_awaiting()
+        if not self._settled:
+            self._settled = True
+            self._negotiation.clear()
+            self.search_other_nodes_in_range()
+            self._ask_for_locations()
+
+    # Lost connection -------------------------------------------------------------------------
+
+    def _lost_connection(self) -> None:
+        if self._lost_since_s is None:
+            self._lost_since_s = self._now_s
+            self._disconnect()
+            if self._preferred_gateway != NO_ROUTE:
+                self._drop_routes_to(self._preferred_gateway)
+                self._tell_missing(self._preferred_gateway)
+        elif self._now_s - self._lost_since_s >= self._timing.connection_lost_after_s:
+            self._emergency()
+
+    def _emergency(self) -> None:
+        self._report(MeshEventKind.EMERGENCY)
+        if self._routing.empty():
+            self._lost_since_s = None
+            self._fly_back()
+        elif not self._negotiation.running:
+            self._negotiate()
+
+    def _fly_back(self) -> None:
+        """One step back towards the gateway; who knows no place has nowhere to fly (14.7)."""
+        place = self._good_location or self._gateway_location
+        if place is None:
+            return
+        at = self._good_location_id if self._good_location else self._preferred_gateway
+        self._report(MeshEventKind.FLIGHT_DECIDED, at)
+        self._forget_neighbourhood()
+        self._fly_to(place)
+
+    def _flight_started(self) -> None:
+        self._disconnect()
+        self._lost_since_s = None
+        self._negotiation.clear()
+        self._set_good_location(self._preferred_gateway, self._gateway_location)
+
+    def _landed(self) -> None:
+        self._disconnect()
+        super()._landed()
+
+    # Negotiation -----------------------------------------------------------------------------
+
+    def _negotiate(self) -> None:
+        score = self._score()
+        self._report(MeshEventKind.NEGOTIATION_STARTED, detail=f"score {score:.2f}")
+        self._negotiation.start(self._node_id, score, self._now_s)
+        body = messages.MovementNegotiationMessage.BODY.pack(score)
+        for neighbour in sorted(self._routing.get_set_of_children()):
+            self._send_own(MessageType.MOVEMENT_NEGOTIATION, neighbour, body)
+        self._decide_negotiation()
+
+    def _score(self) -> float:
+        """Distance to the gateway's place in metres (SDD formula 3.1), or NO_BID."""
+        own = self._own_location()
+        if own is None or self._gateway_location is None or self._good_location is None:
+            return NO_BID
+        if self._good_location_id in self._routing.get_set_of_children():
+            return NO_BID
+        return own.distance_m(self._gateway_location)
+
+    def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
+        self._negotiation.heard(bid.creator, bid.cost, self._now_s)
+        if (
+            self._lost_since_s is not None
+            and not self._knows_gateway()
+            and not self._negotiation.running
+        ):
+            self._negotiate()
+
+    def _decide_negotiation(self) -> None:
+        if not self._negotiation.is_decided(self._routing.get_set_of_children(), self._now_s):
+            return
+        winner = self._negotiation.winner()
+        self._negotiation.clear()
+        self._lost_since_s = None
+        flies = NO_ROUTE if winner is None else winner
+        self._report(MeshEventKind.NEGOTIATION_ENDED, flies)
+        if winner == self._node_id:
+            self._fly_back()
