@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Dict, FrozenSet, Optional, Set
-
 from drone_mesh.communication.interfaces import NO_ROUTE, IRoutingEssentials, IRoutingTechnique
 
 
@@ -11,10 +9,10 @@ class ChildTableTree(IRoutingTechnique):
     """Direct neighbours ("children"), and per child the nodes that it can reach ("grandchildren")."""
 
     def __init__(self) -> None:
-        self._children: Dict[int, Set[int]] = {}
+        self._children: dict[int, set[int]] = {}
         # The same table the other way round, so that no packet has to search it.
-        self._children_with: Dict[int, Set[int]] = {}
-        self._essentials: Optional[IRoutingEssentials] = None
+        self._children_with: dict[int, set[int]] = {}
+        self._essentials: IRoutingEssentials | None = None
 
     def get_direction_to_node(self, node: int) -> int:
         """The node itself if it is a child, else the child with the lowest id that has it."""
@@ -95,7 +93,7 @@ class ChildTableTree(IRoutingTechnique):
         """Number of nodes in direct reach."""
         return len(self._children)
 
-    def get_set_of_children(self) -> FrozenSet[int]:
+    def get_set_of_children(self) -> frozenset[int]:
         """Ids of the nodes in direct reach."""
         return frozenset(self._children)
 

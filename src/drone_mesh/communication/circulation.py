@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Deque, Dict, NamedTuple, Optional, Tuple
+from typing import NamedTuple
 
 from drone_mesh.communication.timing import CIRCULATION_S
 
@@ -23,10 +23,10 @@ class CirculationGuard:
     """
 
     def __init__(self) -> None:
-        self._passages: Dict[bytes, Passage] = {}
-        self._ages: Deque[Tuple[float, bytes]] = deque()
+        self._passages: dict[bytes, Passage] = {}
+        self._ages: deque[tuple[float, bytes]] = deque()
 
-    def came_round(self, identity: bytes, came_from: int, now_s: float) -> Optional[Passage]:
+    def came_round(self, identity: bytes, came_from: int, now_s: float) -> Passage | None:
         """The first passage of a packet that now comes from another neighbour; None if it is fine."""
         while self._ages and now_s - self._ages[0][0] >= CIRCULATION_S:
             at_s, old = self._ages.popleft()

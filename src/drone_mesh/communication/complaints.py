@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from typing import Dict
 
 COMPLAINT_PERIOD_S = 30.0  # our choice: one line per reason and node in this time
 
@@ -16,7 +15,7 @@ class Complaints:
 
     def __init__(self, node_id: int) -> None:
         self._node_id = node_id
-        self._said_s: Dict[str, float] = {}
+        self._said_s: dict[str, float] = {}
         self.counts: Counter[str] = Counter()
 
     def add(self, reason: str, detail: str, now_s: float) -> None:

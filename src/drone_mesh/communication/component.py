@@ -10,7 +10,6 @@ import abc
 import math
 import random
 from collections import deque
-from typing import Deque, Dict, List, Optional, Tuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.circulation import CirculationGuard
@@ -35,8 +34,9 @@ from drone_mesh.communication.observer import (
     ignore_events,
 )
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
-from drone_mesh.errors import LocationUnknown
+from drone_mesh.errors import GoalRefused, LocationUnknown
 
 INTRODUCE_AFTER_POWER_S = 0.2  # our choice: the medium has to hear of the antenna first
 INTRODUCE_SPREAD_S = 1.0  # our choice: after an outage not everybody speaks at once
@@ -57,7 +57,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         engine: IDroneEngine,
         routing: IRoutingTechnique,
         rng: random.Random,
-        timing: Optional[MeshTiming] = None,
+        timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
     ) -> None:
@@ -79,16 +79,16 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._connected = False
         self._preferred_gateway = NO_ROUTE
         self._hops = NO_ROUTE
-        self._gateway_location: Optional[Location] = None
-        self._good_location: Optional[Location] = None
+        self._gateway_location: Location | None = None
+        self._good_location: Location | None = None
         self._good_location_id = NO_ROUTE
         self._total_sent = 0
-        self._heard_s: Dict[int, float] = {}
+        self._heard_s: dict[int, float] = {}
         self._check_due_s = math.inf
         self._introduce_due_s = math.inf
-        self._flight: Optional[Flight] = None
+        self._flight: Flight | None = None
         self._circulation = CirculationGuard()
-        self._missing_to_tell: Deque[Tuple[int, int, int]] = deque()
+        self._missing_to_tell: deque[tuple[int, int, int]] = deque()
         self._telling = False
         self.complaints = Complaints(node_id)
 
@@ -131,10 +131,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
                 self._flight = None
                 self._landed()
         if now_s >= self._check_due_s:
-            period_s = self._timing.check_period_s
-            self._check_due_s += period_s * max(1, math.ceil((now_s - self._check_due_s) / period_s))
+            due_s, period_s = self._check_due_s, self._timing.check_period_s
+            self._check_due_s += period_s * ((now_s - due_s) // period_s + 1.0)
             if self._antenna.on():
-                self._check()
+                self._check(due_s)
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """Learn from a packet, then process it or send it on. Bad packets are dropped and counted."""
@@ -154,7 +154,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._drop("not a finite number", payload)
             return
         self._learn(creator, from_, kind)
-        if forward == me or forward == BROADCAST:
+        if forward in (me, BROADCAST):
             self._process(payload, creator, from_, kind)
         else:
             self._forward(payload, creator, from_, kind, forward)
@@ -202,17 +202,21 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """Known nodes; one that is known through two neighbours counts twice."""
         return self._routing.get_table_size()
 
-    def get_neighbours(self) -> Dict[int, float]:
+    def get_neighbours(self) -> dict[int, float]:
         """Direct neighbours, and when each was last heard (seconds of the core's clock)."""
         return dict(self._heard_s)
 
     def get_route_to_gateway(self) -> int:
         """The neighbour that leads to the preferred gateway; the own id for a gateway itself."""
-        if self._preferred_gateway in (self._node_id, NO_ROUTE):
-            return self._preferred_gateway
-        return self._routing.get_direction_to_node(self._preferred_gateway)
+        return self.get_direction_to(self._preferred_gateway)
 
-    def get_goal(self) -> Optional[Location]:
+    def get_direction_to(self, node: int) -> int:
+        """The neighbour that leads to `node`; the own id for the node itself."""
+        if node in (self._node_id, NO_ROUTE):
+            return node
+        return self._routing.get_direction_to_node(node)
+
+    def get_goal(self) -> Location | None:
         """Where the drone is flying to; None while it is not."""
         flight = self._flight
         return flight.goal if flight is not None else None
@@ -238,8 +242,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """The start of this kind of node, before routing starts."""
 
     @abc.abstractmethod
-    def _check(self) -> None:
-        """What is to be done once a period while the antenna is on."""
+    def _check(self, due_s: float) -> None:
+        """What is to be done once a period while the antenna is on; it was due at `due_s`."""
 
     @abc.abstractmethod
     def _on_present(self, hello: messages.IntroduceMessage) -> None:
@@ -290,10 +294,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             if missing != self._node_id:
                 self._forget_route(creator, missing, told_by=from_)
         elif kind == MessageType.MOVE_TO_LOCATION:
-            order = messages.GoToLocationMessage.from_payload(payload)
-            goal = Location(order.latitude, order.longitude, order.height)
-            self._report(MeshEventKind.FLIGHT_ORDERED, creator, _in_words(goal))
-            self._fly_to(goal)
+            self._on_order(messages.GoToLocationMessage.from_payload(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
             self._on_negotiation(messages.MovementNegotiationMessage.from_payload(payload))
         else:
@@ -307,6 +308,16 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._gateway_location = location
         if self.get_route_to_gateway() == message.creator:
             self._set_good_location(message.creator, location)
+
+    def _on_order(self, order: messages.GoToLocationMessage) -> None:
+        goal = Location(order.latitude, order.longitude, order.height)
+        try:
+            check_goal(*goal)
+        except GoalRefused as error:
+            self.complaints.add("order refused", str(error), self._now_s)
+            return
+        self._report(MeshEventKind.FLIGHT_ORDERED, order.creator, _in_words(goal))
+        self._fly_to(goal)
 
     def _forward(self, payload: bytes, creator: int, from_: int, kind: int, forward: int) -> None:
         routing = self._routing
@@ -322,7 +333,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
                 return
         for _attempt in range(2):
             to = routing.get_direction_to_node(forward)
-            if to == NO_ROUTE or to == from_:
+            if to in (NO_ROUTE, from_):
                 self._tell_missing(forward, first=from_)
                 return
             sent_on = messages.next_hop(payload, self._node_id, to)
@@ -357,7 +368,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     def _send_own(self, kind: int, other: int, body: bytes = b"") -> bool:
         """Send a packet of our own towards `other`, over one route after the other."""
         me = self._node_id
-        tried: List[int] = []
+        tried: list[int] = []
         while True:
             to = self._routing.get_direction_to_node(other)
             if to == NO_ROUTE or to in tried:
@@ -448,7 +459,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._heard_s.clear()
         self._routing.node_moved_location()
 
-    def _own_location(self) -> Optional[Location]:
+    def _own_location(self) -> Location | None:
         try:
             location = self._engine.get_location()
             if not all(map(math.isfinite, location)):
@@ -458,7 +469,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self.complaints.add("own location unknown", str(error), self._now_s)
             return None
 
-    def _set_good_location(self, node: int, location: Optional[Location]) -> None:
+    def _set_good_location(self, node: int, location: Location | None) -> None:
         self._good_location = location
         self._good_location_id = NO_ROUTE if location is None else node
 
@@ -470,7 +481,7 @@ def _in_words(place: Location) -> str:
     return f"to x {place.longitude:.2f} m, y {place.latitude:.2f} m, z {place.height:.0f} m"
 
 
-def _on_the_wire(location: Location) -> Tuple[float, float, int]:
+def _on_the_wire(location: Location) -> tuple[float, float, int]:
     """Heights travel as int16, whole metres (reference, section 11)."""
     height = max(-(2**15), min(2**15 - 1, round(location.height)))
     return location.latitude, location.longitude, height

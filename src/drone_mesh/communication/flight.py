@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Optional
-
 from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
 from drone_mesh.drone.interfaces import Location
 
@@ -17,10 +15,10 @@ class Flight:
     def __init__(self, goal: Location, now_s: float) -> None:
         self.goal = goal
         self.next_ask_s = now_s + FLIGHT_POSITION_PERIOD_S
-        self._last: Optional[Location] = None
+        self._last: Location | None = None
         self._unanswered = 0
 
-    def is_over(self, location: Optional[Location], now_s: float) -> bool:
+    def is_over(self, location: Location | None, now_s: float) -> bool:
         """Take note of where the drone is (None: it cannot say); whether it has landed.
 
         Landed is within 0.1 m of the goal, or no longer moving between two questions.

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-import math
 import random
-from typing import Optional
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.component import MeshnetworkComponent
@@ -19,7 +17,9 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import GoalRefused
 
 _log = logging.getLogger(__name__)
 
@@ -35,7 +35,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         routing: IRoutingTechnique,
         internet: IInternetConnection,
         rng: random.Random,
-        timing: Optional[MeshTiming] = None,
+        timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
     ) -> None:
@@ -56,15 +56,12 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     ) -> bool:
         """Send a drone to a place (metres). True: there was a route and the next hop took it.
 
-        Raises ValueError for an id that no node has and for numbers that are no place.
+        Raises GoalRefused for an id that no node has and for numbers that are no place.
         """
         self._now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
-            raise ValueError(f"drone {node_id}: ids are 0..{MAX_NODE_ID}")
-        if not (math.isfinite(latitude) and math.isfinite(longitude)):
-            raise ValueError(f"drone {node_id}: ({latitude}, {longitude}) is not a place")
-        if not -(2**15) <= height < 2**15:
-            raise ValueError(f"drone {node_id}: height {height} m does not fit a packet")
+            raise GoalRefused(f"drone {node_id}: ids are 0..{MAX_NODE_ID}")
+        check_goal(latitude, longitude, height)
         if node_id == self._node_id:
             self._fly_to(Location(latitude, longitude, height))
             return True
@@ -78,7 +75,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _begin(self) -> None:
         self._internet.connect(self)
 
-    def _check(self) -> None:
+    def _check(self, due_s: float) -> None:
         self._routing.maintain_routing()
 
     def _on_present(self, hello: messages.IntroduceMessage) -> None:

@@ -8,7 +8,6 @@ snapshots and may be read from any thread.
 from __future__ import annotations
 
 import abc
-from typing import FrozenSet
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = 253  # reference, section 3
@@ -77,7 +76,7 @@ class IGatewayCommands(abc.ABC):
     ) -> bool:
         """Send a drone to a place (metres). True: there was a route and the next hop took the order.
 
-        Nothing is told back about its arrival. Raises ValueError for numbers that are no place.
+        Nothing is told back about its arrival. Raises GoalRefused for what is no order.
         """
 
 
@@ -183,7 +182,7 @@ class IRoutingTechnique(abc.ABC):
         """Number of nodes in direct reach."""
 
     @abc.abstractmethod
-    def get_set_of_children(self) -> FrozenSet[int]:
+    def get_set_of_children(self) -> frozenset[int]:
         """Ids of the nodes in direct reach."""
 
     @abc.abstractmethod

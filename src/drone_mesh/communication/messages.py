@@ -12,7 +12,7 @@ import enum
 import math
 import struct
 from dataclasses import dataclass
-from typing import ClassVar, Dict, Tuple, Type, Union
+from typing import ClassVar, Union
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.errors import PacketError
@@ -223,7 +223,7 @@ _TypedMessage = Union[
 ]
 AnyMessage = Union[Message, _TypedMessage]
 
-_CLASS_OF_TYPE: Dict[int, Type[AnyMessage]] = {
+_CLASS_OF_TYPE: dict[int, type[AnyMessage]] = {
     MessageType.LOCATION: LocationMessage,
     MessageType.PRESENT: IntroduceMessage,
     MessageType.HEARTBEAT: HeartbeatMessage,
@@ -231,7 +231,7 @@ _CLASS_OF_TYPE: Dict[int, Type[AnyMessage]] = {
     MessageType.MOVE_TO_LOCATION: GoToLocationMessage,
     MessageType.MOVEMENT_NEGOTIATION: MovementNegotiationMessage,
 }
-_NUMBERS: Dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
+_NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
     MessageType.LOCATION: struct.Struct("<ff"),
     MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
     MessageType.MOVEMENT_NEGOTIATION: struct.Struct("<f"),
@@ -283,7 +283,7 @@ def _packed(message: _TypedMessage, *values: float) -> bytes:
         raise PacketError(f"{message} does not fit its packet: {error}") from error
 
 
-def _unpacked(kind: MessageType, body: struct.Struct, payload: bytes) -> Tuple:  # type: ignore[type-arg]
+def _unpacked(kind: MessageType, body: struct.Struct, payload: bytes) -> tuple:  # type: ignore[type-arg]
     _check_length(payload)
     creator, from_, found, to, forward = payload[:HEADER_BYTES]
     if found != kind:

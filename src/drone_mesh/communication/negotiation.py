@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import AbstractSet, Dict, NamedTuple, Optional
+from typing import AbstractSet, NamedTuple
 
 NO_BID = -1.0  # the score of a node that does not fly
 
@@ -21,8 +21,8 @@ class Negotiation:
     def __init__(self, patience_s: float) -> None:
         """`patience_s`: how long to wait for a bid, and how long a bid stays good."""
         self._patience_s = patience_s
-        self._bids: Dict[int, Bid] = {}
-        self._until_s: Optional[float] = None
+        self._bids: dict[int, Bid] = {}
+        self._until_s: float | None = None
 
     @property
     def running(self) -> bool:
@@ -49,7 +49,7 @@ class Negotiation:
         """Whether every neighbour has bid, or has had its time (reference 14.5)."""
         return now_s >= self.due_s or neighbours <= self._bids.keys()
 
-    def winner(self) -> Optional[int]:
+    def winner(self) -> int | None:
         """Highest score, of equal scores the lowest id; None when nobody bids 0 or more."""
         able = [(-bid.score, node) for node, bid in self._bids.items() if bid.score >= 0]
         return min(able)[1] if able else None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import random
-from typing import NamedTuple, Optional
+from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.component import MeshnetworkComponent
@@ -22,6 +22,9 @@ from drone_mesh.communication.negotiation import NO_BID, Negotiation
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S, MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
+
+
+ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
 class Shortcut(NamedTuple):
@@ -41,7 +44,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         engine: IDroneEngine,
         routing: IRoutingTechnique,
         rng: random.Random,
-        timing: Optional[MeshTiming] = None,
+        timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
     ) -> None:
@@ -55,8 +58,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
         # False from the moment a check finds the connection gone: the next answer is a new start.
         self._settled = False
         self._shown_connected = False
-        self._lost_since_s: Optional[float] = None
-        self._shortcut: Optional[Shortcut] = None
+        self._lost_since_s: float | None = None
+        self._shortcut: Shortcut | None = None
         self._negotiation = Negotiation(self._timing.check_period_s)
 
     @property
@@ -102,7 +105,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _begin(self) -> None:
         pass
 
-    def _check(self) -> None:
+    def _check(self, due_s: float) -> None:
         was_connected = self._knows_gateway()
         self._routing.maintain_routing()
         if was_connected:
@@ -110,7 +113,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._ask_for_locations()
             self._send_heartbeat_to_gateway()
         elif self._flight is None:
-            self._lost_connection()
+            self._lost_connection(due_s)
 
     def _ask_for_locations(self) -> None:
         next_hop = self.get_route_to_gateway()
@@ -222,14 +225,15 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     # Lost connection -------------------------------------------------------------------------
 
-    def _lost_connection(self) -> None:
+    def _lost_connection(self, due_s: float) -> None:
+        """Measured from check to check as they were due: a late one must not cost a whole period."""
         if self._lost_since_s is None:
-            self._lost_since_s = self._now_s
+            self._lost_since_s = due_s
             self._disconnect()
             if self._preferred_gateway != NO_ROUTE:
                 self._drop_routes_to(self._preferred_gateway)
                 self._tell_missing(self._preferred_gateway)
-        elif self._now_s - self._lost_since_s >= self._timing.connection_lost_after_s:
+        elif due_s - self._lost_since_s >= self._timing.connection_lost_after_s - ROUNDING_S:
             self._emergency()
 
     def _emergency(self) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import importlib
-from typing import Callable, Dict
+from typing import Callable
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import IRoutingTechnique
 from drone_mesh.errors import ConfigurationError
 
-ROUTING_TECHNIQUES: Dict[str, Callable[[], IRoutingTechnique]] = {
+ROUTING_TECHNIQUES: dict[str, Callable[[], IRoutingTechnique]] = {
     "child_table_tree": ChildTableTree,
 }
 

@@ -1,0 +1,56 @@
+"""A drone without a world: it flies its path by the virtual clock."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.world.flight_path import FlightPath
+
+
+class InProcessDrone(IDroneEngine):
+    """Where one drone is. Flies as those of the world do (reference, section 11)."""
+
+    def __init__(
+        self, clock: VirtualClock, start: Location, on_flight: Callable[[bool], None]
+    ) -> None:
+        """`on_flight` is told when a flight starts (True) and when it is over (False)."""
+        self._clock = clock
+        self._place = start
+        self._path: FlightPath | None = None
+        self._on_flight = on_flight
+
+    @property
+    def flying(self) -> bool:
+        """Whether it is on its way."""
+        return self._path is not None
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly there. Raises GoalRefused for a place out of bounds."""
+        check_goal(latitude, longitude, height)
+        here = self.get_location()
+        goal = (longitude, latitude, height)
+        target = self._path.goal if self._path else (here.longitude, here.latitude, here.height)
+        if goal == target:
+            return
+        if self._path is None:
+            self._on_flight(True)
+        self._path = FlightPath(
+            (here.longitude, here.latitude, here.height), goal, self._clock.now_s
+        )
+        self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
+
+    def get_location(self) -> Location:
+        """Where it is now. Never raises."""
+        if self._path is None:
+            return self._place
+        x, y, z = self._path.position_at(self._clock.now_s)
+        return Location(latitude=y, longitude=x, height=z)
+
+    def _arrive(self, path: FlightPath) -> None:
+        if path is self._path:  # not replanned on the way
+            self._place = Location(path.goal[1], path.goal[0], path.goal[2])
+            self._path = None
+            self._on_flight(False)

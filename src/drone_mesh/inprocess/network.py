@@ -1,0 +1,248 @@
+"""A whole mesh in one process, under a virtual clock: for tests, experiments and benchmarks."""
+
+from __future__ import annotations
+
+import logging
+import random
+from typing import Callable, Iterable
+
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.interfaces import (
+    NO_ROUTE,
+    IGatewayCommands,
+    IInternetConnection,
+    IMeshNetwork,
+)
+from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.communication.router import MeshnetworkRouter
+from drone_mesh.communication.routing import create_routing_technique
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.drone import InProcessDrone
+from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
+from drone_mesh.world.factory import plan_fleet
+from drone_mesh.world.drones import DroneRole
+
+_log = logging.getLogger(__name__)
+
+STEP_S = 0.1  # how closely run_until looks
+
+
+class NoInternet(IInternetConnection):
+    """Orders come from whoever holds the network."""
+
+    def connect(self, commands: IGatewayCommands) -> None:
+        """Nothing to connect."""
+
+    def disconnect(self) -> None:
+        """Nothing to disconnect."""
+
+
+class Node:
+    """One drone of the network with all that it carries."""
+
+    def __init__(
+        self, component: MeshnetworkComponent, antenna: InProcessAntenna, drone: InProcessDrone
+    ) -> None:
+        self.component = component
+        self.antenna = antenna
+        self.drone = drone
+        self.planned_tick_s = -1.0
+
+    @property
+    def is_gateway(self) -> bool:
+        """Whether it is a gateway."""
+        return isinstance(self.component, MeshnetworkGateway)
+
+
+class Network:
+    """Drones, their mesh software and an in-process radio. The same seed gives the same run.
+
+    >>> network = Network(seed=1)
+    >>> network.add_fleet(gateways=1, routers=16, gridsize=4, spacing=6.0)
+    >>> network.run_until(network.all_connected, within_s=15.0)
+    True
+    """
+
+    def __init__(
+        self,
+        seed: int = 0,
+        timing: MeshTiming | None = None,
+        routing: str = "child_table_tree",
+        max_distance_m: float = 9.0,
+        loss: float = 0.0,
+        delay_s: float = HOP_DELAY_S,
+        jitter_s: float = 0.0,
+    ) -> None:
+        """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file."""
+        self._rng = random.Random(seed)
+        self._timing = timing or MeshTiming()
+        self._routing = routing
+        self.clock = VirtualClock()
+        self.air = InProcessAir(
+            self.clock,
+            self._deliver,
+            random.Random(self._rng.random()),
+            max_distance_m,
+            loss,
+            delay_s,
+            jitter_s,
+        )
+        self.nodes: dict[int, Node] = {}
+        self.events: list[MeshEvent] = []
+
+    # Building --------------------------------------------------------------------------------
+
+    def add_gateway(self, node_id: int, x: float, y: float, start_s: float = 0.0) -> None:
+        """A gateway at (x, y) metres on the ground; it starts at `start_s`."""
+        self._add(node_id, x, y, start_s, gateway=True)
+
+    def add_router(self, node_id: int, x: float, y: float, start_s: float = 0.0) -> None:
+        """A router at (x, y) metres on the ground; it starts at `start_s`."""
+        self._add(node_id, x, y, start_s, gateway=False)
+
+    def add_fleet(
+        self,
+        gateways: int = 1,
+        routers: int = 17,
+        gridsize: int = 6,
+        spacing: float = 1.0,
+        apart_s: float = 0.0,
+    ) -> None:
+        """The fleet that the factory would make; each drone starts `apart_s` after the last one."""
+        for place in plan_fleet(gateways, routers, gridsize, spacing):
+            self._add(
+                place.node_id,
+                place.longitude,
+                place.latitude,
+                place.node_id * apart_s,
+                gateway=place.role is DroneRole.GATEWAY,
+            )
+
+    def _add(self, node_id: int, x: float, y: float, start_s: float, gateway: bool) -> None:
+        if node_id in self.nodes:
+            raise ValueError(f"node {node_id} is there already")
+        drone = InProcessDrone(self.clock, Location(y, x, 0.0), self.air.flight)
+        antenna = InProcessAntenna(self.air, node_id, drone)
+        routing = create_routing_technique(self._routing)
+        rng = random.Random(self._rng.random())
+        component: MeshnetworkComponent
+        if gateway:
+            component = MeshnetworkGateway(
+                node_id, antenna, drone, routing, NoInternet(), rng, self._timing, self._observe
+            )
+        else:
+            component = MeshnetworkRouter(
+                node_id, antenna, drone, routing, rng, self._timing, self._observe
+            )
+        node = Node(component, antenna, drone)
+        self.nodes[node_id] = node
+        self.clock.call_at(start_s, self._start, node)
+
+    # Acting ----------------------------------------------------------------------------------
+
+    def power(self, node_id: int, on: bool) -> None:
+        """Switch a node's antenna."""
+        node = self.nodes[node_id]
+        if node.antenna.powered != on:
+            node.antenna.powered = on
+            node.component.on_antenna_power(on, self.clock.now_s)
+            self._plan(node)
+
+    def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> bool:
+        """Order a drone to (x, y, height) metres through a gateway; as IGatewayCommands."""
+        node = self.nodes[gateway]
+        assert isinstance(node.component, MeshnetworkGateway)
+        taken = node.component.send_goal_request_to_drone(node_id, y, x, height, self.clock.now_s)
+        self._plan(node)
+        return taken
+
+    def inject(self, node_id: int, payload: bytes) -> None:
+        """Let a node hear a packet from nowhere."""
+        self._deliver(self.nodes[node_id].component, payload)
+
+    def run_for(self, seconds: float) -> None:
+        """Let simulated time pass."""
+        self.clock.run_until(self.clock.now_s + seconds)
+
+    def run_until(self, condition: Callable[[], bool], within_s: float) -> bool:
+        """Let time pass until `condition()` is true; False if it is not within so many seconds."""
+        deadline_s = self.clock.now_s + within_s
+        while not condition():
+            if self.clock.now_s >= deadline_s:
+                return False
+            self.clock.run_until(min(deadline_s, self.clock.now_s + STEP_S))
+        return True
+
+    # Looking ---------------------------------------------------------------------------------
+
+    def connected(self, node_id: int) -> bool:
+        """Whether a node is connected to a gateway."""
+        return self.nodes[node_id].component.get_connected_to_gateway()
+
+    def all_connected(self, among: Iterable[int] | None = None) -> bool:
+        """Whether each of these nodes (all that have power, if not said) is connected."""
+        if among is None:
+            among = [n for n, node in self.nodes.items() if node.antenna.powered]
+        return all(map(self.connected, among))
+
+    def hops(self, node_id: int) -> int:
+        """What a node believes its distance to the gateway to be."""
+        return self.nodes[node_id].component.get_hops_from_gateway_away()
+
+    def location(self, node_id: int) -> Location:
+        """Where a drone is."""
+        return self.nodes[node_id].drone.get_location()
+
+    def shortest_hops(self) -> dict[int, int]:
+        """Hops on the shortest path to a gateway, of all nodes that have a path, by id."""
+        hops = {n: 0 for n, node in self.nodes.items() if node.is_gateway and node.antenna.powered}
+        edge = list(hops)
+        while edge:
+            reached = []
+            for node_id in edge:
+                for other, antenna in self.air.in_range(node_id).items():
+                    if antenna.powered and other not in hops:
+                        hops[other] = hops[node_id] + 1
+                        reached.append(other)
+            edge = reached
+        return hops
+
+    def path_to_gateway(self, node_id: int) -> list[int] | None:
+        """The nodes that a packet for the node's gateway would pass, ends included; None: a loop."""
+        gateway = self.nodes[node_id].component.get_preferred_gateway()
+        path = [node_id]
+        while path[-1] != gateway:
+            step = self.nodes[path[-1]].component.get_direction_to(gateway)
+            if step == NO_ROUTE or step in path:
+                return None
+            path.append(step)
+        return path
+
+    # Driving the components ------------------------------------------------------------------
+
+    def _observe(self, event: MeshEvent) -> None:
+        self.events.append(event)
+
+    def _start(self, node: Node) -> None:
+        node.component.start(self.clock.now_s)
+        self._plan(node)
+
+    def _deliver(self, mesh: IMeshNetwork, payload: bytes) -> None:
+        mesh.on_msg(payload, self.clock.now_s)
+        self._plan(self.nodes[mesh.get_node_id()])
+
+    def _plan(self, node: Node) -> None:
+        """Have the component called when it wants to be; an earlier plan that stands is kept."""
+        next_s = node.component.next_tick_s
+        if next_s != node.planned_tick_s:
+            node.planned_tick_s = next_s
+            self.clock.call_at(next_s, self._tick, node)
+
+    def _tick(self, node: Node) -> None:
+        if self.clock.now_s >= node.component.next_tick_s:
+            node.component.tick(self.clock.now_s)
+            node.planned_tick_s = -1.0
+            self._plan(node)

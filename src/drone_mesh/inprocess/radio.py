@@ -1,0 +1,149 @@
+"""The in-process radio: an ideal disc that can lose, delay and cut."""
+
+from __future__ import annotations
+
+import random
+from typing import Callable
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import (
+    IMeshDebugInfo,
+    IMeshNetwork,
+    IWirelessCommunication,
+)
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.inprocess.clock import VirtualClock
+
+HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)
+
+Deliver = Callable[[IMeshNetwork, bytes], None]
+
+
+class InProcessAir:
+    """Who hears whom, and what becomes of packets on their way."""
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        deliver: Deliver,
+        rng: random.Random,
+        max_distance_m: float = 9.0,
+        loss: float = 0.0,
+        delay_s: float = HOP_DELAY_S,
+        jitter_s: float = 0.0,
+    ) -> None:
+        """`loss`: share of packets that do not arrive, and whose sender knows it.
+
+        A packet arrives after `delay_s` and a random part of `jitter_s`.
+        """
+        self._clock = clock
+        self._deliver = deliver
+        self._rng = rng
+        self._max_distance_m = max_distance_m
+        self.loss = loss
+        self._delay_s = delay_s
+        self._jitter_s = jitter_s
+        self._antennas: dict[int, InProcessAntenna] = {}
+        self._cut: set[frozenset[int]] = set()
+        self._flying = 0
+        self._in_range: dict[int, dict[int, InProcessAntenna]] = {}  # who stands still is remembered
+        self.delivered = 0
+
+    def add(self, antenna: InProcessAntenna) -> None:
+        """An antenna comes into reach of the others."""
+        self._antennas[antenna.node_id] = antenna
+        self._in_range.clear()
+
+    def remove(self, antenna: InProcessAntenna) -> None:
+        """An antenna is gone."""
+        self._antennas.pop(antenna.node_id, None)
+        self._in_range.clear()
+
+    def flight(self, started: bool) -> None:
+        """A drone took off (True) or came to a stop."""
+        self._flying += 1 if started else -1
+        self._in_range.clear()
+
+    def cut(self, one: int, other: int, off: bool = True) -> None:
+        """Cut the link between two nodes, or mend it."""
+        pair = frozenset((one, other))
+        (self._cut.add if off else self._cut.discard)(pair)
+        self._in_range.clear()
+
+    def in_range(self, node: int) -> dict[int, InProcessAntenna]:
+        """The antennas that `node` could reach if they were on, by id. Do not change it."""
+        found = self._in_range.get(node)
+        if found is None:
+            here = self._antennas[node].drone.get_location()
+            found = {
+                other: antenna
+                for other, antenna in self._antennas.items()
+                if other != node
+                and here.distance_m(antenna.drone.get_location()) < self._max_distance_m
+                and (not self._cut or frozenset((node, other)) not in self._cut)
+            }
+            if not self._flying:
+                self._in_range[node] = found
+        return found
+
+    def send(self, payload: bytes) -> bool:
+        """Hand a packet over; True when the receiver has it, or will in a moment."""
+        receiver = self.in_range(payload[messages.FROM]).get(payload[messages.TO])
+        if receiver is None or not receiver.powered:
+            return False
+        if self.loss and self._rng.random() < self.loss:
+            return False
+        self.delivered += 1
+        at_s = self._clock.now_s + self._delay_s
+        if self._jitter_s:
+            at_s += self._rng.random() * self._jitter_s
+        self._clock.call_at(at_s, receiver.receive, payload)
+        return True
+
+    def hand_over(self, mesh: IMeshNetwork, payload: bytes) -> None:
+        """A packet has arrived."""
+        self._deliver(mesh, payload)
+
+
+class InProcessAntenna(IWirelessCommunication):
+    """One node's radio."""
+
+    def __init__(self, air: InProcessAir, node_id: int, drone: IDroneEngine) -> None:
+        self.node_id = node_id
+        self.drone = drone
+        self.powered = True
+        self._air = air
+        self._mesh: IMeshNetwork | None = None
+
+    def start_antenna(self, mesh: IMeshNetwork) -> None:
+        """Be reachable."""
+        self._mesh = mesh
+        self._air.add(self)
+
+    def stop_antenna(self) -> None:
+        """Be gone."""
+        self._mesh = None
+        self._air.remove(self)
+
+    def send_message_to(self, payload: bytes) -> bool:
+        """Send to the node in byte 3."""
+        return self.powered and self._air.send(payload)
+
+    def broadcast_message(self, payload: bytes) -> None:
+        """Send to each node in range."""
+        if self.powered:
+            before, after = payload[: messages.TO], payload[messages.TO + 1 :]
+            for other in self._air.in_range(self.node_id):
+                self._air.send(before + bytes((other,)) + after)
+
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        """Nothing: whoever has the network has its nodes."""
+
+    def on(self) -> bool:
+        """Whether it has power."""
+        return self.powered
+
+    def receive(self, payload: bytes) -> None:
+        """A packet arrives; a node that is off hears nothing."""
+        if self.powered and self._mesh is not None:
+            self._air.hand_over(self._mesh, payload)
