@@ -1,1 +1,1 @@
-"""The mesh software: no ROS, no pybullet, no SPI, no clock, no threads, no randomness of its own."""
+"""The mesh software: no ROS, no pybullet, no SPI; no clock, threads or chance of its own."""

@@ -1,4 +1,4 @@
-"""ChildTableTree: each neighbour and the set of nodes behind it (SDD 3.2.1, reference section 8)."""
+"""ChildTableTree: each neighbour and the nodes behind it (SDD 3.2.1, reference section 8)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE, IRoutingEssentials, IR
 
 
 class ChildTableTree(IRoutingTechnique):
-    """Direct neighbours ("children"), and per child the nodes that it can reach ("grandchildren")."""
+    """Direct neighbours ("children"), and per child what it can reach ("grandchildren")."""
 
     def __init__(self) -> None:
         self._children: dict[int, set[int]] = {}

@@ -27,7 +27,7 @@ class CirculationGuard:
         self._ages: deque[tuple[float, bytes]] = deque()
 
     def came_round(self, identity: bytes, came_from: int, now_s: float) -> Passage | None:
-        """The first passage of a packet that now comes from another neighbour; None if it is fine."""
+        """The first passage of a packet that now comes from another neighbour, else None."""
         while self._ages and now_s - self._ages[0][0] >= CIRCULATION_S:
             at_s, old = self._ages.popleft()
             if old in self._passages and self._passages[old].at_s == at_s:

@@ -14,6 +14,7 @@ from collections import deque
 from drone_mesh.communication import messages
 from drone_mesh.communication.circulation import CirculationGuard
 from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.flight import Flight
 from drone_mesh.communication.interfaces import (
     BROADCAST,
@@ -33,7 +34,7 @@ from drone_mesh.communication.observer import (
     MeshObserver,
     ignore_events,
 )
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, MeshTiming
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
@@ -42,6 +43,7 @@ INTRODUCE_AFTER_POWER_S = 0.2  # our choice: the medium has to hear of the anten
 INTRODUCE_SPREAD_S = 1.0  # our choice: after an outage not everybody speaks at once
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
+_PRESENT = int(MessageType.PRESENT)
 _TYPES_WITH_NUMBERS = frozenset(
     (MessageType.LOCATION, MessageType.MOVE_TO_LOCATION, MessageType.MOVEMENT_NEGOTIATION)
 )
@@ -84,8 +86,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._good_location_id = NO_ROUTE
         self._total_sent = 0
         self._heard_s: dict[int, float] = {}
-        self._check_due_s = math.inf
-        self._introduce_due_s = math.inf
+        self._deadlines = Deadlines()
         self._flight: Flight | None = None
         self._circulation = CirculationGuard()
         self._missing_to_tell: deque[tuple[int, int, int]] = deque()
@@ -100,14 +101,15 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._antenna.start_antenna(self)
         if self._debug:
             self._antenna.debugging_mode(self, True)
-        self._check_due_s = now_s + self._rng.random() * self._timing.check_period_s
+        first_check_s = now_s + self._rng.random() * self._timing.check_period_s
+        self._deadlines.set(Due.CHECK, first_check_s)
         self._report(MeshEventKind.STARTED)
         self._begin()
         self._routing.start_routing(self)
 
     def stop(self) -> None:
         """Antenna and debugging off; nothing is due any more."""
-        self._check_due_s = self._introduce_due_s = math.inf
+        self._deadlines.clear()
         self._flight = None
         if self._debug:
             self._antenna.debugging_mode(self, False)
@@ -116,28 +118,26 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     @property
     def next_tick_s(self) -> float:
         """When `tick` wants to be called next. May change with every call into the component."""
-        flight = self._flight
-        ask_s = flight.next_ask_s if flight is not None else math.inf
-        return min(self._check_due_s, self._introduce_due_s, ask_s)
+        return self._deadlines.next_s
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
         self._now_s = now_s
-        if now_s >= self._introduce_due_s:
-            self._introduce_due_s = math.inf
+        deadlines = self._deadlines
+        if now_s >= deadlines.get(Due.INTRODUCE):
+            deadlines.set(Due.INTRODUCE, math.inf)
             self.search_other_nodes_in_range()
-        if self._flight is not None and now_s >= self._flight.next_ask_s:
-            if self._flight.is_over(self._own_location(), now_s):
-                self._flight = None
-                self._landed()
-        if now_s >= self._check_due_s:
-            due_s, period_s = self._check_due_s, self._timing.check_period_s
-            self._check_due_s += period_s * ((now_s - due_s) // period_s + 1.0)
+        if now_s >= deadlines.get(Due.ASK_POSITION):
+            self._watch_flight()
+        due_s = deadlines.get(Due.CHECK)
+        if now_s >= due_s:
+            period_s = self._timing.check_period_s
+            deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))
             if self._antenna.on():
                 self._check(due_s)
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
-        """Learn from a packet, then process it or send it on. Bad packets are dropped and counted."""
+        """Learn from a packet, then process it or send it on. Bad packets are dropped."""
         self._now_s = now_s
         if len(payload) != PAYLOAD_BYTES:
             self._drop(f"want {PAYLOAD_BYTES} bytes, got {len(payload)}", payload)
@@ -154,23 +154,30 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._drop("not a finite number", payload)
             return
         self._learn(creator, from_, kind)
-        if forward in (me, BROADCAST):
-            self._process(payload, creator, from_, kind)
-        else:
+        if forward not in (me, BROADCAST):
             self._forward(payload, creator, from_, kind, forward)
+        elif kind == _HEARTBEAT:
+            body = messages.HeartbeatMessage.BODY.unpack_from(payload, messages.HEADER_BYTES)
+            self._on_heartbeat(creator, from_, *body)
+        elif kind == _PRESENT:
+            body = messages.IntroduceMessage.BODY.unpack_from(payload, messages.HEADER_BYTES)
+            self._on_present(creator, *body)
+        else:
+            self._process(payload, creator, from_, kind)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
         """Switched on: introduce soon."""
         self._now_s = now_s
         self._report(MeshEventKind.POWER_ON if on else MeshEventKind.POWER_OFF)
-        self._introduce_due_s = now_s + INTRODUCE_AFTER_POWER_S if on else math.inf
+        introduce_s = now_s + INTRODUCE_AFTER_POWER_S if on else math.inf
+        self._deadlines.set(Due.INTRODUCE, introduce_s)
 
     def on_antenna_registered(self, now_s: float) -> None:
         """The medium came back: introduce soon, each node at its own moment."""
         self._now_s = now_s
         if self._antenna.on():
             wait_s = INTRODUCE_AFTER_POWER_S + self._rng.random() * INTRODUCE_SPREAD_S
-            self._introduce_due_s = now_s + wait_s
+            self._deadlines.set(Due.INTRODUCE, now_s + wait_s)
 
     # Snapshots -------------------------------------------------------------------------------
 
@@ -246,12 +253,14 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """What is to be done once a period while the antenna is on; it was due at `due_s`."""
 
     @abc.abstractmethod
-    def _on_present(self, hello: messages.IntroduceMessage) -> None:
-        """A neighbour introduced itself."""
+    def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
+        """A neighbour introduced itself; the body is that of an IntroduceMessage."""
 
     @abc.abstractmethod
-    def _on_heartbeat(self, heartbeat: messages.HeartbeatMessage) -> None:
-        """A heartbeat for this node arrived."""
+    def _on_heartbeat(
+        self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
+    ) -> None:
+        """A heartbeat for this node arrived; the body is that of a HeartbeatMessage."""
 
     @abc.abstractmethod
     def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
@@ -281,11 +290,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             routing.other_can_communicate_with_node(from_, creator)
 
     def _process(self, payload: bytes, creator: int, from_: int, kind: int) -> None:
-        if kind == _HEARTBEAT:
-            self._on_heartbeat(messages.HeartbeatMessage.from_payload(payload))
-        elif kind == MessageType.PRESENT:
-            self._on_present(messages.IntroduceMessage.from_payload(payload))
-        elif kind == MessageType.LOCATION:
+        if kind == MessageType.LOCATION:
             self._on_location(messages.LocationMessage.from_payload(payload))
         elif kind == MessageType.REQUESTLOCATION:
             self._tell_location(creator)
@@ -445,9 +450,19 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     def _fly_to(self, goal: Location) -> None:
         if self._flight is not None and self._flight.goal == goal:
             return  # a second gateway orders the same flight (reference 14.11)
-        self._flight = Flight(goal, self._now_s)
+        self._flight = Flight(goal)
+        self._deadlines.set(Due.ASK_POSITION, self._now_s + FLIGHT_POSITION_PERIOD_S)
         self._engine.set_goal(*goal)
         self._flight_started()
+
+    def _watch_flight(self) -> None:
+        assert self._flight is not None
+        if not self._flight.is_over(self._own_location()):
+            self._deadlines.set(Due.ASK_POSITION, self._now_s + FLIGHT_POSITION_PERIOD_S)
+            return
+        self._flight = None
+        self._deadlines.set(Due.ASK_POSITION, math.inf)
+        self._landed()
 
     def _landed(self) -> None:
         """The neighbourhood is another one now."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
+from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.interfaces import Location
 
 STANDS_STILL_WITHIN_M = 1e-3  # our choice: far below what a drone flies in a second
@@ -12,18 +12,16 @@ ASKS_WITHOUT_ANSWER = 10  # our choice: then nobody will ever know; the mesh has
 class Flight:
     """One flight: where to, and whether it is over."""
 
-    def __init__(self, goal: Location, now_s: float) -> None:
+    def __init__(self, goal: Location) -> None:
         self.goal = goal
-        self.next_ask_s = now_s + FLIGHT_POSITION_PERIOD_S
         self._last: Location | None = None
         self._unanswered = 0
 
-    def is_over(self, location: Location | None, now_s: float) -> bool:
+    def is_over(self, location: Location | None) -> bool:
         """Take note of where the drone is (None: it cannot say); whether it has landed.
 
         Landed is within 0.1 m of the goal, or no longer moving between two questions.
         """
-        self.next_ask_s = now_s + FLIGHT_POSITION_PERIOD_S
         if location is None:
             self._unanswered += 1
             return self._unanswered >= ASKS_WITHOUT_ANSWER

@@ -78,13 +78,15 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _check(self, due_s: float) -> None:
         self._routing.maintain_routing()
 
-    def _on_present(self, hello: messages.IntroduceMessage) -> None:
-        if not hello.know_gateway:
-            self.send_heartbeat(hello.creator)
+    def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
+        if not know_gateway:
+            self.send_heartbeat(neighbour)
 
-    def _on_heartbeat(self, heartbeat: messages.HeartbeatMessage) -> None:
-        if not heartbeat.is_from_gateway:
-            self.send_heartbeat(heartbeat.creator)
+    def _on_heartbeat(
+        self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
+    ) -> None:
+        if creator != preferred_gateway:  # gateways do not answer each other
+            self.send_heartbeat(creator)
 
     def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
         """A gateway does not fly for the mesh."""

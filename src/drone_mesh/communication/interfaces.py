@@ -20,7 +20,7 @@ class IMeshNetwork(abc.ABC):
 
     @abc.abstractmethod
     def on_msg(self, payload: bytes, now_s: float) -> None:
-        """Handle one packet from the air; it is handled when this returns. Any bytes are allowed."""
+        """Handle one packet from the air; handled when this returns. Any bytes are allowed."""
 
     @abc.abstractmethod
     def get_node_id(self) -> int:
@@ -74,7 +74,7 @@ class IGatewayCommands(abc.ABC):
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
-        """Send a drone to a place (metres). True: there was a route and the next hop took the order.
+        """Send a drone to a place (metres). True: there was a route and the next hop took it.
 
         Nothing is told back about its arrival. Raises GoalRefused for what is no order.
         """

@@ -231,6 +231,8 @@ _CLASS_OF_TYPE: dict[int, type[AnyMessage]] = {
     MessageType.MOVE_TO_LOCATION: GoToLocationMessage,
     MessageType.MOVEMENT_NEGOTIATION: MovementNegotiationMessage,
 }
+_HEARTBEAT = int(MessageType.HEARTBEAT)
+_HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
 _NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
     MessageType.LOCATION: struct.Struct("<ff"),
     MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
@@ -257,14 +259,14 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
 
     None for a heartbeat that has made as many hops as it may.
     """
-    header = bytes((payload[CREATOR], from_, payload[TYPE], to, payload[FORWARD]))
-    if payload[TYPE] != MessageType.HEARTBEAT:
-        return header + payload[HEADER_BYTES:]
-    know, preferred, hops = HeartbeatMessage.BODY.unpack_from(payload, HEADER_BYTES)
-    if hops >= MAX_HOPS:
-        return None
-    body = HeartbeatMessage.BODY.pack(know, preferred, hops + 1)
-    return header + body + payload[HEADER_BYTES + len(body) :]
+    sent_on = bytearray(payload)
+    sent_on[FROM] = from_
+    sent_on[TO] = to
+    if payload[TYPE] == _HEARTBEAT:
+        if payload[_HEARTBEAT_HOPS] >= MAX_HOPS:
+            return None
+        sent_on[_HEARTBEAT_HOPS] += 1
+    return bytes(sent_on)
 
 
 def is_finite(payload: bytes) -> bool:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
     NO_ROUTE,
@@ -22,7 +23,6 @@ from drone_mesh.communication.negotiation import NO_BID, Negotiation
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S, MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
-
 
 ROUNDING_S = 1e-6  # sums of periods are not exact
 
@@ -52,7 +52,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         # Connected, but for the moment between a heartbeat to the gateway and its answer.
         self._awaiting_answer = False
-        self._answer_due_s = math.inf
         self._heartbeat_sent_s = -math.inf
         self._answered_s = -math.inf
         # False from the moment a check finds the connection gone: the next answer is a new start.
@@ -62,29 +61,18 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._shortcut: Shortcut | None = None
         self._negotiation = Negotiation(self._timing.check_period_s)
 
-    @property
-    def next_tick_s(self) -> float:
-        """When `tick` wants to be called next."""
-        return min(super().next_tick_s, self._answer_due_s, self._negotiation.due_s)
-
     def tick(self, now_s: float) -> None:
         """Do what is due."""
-        if now_s >= self._answer_due_s:
-            self._now_s = now_s
+        self._now_s = now_s
+        if now_s >= self._deadlines.get(Due.ANSWER):
             self._stop_awaiting()
         super().tick(now_s)
-        if self._negotiation.running:
+        if now_s >= self._deadlines.get(Due.DECIDE):
             self._decide_negotiation()
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered last time, or may still answer."""
         return self._connected or self._awaiting_answer
-
-    def on_msg(self, payload: bytes, now_s: float) -> None:
-        """As MeshnetworkComponent; what was lost or heard may decide a negotiation."""
-        super().on_msg(payload, now_s)
-        if self._negotiation.running:
-            self._decide_negotiation()
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
         """Switched off: not connected at once."""
@@ -92,7 +80,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if not on:
             self._disconnect()
             self._lost_since_s = None
-            self._negotiation.clear()
+            self._end_negotiation()
 
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`; the one to the preferred gateway wants an answer."""
@@ -135,7 +123,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         body = self._heartbeat_body()
         self._connected = False
         self._awaiting_answer = True
-        self._answer_due_s = now_s + HEARTBEAT_ANSWER_S
+        self._deadlines.set(Due.ANSWER, now_s + HEARTBEAT_ANSWER_S)
         self._heartbeat_sent_s = now_s
         shortcut, self._shortcut = self._shortcut, None
         me = self._node_id
@@ -152,7 +140,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _stop_awaiting(self) -> None:
         self._awaiting_answer = False
-        self._answer_due_s = math.inf
+        self._deadlines.set(Due.ANSWER, math.inf)
         self._show_connection()
 
     def _show_connection(self) -> None:
@@ -178,24 +166,27 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._preferred_gateway = gateway
             self._gateway_location = None
 
-    def _on_present(self, hello: messages.IntroduceMessage) -> None:
-        neighbour = hello.creator
+    def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
         knows = self._knows_gateway()
-        if hello.know_gateway != knows:
+        if know_gateway != knows:
             self.send_heartbeat(neighbour)
-        elif knows and hello.hops_until_gateway + 1 < self._hops:
-            if self._shortcut is None or hello.hops_until_gateway < self._shortcut.hops:
-                self._shortcut = Shortcut(neighbour, hello.hops_until_gateway)
+        elif (
+            knows
+            and hops + 1 < self._hops
+            and (self._shortcut is None or hops < self._shortcut.hops)
+        ):
+            self._shortcut = Shortcut(neighbour, hops)
 
-    def _on_heartbeat(self, heartbeat: messages.HeartbeatMessage) -> None:
-        if heartbeat.is_from_gateway:
-            self._on_gateway_answer(heartbeat.creator, heartbeat.hops + 1)
-            return
-        knows = self._knows_gateway()
-        if knows and not heartbeat.know_gateway:
-            self.send_heartbeat(heartbeat.creator)
-        elif heartbeat.know_gateway and not knows:
-            self._take_gateway(heartbeat.preferred_gateway, heartbeat.from_)
+    def _on_heartbeat(
+        self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
+    ) -> None:
+        if creator == preferred_gateway:
+            self._on_gateway_answer(creator, hops + 1)
+        elif know_gateway != self._knows_gateway():
+            if know_gateway:
+                self._take_gateway(preferred_gateway, from_)
+            else:
+                self.send_heartbeat(creator)
 
     def _take_gateway(self, gateway: int, neighbour: int) -> None:
         """Try the gateway of a neighbour; other ways to it did not work."""
@@ -219,14 +210,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._stop_awaiting()
         if not self._settled:
             self._settled = True
-            self._negotiation.clear()
+            self._end_negotiation()
             self.search_other_nodes_in_range()
             self._ask_for_locations()
 
     # Lost connection -------------------------------------------------------------------------
 
     def _lost_connection(self, due_s: float) -> None:
-        """Measured from check to check as they were due: a late one must not cost a whole period."""
+        """Measured from check to check as they were due: a late one must not cost a period."""
         if self._lost_since_s is None:
             self._lost_since_s = due_s
             self._disconnect()
@@ -257,7 +248,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _flight_started(self) -> None:
         self._disconnect()
         self._lost_since_s = None
-        self._negotiation.clear()
+        self._end_negotiation()
         self._set_good_location(self._preferred_gateway, self._gateway_location)
 
     def _landed(self) -> None:
@@ -270,6 +261,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         score = self._score()
         self._report(MeshEventKind.NEGOTIATION_STARTED, detail=f"score {score:.2f}")
         self._negotiation.start(self._node_id, score, self._now_s)
+        self._deadlines.set(Due.DECIDE, self._negotiation.due_s)
         body = messages.MovementNegotiationMessage.BODY.pack(score)
         for neighbour in sorted(self._routing.get_set_of_children()):
             self._send_own(MessageType.MOVEMENT_NEGOTIATION, neighbour, body)
@@ -292,14 +284,27 @@ class MeshnetworkRouter(MeshnetworkComponent):
             and not self._negotiation.running
         ):
             self._negotiate()
+        self._decide_negotiation()
+
+    def _neighbour_lost(self, node: int) -> None:
+        super()._neighbour_lost(node)
+        if self._negotiation.running:  # nobody waits for the bid of a node that is gone
+            self._deadlines.set(Due.DECIDE, self._now_s)
 
     def _decide_negotiation(self) -> None:
+        if not self._negotiation.running:
+            return
         if not self._negotiation.is_decided(self._routing.get_set_of_children(), self._now_s):
+            self._deadlines.set(Due.DECIDE, self._negotiation.due_s)
             return
         winner = self._negotiation.winner()
-        self._negotiation.clear()
+        self._end_negotiation()
         self._lost_since_s = None
         flies = NO_ROUTE if winner is None else winner
         self._report(MeshEventKind.NEGOTIATION_ENDED, flies)
         if winner == self._node_id:
             self._fly_back()
+
+    def _end_negotiation(self) -> None:
+        self._negotiation.clear()
+        self._deadlines.set(Due.DECIDE, math.inf)

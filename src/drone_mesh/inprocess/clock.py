@@ -17,7 +17,7 @@ class VirtualClock:
         self._order = itertools.count()  # events of one moment happen in the order of their asking
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
-        """Call `function(argument)` at `at_s`, or at once in the order of asking if that is past."""
+        """Call `function(argument)` at `at_s`, or at once if that is past."""
         heapq.heappush(self._events, (at_s, next(self._order), function, argument))
 
     def next_event_s(self) -> float:

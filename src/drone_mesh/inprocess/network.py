@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import logging
+import math
 import random
 from typing import Callable, Iterable
 
@@ -12,7 +12,6 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IGatewayCommands,
     IInternetConnection,
-    IMeshNetwork,
 )
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.router import MeshnetworkRouter
@@ -22,10 +21,8 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
-from drone_mesh.world.factory import plan_fleet
 from drone_mesh.world.drones import DroneRole
-
-_log = logging.getLogger(__name__)
+from drone_mesh.world.factory import plan_fleet
 
 STEP_S = 0.1  # how closely run_until looks
 
@@ -41,20 +38,44 @@ class NoInternet(IInternetConnection):
 
 
 class Node:
-    """One drone of the network with all that it carries."""
+    """One drone of the network with all that it carries, driven by the virtual clock."""
 
     def __init__(
-        self, component: MeshnetworkComponent, antenna: InProcessAntenna, drone: InProcessDrone
+        self, clock: VirtualClock, air: InProcessAir, node_id: int, start: Location
     ) -> None:
-        self.component = component
-        self.antenna = antenna
-        self.drone = drone
-        self.planned_tick_s = -1.0
+        self._clock = clock
+        self.drone = InProcessDrone(clock, start, air.flight)
+        self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
+        self.component: MeshnetworkComponent
+        self._planned_s = math.inf
 
     @property
     def is_gateway(self) -> bool:
         """Whether it is a gateway."""
         return isinstance(self.component, MeshnetworkGateway)
+
+    def start(self) -> None:
+        """Start the mesh software."""
+        self.component.start(self._clock.now_s)
+        self.plan()
+
+    def hear(self, payload: bytes) -> None:
+        """A packet arrives."""
+        component = self.component
+        component.on_msg(payload, self._clock.now_s)
+        if component.next_tick_s != self._planned_s:
+            self.plan()
+
+    def plan(self) -> None:
+        """Have the component called when it wants to be; to be called after every call into it."""
+        self._planned_s = self.component.next_tick_s
+        if self._planned_s < math.inf:
+            self._clock.call_at(self._planned_s, self._tick, self._planned_s)
+
+    def _tick(self, planned_s: float) -> None:
+        if planned_s == self._planned_s:  # else the plan has changed since
+            self.component.tick(self._clock.now_s)
+            self.plan()
 
 
 class Network:
@@ -83,7 +104,6 @@ class Network:
         self.clock = VirtualClock()
         self.air = InProcessAir(
             self.clock,
-            self._deliver,
             random.Random(self._rng.random()),
             max_distance_m,
             loss,
@@ -124,22 +144,20 @@ class Network:
     def _add(self, node_id: int, x: float, y: float, start_s: float, gateway: bool) -> None:
         if node_id in self.nodes:
             raise ValueError(f"node {node_id} is there already")
-        drone = InProcessDrone(self.clock, Location(y, x, 0.0), self.air.flight)
-        antenna = InProcessAntenna(self.air, node_id, drone)
+        node = Node(self.clock, self.air, node_id, Location(y, x, 0.0))
+        antenna, drone = node.antenna, node.drone
         routing = create_routing_technique(self._routing)
         rng = random.Random(self._rng.random())
-        component: MeshnetworkComponent
         if gateway:
-            component = MeshnetworkGateway(
+            node.component = MeshnetworkGateway(
                 node_id, antenna, drone, routing, NoInternet(), rng, self._timing, self._observe
             )
         else:
-            component = MeshnetworkRouter(
+            node.component = MeshnetworkRouter(
                 node_id, antenna, drone, routing, rng, self._timing, self._observe
             )
-        node = Node(component, antenna, drone)
         self.nodes[node_id] = node
-        self.clock.call_at(start_s, self._start, node)
+        self.clock.call_at(start_s, Node.start, node)
 
     # Acting ----------------------------------------------------------------------------------
 
@@ -149,19 +167,19 @@ class Network:
         if node.antenna.powered != on:
             node.antenna.powered = on
             node.component.on_antenna_power(on, self.clock.now_s)
-            self._plan(node)
+            node.plan()
 
     def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> bool:
         """Order a drone to (x, y, height) metres through a gateway; as IGatewayCommands."""
         node = self.nodes[gateway]
         assert isinstance(node.component, MeshnetworkGateway)
         taken = node.component.send_goal_request_to_drone(node_id, y, x, height, self.clock.now_s)
-        self._plan(node)
+        node.plan()
         return taken
 
     def inject(self, node_id: int, payload: bytes) -> None:
         """Let a node hear a packet from nowhere."""
-        self._deliver(self.nodes[node_id].component, payload)
+        self.nodes[node_id].hear(payload)
 
     def run_for(self, seconds: float) -> None:
         """Let simulated time pass."""
@@ -211,7 +229,7 @@ class Network:
         return hops
 
     def path_to_gateway(self, node_id: int) -> list[int] | None:
-        """The nodes that a packet for the node's gateway would pass, ends included; None: a loop."""
+        """The nodes that a packet for the node's gateway would pass; None: it would not arrive."""
         gateway = self.nodes[node_id].component.get_preferred_gateway()
         path = [node_id]
         while path[-1] != gateway:
@@ -221,28 +239,5 @@ class Network:
             path.append(step)
         return path
 
-    # Driving the components ------------------------------------------------------------------
-
     def _observe(self, event: MeshEvent) -> None:
         self.events.append(event)
-
-    def _start(self, node: Node) -> None:
-        node.component.start(self.clock.now_s)
-        self._plan(node)
-
-    def _deliver(self, mesh: IMeshNetwork, payload: bytes) -> None:
-        mesh.on_msg(payload, self.clock.now_s)
-        self._plan(self.nodes[mesh.get_node_id()])
-
-    def _plan(self, node: Node) -> None:
-        """Have the component called when it wants to be; an earlier plan that stands is kept."""
-        next_s = node.component.next_tick_s
-        if next_s != node.planned_tick_s:
-            node.planned_tick_s = next_s
-            self.clock.call_at(next_s, self._tick, node)
-
-    def _tick(self, node: Node) -> None:
-        if self.clock.now_s >= node.component.next_tick_s:
-            node.component.tick(self.clock.now_s)
-            node.planned_tick_s = -1.0
-            self._plan(node)

@@ -16,7 +16,8 @@ from drone_mesh.inprocess.clock import VirtualClock
 
 HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)
 
-Deliver = Callable[[IMeshNetwork, bytes], None]
+Deliver = Callable[[bytes], None]
+"""Hands a packet to the mesh component of one node, and looks after what it wants next."""
 
 
 class InProcessAir:
@@ -25,7 +26,6 @@ class InProcessAir:
     def __init__(
         self,
         clock: VirtualClock,
-        deliver: Deliver,
         rng: random.Random,
         max_distance_m: float = 9.0,
         loss: float = 0.0,
@@ -37,7 +37,6 @@ class InProcessAir:
         A packet arrives after `delay_s` and a random part of `jitter_s`.
         """
         self._clock = clock
-        self._deliver = deliver
         self._rng = rng
         self._max_distance_m = max_distance_m
         self.loss = loss
@@ -46,7 +45,8 @@ class InProcessAir:
         self._antennas: dict[int, InProcessAntenna] = {}
         self._cut: set[frozenset[int]] = set()
         self._flying = 0
-        self._in_range: dict[int, dict[int, InProcessAntenna]] = {}  # who stands still is remembered
+        # Remembered while everybody stands still.
+        self._in_range: dict[int, dict[int, InProcessAntenna]] = {}
         self.delivered = 0
 
     def add(self, antenna: InProcessAntenna) -> None:
@@ -88,7 +88,9 @@ class InProcessAir:
 
     def send(self, payload: bytes) -> bool:
         """Hand a packet over; True when the receiver has it, or will in a moment."""
-        receiver = self.in_range(payload[messages.FROM]).get(payload[messages.TO])
+        sender = payload[messages.FROM]
+        in_range = self._in_range.get(sender) or self.in_range(sender)
+        receiver = in_range.get(payload[messages.TO])
         if receiver is None or not receiver.powered:
             return False
         if self.loss and self._rng.random() < self.loss:
@@ -100,29 +102,28 @@ class InProcessAir:
         self._clock.call_at(at_s, receiver.receive, payload)
         return True
 
-    def hand_over(self, mesh: IMeshNetwork, payload: bytes) -> None:
-        """A packet has arrived."""
-        self._deliver(mesh, payload)
-
 
 class InProcessAntenna(IWirelessCommunication):
     """One node's radio."""
 
-    def __init__(self, air: InProcessAir, node_id: int, drone: IDroneEngine) -> None:
+    def __init__(
+        self, air: InProcessAir, node_id: int, drone: IDroneEngine, deliver: Deliver
+    ) -> None:
         self.node_id = node_id
         self.drone = drone
         self.powered = True
         self._air = air
-        self._mesh: IMeshNetwork | None = None
+        self._deliver = deliver
+        self._started = False
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Be reachable."""
-        self._mesh = mesh
+        self._started = True
         self._air.add(self)
 
     def stop_antenna(self) -> None:
         """Be gone."""
-        self._mesh = None
+        self._started = False
         self._air.remove(self)
 
     def send_message_to(self, payload: bytes) -> bool:
@@ -145,5 +146,5 @@ class InProcessAntenna(IWirelessCommunication):
 
     def receive(self, payload: bytes) -> None:
         """A packet arrives; a node that is off hears nothing."""
-        if self.powered and self._mesh is not None:
-            self._air.hand_over(self._mesh, payload)
+        if self.powered and self._started:
+            self._deliver(payload)
