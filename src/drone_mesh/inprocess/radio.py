@@ -74,23 +74,31 @@ class InProcessAir:
         """The antennas that `node` could reach if they were on, by id. Do not change it."""
         found = self._in_range.get(node)
         if found is None:
-            here = self._antennas[node].drone.get_location()
             found = {
                 other: antenna
                 for other, antenna in self._antennas.items()
-                if other != node
-                and here.distance_m(antenna.drone.get_location()) < self._max_distance_m
-                and (not self._cut or frozenset((node, other)) not in self._cut)
+                if other != node and self._hears(node, other)
             }
             if not self._flying:
                 self._in_range[node] = found
         return found
 
+    def _hears(self, one: int, other: int) -> bool:
+        if self._cut and frozenset((one, other)) in self._cut:
+            return False
+        here = self._antennas[one].drone.get_location()
+        there = self._antennas[other].drone.get_location()
+        return here.distance_m(there) < self._max_distance_m
+
     def send(self, payload: bytes) -> bool:
         """Hand a packet over; True when the receiver has it, or will in a moment."""
-        sender = payload[messages.FROM]
-        in_range = self._in_range.get(sender) or self.in_range(sender)
-        receiver = in_range.get(payload[messages.TO])
+        sender, to = payload[messages.FROM], payload[messages.TO]
+        if self._flying:
+            receiver = self._antennas.get(to)
+            if receiver is None or not self._hears(sender, to):
+                return False
+        else:
+            receiver = (self._in_range.get(sender) or self.in_range(sender)).get(to)
         if receiver is None or not receiver.powered:
             return False
         if self.loss and self._rng.random() < self.loss:
