@@ -1,0 +1,227 @@
+"""MeshExecutor: the one thread that works in all mesh components of a process.
+
+The core has no threads of its own (reference, section 2). Here packets, orders and time meet: what
+arrives from other threads waits in one first-in-first-out queue, what is due at a time waits in a
+heap of deadlines, and one worker takes whichever has waited longest.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import logging
+import math
+import queue
+import threading
+from collections import Counter
+from typing import Callable, Protocol
+
+FAILURE_PERIOD_S = 30.0  # our choice: one traceback per kind of failure in this time
+RETRY_AFTER_S = 1.0  # our choice: what failed and is still due waits so long, instead of spinning
+_WAKE = None  # in the queue: nothing to run, look at the deadlines again
+
+_log = logging.getLogger(__name__)
+
+Work = Callable[[float], None]
+"""A function of the time at which it runs."""
+
+
+class Driven(Protocol):
+    """What the executor drives: a mesh component."""
+
+    @property
+    def next_tick_s(self) -> float:
+        """When `tick` wants to be called next; math.inf: not at all. May change with every call."""
+
+    def tick(self, now_s: float) -> None:
+        """Do what is due."""
+
+
+class _Periodic:
+    """A function that is called again and again; each call is due one period after the last."""
+
+    def __init__(self, period_s: float, function: Work, first_s: float) -> None:
+        self._period_s = period_s
+        self._function = function
+        self.next_tick_s = first_s
+
+    def tick(self, now_s: float) -> None:
+        """Call it; periods that went by meanwhile are skipped, not made up for."""
+        missed = max(0.0, (now_s - self.next_tick_s) // self._period_s)
+        self.next_tick_s += self._period_s * (missed + 1.0)
+        self._function(now_s)
+
+    def cancel(self) -> None:
+        self.next_tick_s = math.inf
+
+
+class Seat:
+    """One component's place in an executor. Its antenna needs `submit` before the component exists.
+
+    `submit` may be called by any thread; everything else is done by the executor's worker.
+    """
+
+    def __init__(self, executor: MeshExecutor) -> None:
+        self._executor = executor
+        self._driven: Driven | None = None
+        self.scheduled_s = math.inf
+
+    def submit(self, function: Work) -> None:
+        """Run this, with the time, on the worker's thread, after what was submitted before."""
+        self._executor.submit(function, self)
+
+    def take(self, driven: Driven) -> None:
+        """Drive this component from now on. Only on the worker's thread."""
+        self._driven = driven
+
+    def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
+        """Have the executor call `function` once per period; returns what stops that."""
+        return self._executor.call_every(period_s, function)
+
+    @property
+    def next_tick_s(self) -> float:
+        return math.inf if self._driven is None else self._driven.next_tick_s
+
+    def tick(self, now_s: float) -> None:
+        if self._driven is not None:
+            self._driven.tick(now_s)
+
+
+class MeshExecutor:
+    """Owns components and calls into them from one thread.
+
+    Any thread may use `submit`, `call_every`, `time_advanced`, `lag_s`, `start` and `stop`. An
+    exception that comes out of one component is logged and counted, and stops nothing else.
+    """
+
+    def __init__(
+        self, clock: Callable[[], float], clock_is_poked: bool, name: str = "mesh"
+    ) -> None:
+        """`clock` gives the time in seconds.
+
+        `clock_is_poked`: whoever moves the time calls `time_advanced` (simulated time). Otherwise
+        the clock runs by itself, at one second per second.
+        """
+        self._clock = clock
+        self._clock_is_poked = clock_is_poked
+        self._queue: queue.SimpleQueue[tuple[float, Work, Seat | None] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self._stopping = False
+        # Written by the worker, read by others; single floats need no lock.
+        self._working_since_s = math.inf  # when that was due what is being worked on
+        self._next_due_s = math.inf
+        self._worst_lag_s = 0.0
+        # The worker's alone.
+        self._deadlines: list[tuple[float, int, Seat | _Periodic]] = []
+        self._order = itertools.count()
+        self._said_s: dict[str, float] = {}
+        self.failures: Counter[str] = Counter()  # by name of the exception; others may read
+
+    # Any thread ------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start to work. Whatever was submitted before comes first."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Work off what has been submitted, then stop; returns when the thread has ended."""
+        self.submit(self._stop)
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def seat(self) -> Seat:
+        """A place for one more component."""
+        return Seat(self)
+
+    def submit(self, function: Work, seat: Seat | None = None) -> None:
+        """Run this, with the time, on the worker's thread, after what was submitted before."""
+        self._queue.put((self._clock(), function, seat))
+
+    def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
+        """Call `function` once per period, the first time after one; returns what stops that."""
+        periodic = _Periodic(period_s, function, self._clock() + period_s)
+        self.submit(lambda _now_s: self._schedule(periodic, periodic.next_tick_s))
+        return periodic.cancel
+
+    def time_advanced(self) -> None:
+        """The clock was moved: see whether something has become due."""
+        if self._clock() >= self._next_due_s:
+            self._queue.put(_WAKE)
+
+    def lag_s(self, now_s: float) -> float:
+        """For how many seconds the oldest undone work has waited at `now_s`; 0: there is none."""
+        return max(0.0, now_s - min(self._working_since_s, self._next_due_s))
+
+    def take_worst_lag_s(self) -> float:
+        """How late the latest timer since the last call of this was, in seconds."""
+        worst_s, self._worst_lag_s = self._worst_lag_s, 0.0
+        return worst_s
+
+    # The worker ------------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        deadlines = self._deadlines
+        waiting: tuple[float, Work, Seat | None] | None = None
+        while not self._stopping:
+            if waiting is None:
+                waiting = self._take(block=not deadlines or deadlines[0][0] > self._clock())
+            now_s = self._clock()
+            due_s = deadlines[0][0] if deadlines else math.inf
+            if due_s <= now_s and (waiting is None or due_s <= waiting[0]):
+                self._tick_first(now_s)
+            elif waiting is not None:
+                submitted_s, function, seat = waiting
+                waiting = None
+                self._working_since_s = submitted_s
+                self._run(function, now_s, seat)
+            self._next_due_s = deadlines[0][0] if deadlines else math.inf
+            self._working_since_s = math.inf
+
+    def _take(self, block: bool) -> tuple[float, Work, Seat | None] | None:
+        """The next function that was submitted; None: look at the deadlines again."""
+        timeout_s = None
+        if block and not self._clock_is_poked and self._deadlines:
+            timeout_s = max(0.0, self._deadlines[0][0] - self._clock())
+        try:
+            return self._queue.get(block, timeout_s)
+        except queue.Empty:
+            return None
+
+    def _tick_first(self, now_s: float) -> None:
+        due_s, _, driven = heapq.heappop(self._deadlines)
+        if isinstance(driven, Seat):
+            if due_s != driven.scheduled_s:
+                return  # it was put elsewhere in the heap meanwhile
+            driven.scheduled_s = math.inf
+        elif due_s != driven.next_tick_s:
+            return  # cancelled
+        self._working_since_s = due_s
+        self._worst_lag_s = max(self._worst_lag_s, now_s - due_s)
+        self._run(driven.tick, now_s, driven if isinstance(driven, Seat) else None)
+        if isinstance(driven, _Periodic):
+            self._schedule(driven, driven.next_tick_s)
+
+    def _run(self, function: Work, now_s: float, seat: Seat | None) -> None:
+        not_before_s = -math.inf
+        try:
+            function(now_s)
+        except Exception as error:  # one node's fault must not stop the others
+            self._report(error, now_s)
+            not_before_s = now_s + RETRY_AFTER_S
+        if seat is not None and seat.next_tick_s != seat.scheduled_s:
+            seat.scheduled_s = max(seat.next_tick_s, not_before_s)
+            self._schedule(seat, seat.scheduled_s)
+
+    def _schedule(self, driven: Seat | _Periodic, due_s: float) -> None:
+        if due_s < math.inf:
+            heapq.heappush(self._deadlines, (due_s, next(self._order), driven))
+
+    def _stop(self, _now_s: float) -> None:
+        self._stopping = True
+
+    def _report(self, error: Exception, now_s: float) -> None:
+        kind = type(error).__name__
+        self.failures[kind] += 1
+        if now_s - self._said_s.get(kind, -math.inf) >= FAILURE_PERIOD_S:
+            self._said_s[kind] = now_s
+            _log.error("%s in a mesh node (%d so far)", kind, self.failures[kind], exc_info=error)
