@@ -1,0 +1,175 @@
+"""FrameStore: what the page knows, and the difference to what it knew.
+
+A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), `gone` (ids),
+`events` and `samples` (new ones). A page that has version v gets what changed after v, however long
+ago that was: who falls behind simply gets a larger difference, and nothing is kept for him.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from dataclasses import asdict
+from typing import Any, Iterable, Mapping, Sequence
+
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
+from drone_mesh.state.outages import Sample, take_sample
+from drone_mesh.state.trouble import Trouble, find_trouble, summarise
+
+EVENTS_KEPT = 1000  # our choice: more than anybody scrolls back
+EVENTS_PER_FRAME = 300  # a burst of thousands would only be scrolled past
+SAMPLES_KEPT = 600  # ten minutes
+SAMPLE_PERIOD_S = 1.0  # wall time
+
+
+class FrameStore:
+    """Belongs to one thread (the server's event loop). Version 0 is a page that knows nothing."""
+
+    def __init__(self) -> None:
+        self.version = 0
+        self._mesh: MeshStatus | None = None
+        self._link = "waiting for the first news of a mesh"
+        self._clock: dict[str, Any] = {}
+        self._nodes: dict[int, dict[str, Any]] = {}
+        self._changed_at: dict[int, dict[str, int]] = {}
+        self._gone_at: dict[int, int] = {}
+        self._events: deque[tuple[int, dict[str, Any]]] = deque(maxlen=EVENTS_KEPT)
+        self._samples: deque[tuple[int, Sample]] = deque(maxlen=SAMPLES_KEPT)
+        self._sampled_at_s = float("-inf")
+        self._run_began_at = 0
+        self._cache: dict[int, str] = {}
+
+    def update_mesh(self, mesh: MeshStatus, wall_s: float) -> None:
+        """The mesh as it is now."""
+        self._next_version()
+        if self._mesh is not None and mesh.stamp_s < self._mesh.stamp_s:
+            self._forget_run()
+        self._mesh, self._link = mesh, ""
+        troubles = {trouble.node: trouble for trouble in find_trouble(mesh.nodes)}
+        summary = summarise(mesh.nodes, list(troubles.values()))
+        self._clock = {
+            "t": round(mesh.stamp_s, 2),
+            "paused": mesh.paused,
+            "factor": round(mesh.real_time_factor, 3),
+            "achieved": round(mesh.achieved_real_time_factor, 2),
+            "range": round(mesh.max_distance, 3),
+            "summary": summary.text,
+            "severity": int(summary.severity),
+        }
+        for gone in self._nodes.keys() - {node.id for node in mesh.nodes}:
+            del self._nodes[gone]
+            del self._changed_at[gone]
+            self._gone_at[gone] = self.version
+        for node in mesh.nodes:
+            self._update_node(node.id, _fields(node, troubles.get(node.id)))
+        if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:
+            self._sampled_at_s = wall_s
+            self._samples.append((self.version, take_sample(mesh)))
+
+    def add_events(self, events: Iterable[EventRecord]) -> None:
+        """New events, oldest first."""
+        self._next_version()
+        for event in events:
+            self._events.append(
+                (
+                    self.version,
+                    {
+                        "t": round(event.stamp_s, 2),
+                        "node": event.node,
+                        "kind": event.kind,
+                        "peers": list(event.peers),
+                        "detail": event.detail,
+                    },
+                )
+            )
+
+    def set_link(self, text: str) -> None:
+        """Why there is no news, in words for the page; empty: there is."""
+        if text != self._link:
+            self._next_version()
+            self._link = text
+
+    def frame_since(self, version: int) -> str:
+        """JSON text of what changed after `version`; version 0 gives everything there is."""
+        if version not in self._cache:
+            self._cache[version] = json.dumps(self._build(version), separators=(",", ":"))
+        return self._cache[version]
+
+    def neighbours_of(self, node_id: int) -> list[tuple[int, int]]:
+        """(neighbour, simulated seconds since it was last heard) of one node."""
+        for node in self._mesh.nodes if self._mesh else ():
+            if node.id == node_id:
+                return list(zip(node.neighbours, node.neighbour_ages))
+        return []
+
+    def _build(self, version: int) -> dict[str, Any]:
+        if version < self._run_began_at:
+            version = 0
+        frame: dict[str, Any] = {
+            "type": "frame",
+            "full": version == 0,
+            "version": self.version,
+            "link": self._link,
+            "clock": self._clock,
+        }
+        if nodes := {
+            node: {key: fields[key] for key, at in self._changed_at[node].items() if at > version}
+            for node, fields in self._nodes.items()
+            if max(self._changed_at[node].values()) > version
+        }:
+            frame["nodes"] = nodes
+        if gone := [node for node, at in self._gone_at.items() if at > version]:
+            frame["gone"] = gone
+        if events := [event for at, event in self._events if at > version]:
+            frame["events"] = events[-EVENTS_PER_FRAME:]
+        if samples := [asdict(sample) for at, sample in self._samples if at > version]:
+            frame["samples"] = samples
+        return frame
+
+    def _update_node(self, node_id: int, fields: Mapping[str, Any]) -> None:
+        known = self._nodes.setdefault(node_id, {})
+        changed_at = self._changed_at.setdefault(node_id, {})
+        self._gone_at.pop(node_id, None)
+        for key, value in fields.items():
+            if key not in known or known[key] != value:
+                known[key] = value
+                changed_at[key] = self.version
+
+    def _next_version(self) -> None:
+        self.version += 1
+        self._cache.clear()
+
+    def _forget_run(self) -> None:
+        """Simulated time went back: a new world. Its charts and log start anew on every page."""
+        self._run_began_at = self.version
+        self._events.clear()
+        self._samples.clear()
+
+
+def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
+    return {
+        "role": node.role,
+        "on": node.on,
+        "connected": node.connected,
+        "gateway": node.gateway,
+        "hops": node.hops,
+        "next": node.next_hop,
+        "place": node.pref_loc,
+        "known": node.known_nodes,
+        "sent": node.total_messages,
+        "neighbours": _bits(node.neighbours),
+        "route": list(node.route),
+        "at": _centimetres(node.position) if position_is_known(node) else None,
+        "path": _centimetres(node.path),
+        "trouble": trouble.text if trouble else "",
+        "severity": int(trouble.severity) if trouble else 0,
+    }
+
+
+def _centimetres(metres: Sequence[float]) -> list[float]:
+    return [round(float(value), 2) for value in metres]
+
+
+def _bits(ids: Iterable[int]) -> str:
+    """256 bits as hex, bit n for id n: a fifth of a list of 200 ids."""
+    return format(sum(1 << node for node in ids), "x")

@@ -1,0 +1,55 @@
+"""Events on their way from the mesh software to people: gathered, and bounded."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.state.model import EventRecord
+
+_SEVERAL_AT_ONCE = frozenset(
+    kind.value
+    for kind in (
+        MeshEventKind.NEIGHBOUR_FOUND,
+        MeshEventKind.NEIGHBOUR_LOST,
+        MeshEventKind.NODE_MISSING,
+    )
+)
+EVENTS_KEPT = 100_000  # our choice: 254 nodes that find 200 neighbours each, and as much again
+
+
+class EventBatcher:
+    """Takes events from any thread; one other thread takes them out in batches.
+
+    A crowd that meets makes tens of thousands of events in a second. Of one node, neighbours
+    found (or lost, or missing) one after the other become one event with many peers.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[MeshEvent] = deque(maxlen=EVENTS_KEPT)  # append and popleft are atomic
+
+    def observe(self, event: MeshEvent) -> None:
+        """A MeshObserver. With nobody to take them out the oldest events are forgotten."""
+        self._waiting.append(event)
+
+    def take(self) -> list[EventRecord]:
+        """Everything since the last call, oldest first."""
+        batch: list[EventRecord] = []
+        peers_of: list[list[int]] = []
+        latest_of: dict[int, int] = {}
+        for _ in range(len(self._waiting)):
+            event = self._waiting.popleft()
+            peers = [] if event.peer == NO_ROUTE else [event.peer]
+            latest = latest_of.get(event.node)
+            kind = event.kind.value
+            if kind in _SEVERAL_AT_ONCE and latest is not None and batch[latest].kind == kind:
+                peers_of[latest] += [peer for peer in peers if peer not in peers_of[latest]]
+                continue
+            latest_of[event.node] = len(batch)
+            batch.append(EventRecord(event.now_s, event.node, kind, (), event.detail))
+            peers_of.append(peers)
+        return [
+            EventRecord(event.stamp_s, event.node, event.kind, tuple(peers), event.detail)
+            for event, peers in zip(batch, peers_of)
+        ]

@@ -1,0 +1,73 @@
+"""What is known about a mesh at one moment.
+
+NodeStatus has, field for field, the names of NodeState.msg, so that a message may stand wherever
+one of these is read: nothing has to be copied on the way from the wire to the reader.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Sequence
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+
+UNKNOWN_POSITION = (math.nan, math.nan, math.nan)
+
+
+class Role(enum.IntEnum):
+    """What a node is; the values of NodeState.msg."""
+
+    ROUTER = 0
+    GATEWAY = 1
+
+
+@dataclass
+class NodeStatus:
+    """One node, as NodeState.msg describes it (units and special values are given there)."""
+
+    id: int
+    role: int = Role.ROUTER
+    on: bool = True
+    connected: bool = False
+    gateway: int = NO_ROUTE
+    hops: int = NO_ROUTE
+    next_hop: int = NO_ROUTE
+    pref_loc: int = NO_ROUTE
+    known_nodes: int = 0
+    total_messages: int = 0
+    neighbours: bytes = b""
+    neighbour_ages: bytes = b""  # s, one per neighbour, 255 means 255 or more
+    route: bytes = b""
+    position: Sequence[float] = UNKNOWN_POSITION  # (3,) m, map frame, of the underside
+    path: Sequence[float] = ()  # (3 * waypoints,) m, map frame
+    report_age: float = 0.0  # wall seconds
+
+
+@dataclass(frozen=True)
+class EventRecord:
+    """One thing that happened to one node, as MeshEvent.msg describes it."""
+
+    stamp_s: float
+    node: int
+    kind: str
+    peers: tuple[int, ...] = ()
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class MeshStatus:
+    """All nodes at one moment, as MeshState.msg describes it."""
+
+    stamp_s: float
+    nodes: Sequence[NodeStatus]  # ascending ids
+    max_distance: float = 9.0  # m
+    real_time_factor: float = 1.0
+    achieved_real_time_factor: float = 0.0
+    paused: bool = False
+
+
+def position_is_known(node: NodeStatus) -> bool:
+    """Whether the world, or the node itself, has told where the node is."""
+    return math.isfinite(node.position[0])

@@ -1,0 +1,116 @@
+"""The story of a run, told from its events: who was lost when, and how each loss was repaired."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Iterable, Sequence
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.state.model import EventRecord, MeshStatus, Role
+
+_CONNECTED = MeshEventKind.CONNECTED.value
+_DISCONNECTED = MeshEventKind.DISCONNECTED.value
+_POWER_OFF = MeshEventKind.POWER_OFF.value
+_EMERGENCY = MeshEventKind.EMERGENCY.value
+_FLIGHT_DECIDED = MeshEventKind.FLIGHT_DECIDED.value
+_LANDED = MeshEventKind.LANDED.value
+
+
+@dataclass(frozen=True)
+class Outage:
+    """One node's time without a gateway. Seconds of simulated time; None: did not happen (yet)."""
+
+    node: int
+    lost_s: float  # it noticed that no gateway answers
+    cause_s: float | None = None  # the last power-off of another node before that
+    cause_node: int | None = None
+    emergency_s: float | None = None  # its patience ran out
+    decided_s: float | None = None  # it decided to fly
+    place_of: int | None = None  # the node whose place it took
+    landed_s: float | None = None
+    connected_s: float | None = None
+    switched_off: bool = False  # it was switched off itself: nothing to repair
+
+    @property
+    def seconds(self) -> float | None:
+        """How long it lasted, or None while it lasts."""
+        return None if self.connected_s is None else self.connected_s - self.lost_s
+
+
+def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
+    """Each time that a node which had been connected was without a gateway, in order of loss.
+
+    A node that flies because it was ordered to is lost, too, until it is connected again.
+    """
+    done: list[Outage] = []
+    open_of: dict[int, Outage] = {}
+    connected = set()
+    power_offs: list[tuple[float, int]] = []
+    for event in sorted(events, key=lambda event: event.stamp_s):
+        node = event.node
+        outage = open_of.get(node)
+        if event.kind == _POWER_OFF:
+            power_offs.append((event.stamp_s, node))
+            if outage is not None:
+                open_of[node] = replace(outage, switched_off=True)
+        elif event.kind == _DISCONNECTED and node in connected:
+            connected.discard(node)
+            open_of[node] = _new_outage(event, power_offs)
+        elif event.kind == _CONNECTED:
+            connected.add(node)
+            if outage is not None:
+                done.append(replace(open_of.pop(node), connected_s=event.stamp_s))
+        elif outage is not None:
+            open_of[node] = _with_phase(outage, event)
+    return sorted([*done, *open_of.values()], key=lambda outage: (outage.lost_s, outage.node))
+
+
+def _new_outage(event: EventRecord, power_offs: Sequence[tuple[float, int]]) -> Outage:
+    for stamp_s, node in reversed(power_offs):
+        if node != event.node:
+            return Outage(event.node, event.stamp_s, cause_s=stamp_s, cause_node=node)
+        if stamp_s == event.stamp_s:
+            return Outage(event.node, event.stamp_s, switched_off=True)
+    return Outage(event.node, event.stamp_s)
+
+
+def _with_phase(outage: Outage, event: EventRecord) -> Outage:
+    if event.kind == _EMERGENCY and outage.emergency_s is None:
+        return replace(outage, emergency_s=event.stamp_s)
+    if event.kind == _FLIGHT_DECIDED:
+        place_of = event.peers[0] if event.peers else None
+        return replace(outage, decided_s=event.stamp_s, place_of=place_of, landed_s=None)
+    if event.kind == _LANDED and outage.decided_s is not None:
+        return replace(outage, landed_s=event.stamp_s)
+    return outage
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The mesh at one moment, in numbers."""
+
+    stamp_s: float
+    routers_on: int
+    routers_connected: int
+    messages: int  # sum over all nodes of packets sent since the start
+    mean_hops: float  # over connected routers; 0 when there is none
+    most_hops: int
+
+    @property
+    def connected_share(self) -> float:
+        """0..1, of the routers that are on; 1 when none is."""
+        return self.routers_connected / self.routers_on if self.routers_on else 1.0
+
+
+def take_sample(mesh: MeshStatus) -> Sample:
+    """The numbers that charts show over time."""
+    routers = [node for node in mesh.nodes if node.role == Role.ROUTER and node.on]
+    hops = [node.hops for node in routers if node.connected]
+    return Sample(
+        stamp_s=mesh.stamp_s,
+        routers_on=len(routers),
+        routers_connected=len(hops),
+        messages=sum(node.total_messages for node in mesh.nodes),
+        mean_hops=sum(hops) / len(hops) if hops else 0.0,
+        most_hops=max(hops, default=0),
+    )

@@ -1,0 +1,32 @@
+"""Whole routes, put together from what each node knows: its next hop."""
+
+from __future__ import annotations
+
+from typing import Mapping, Sequence
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.state.model import NodeStatus, Role
+
+
+def route_to_gateway(start: int, nodes: Mapping[int, NodeStatus]) -> bytes:
+    """Ids from `start` to a gateway, both included; empty when `start` knows no way.
+
+    A route that goes round, or that leads to a node nobody reports, ends with the last id that
+    could still be followed: it shows where the packets get stuck.
+    """
+    route = bytearray()
+    here = start
+    while here in nodes and here not in route:
+        route.append(here)
+        node = nodes[here]
+        if node.role == Role.GATEWAY:
+            return bytes(route)
+        if node.next_hop == NO_ROUTE:
+            break
+        here = node.next_hop
+    return bytes(route) if len(route) > 1 else b""
+
+
+def reaches_gateway(route: Sequence[int], nodes: Mapping[int, NodeStatus]) -> bool:
+    """Whether this route ends at a gateway."""
+    return bool(route) and nodes[route[-1]].role == Role.GATEWAY

@@ -1,0 +1,82 @@
+"""The state of the mesh as text, for a terminal or a pipe."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.state.model import MeshStatus, NodeStatus, Role, position_is_known
+from drone_mesh.state.trouble import Severity, Trouble, find_trouble, summarise
+
+_COLOUR = {
+    Severity.OK: "\x1b[32m",
+    Severity.WARN: "\x1b[33m",
+    Severity.ERROR: "\x1b[31m",
+    Severity.STALE: "\x1b[35m",
+}
+_BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
+_LONGEST_ROUTE = 6  # ids shown of a route before its middle is left out
+_HEADINGS = (
+    "node", "kind", "power", "connected", "gateway", "hops", "neighbours", "known", "sent",
+    "place (x, y, z)", "route", "remark",
+)  # fmt: skip
+
+
+def mesh_table(mesh: MeshStatus, colours: bool) -> str:
+    """One heading line, a table with one row per node, one line per kind of news. No line end."""
+    troubles = {trouble.node: trouble for trouble in find_trouble(mesh.nodes)}
+    summary = summarise(mesh.nodes, list(troubles.values()))
+    speed = "paused" if mesh.paused else f"speed {mesh.achieved_real_time_factor:.2g}x"
+    heading = f"t = {mesh.stamp_s:.1f} s, {speed}: {summary.text}"
+    rows = [_row(node, troubles.get(node.id)) for node in mesh.nodes]
+    widths = [max(len(row[i]) for row in [_HEADINGS, *rows]) for i in range(len(_HEADINGS))]
+    lines = [_line(_HEADINGS, widths), *(_line(row, widths) for row in rows)]
+    if colours:
+        heading = f"{_COLOUR[summary.severity]}{heading}{_PLAIN}"
+        lines[0] = f"{_BOLD}{lines[0]}{_PLAIN}"
+        for number, node in enumerate(mesh.nodes, start=1):
+            if node.id in troubles:
+                lines[number] = f"{_COLOUR[troubles[node.id].severity]}{lines[number]}{_PLAIN}"
+    return "\n".join([heading, *lines])
+
+
+def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
+    return (
+        str(node.id),
+        Role(node.role).name.lower(),
+        "on" if node.on else "off",
+        "yes" if node.connected else "no",
+        _number(node.gateway),
+        _number(node.hops),
+        str(len(node.neighbours)),
+        str(node.known_nodes),
+        str(node.total_messages),
+        _place(node),
+        _route(node.route),
+        trouble.text if trouble else "",
+    )
+
+
+def _line(cells: Sequence[str], widths: list[int]) -> str:
+    return "  ".join(cell.ljust(width) for cell, width in zip(cells, widths)).rstrip()
+
+
+def _number(value: int) -> str:
+    return "-" if value == NO_ROUTE else str(value)
+
+
+def _place(node: NodeStatus) -> str:
+    if not position_is_known(node):
+        return "-"
+    place = ", ".join(f"{metres:.1f}" for metres in node.position)
+    if not len(node.path):
+        return place
+    goal = ", ".join(f"{metres:.1f}" for metres in node.path[-3:])
+    return f"{place} -> {goal}"
+
+
+def _route(route: Sequence[int]) -> str:
+    ids = [str(node) for node in route]
+    if len(ids) > _LONGEST_ROUTE:
+        ids = [*ids[:3], "...", *ids[-2:]]
+    return " > ".join(ids) or "-"
