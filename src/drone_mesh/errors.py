@@ -17,3 +17,7 @@ class LocationUnknown(MeshError):
 
 class ConfigurationError(MeshError):
     """A parameter or a file is wrong. The message names it and says what is allowed: show it and stop."""
+
+
+class GoalRefused(MeshError):
+    """A goal for a drone is no number or out of bounds (reference 11). Nothing moves; tell who ordered it."""

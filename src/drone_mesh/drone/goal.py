@@ -1,0 +1,24 @@
+"""Which goals a drone takes (reference, section 11): one answer for all who pass orders on."""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.errors import GoalRefused
+
+MAX_COORDINATE_M = 5000.0  # latitude and longitude: -5000..5000 m, reference, section 11
+MAX_HEIGHT_M = 500.0  # height of the underside: 0..500 m, reference, section 11
+
+
+def check_goal(latitude: float, longitude: float, height: float) -> None:
+    """Raise GoalRefused unless a drone may be sent to this place (metres, world frame)."""
+    bounds = (
+        ("latitude", latitude, -MAX_COORDINATE_M, MAX_COORDINATE_M),
+        ("longitude", longitude, -MAX_COORDINATE_M, MAX_COORDINATE_M),
+        ("height", height, 0.0, MAX_HEIGHT_M),
+    )
+    for name, value, lowest, highest in bounds:
+        if not math.isfinite(value):
+            raise GoalRefused(f"{name} {value} is not a finite number of metres")
+        if not lowest <= value <= highest:
+            raise GoalRefused(f"{name} {value:g} m is outside {lowest:g}..{highest:g} m")

@@ -1,0 +1,74 @@
+"""BulletWorld: ground, gravity, bodies and time in pybullet."""
+
+from __future__ import annotations
+
+import pybullet  # type: ignore[import-not-found]  # a compiled module without types
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.world.flight_path import Vector
+from drone_mesh.world.interfaces import Colour, World
+
+GRAVITY_M_S2 = -9.81  # along z
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
+KINEMATIC = 0.0  # a body of mass 0 is moved by us and never pushed by physics
+
+
+class BulletWorld(World):
+    """A pybullet world of its own; any number of them can live in one process.
+
+    Nothing is drawn. Ground plane at z = 0. Each pybullet call names this world's client.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.client = pybullet.connect(pybullet.DIRECT)
+        if self.client < 0:
+            raise ConfigurationError("pybullet has no room for another world: close one first")
+        self._shapes: dict[
+            tuple[Vector, Colour], tuple[int, int]
+        ] = {}  # collision shape, visual shape
+        pybullet.setTimeStep(self.tick_s, physicsClientId=self.client)
+        pybullet.setGravity(0.0, 0.0, GRAVITY_M_S2, physicsClientId=self.client)
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self.client)
+        self.ground = pybullet.createMultiBody(KINEMATIC, plane, physicsClientId=self.client)
+
+    def add_box(self, size: Vector, colour: Colour, centre: Vector) -> int:
+        collision_shape, visual_shape = self._shape(size, colour)
+        return int(
+            pybullet.createMultiBody(
+                KINEMATIC,
+                collision_shape,
+                visual_shape,
+                centre,
+                UPRIGHT,
+                physicsClientId=self.client,
+            )
+        )
+
+    def move_box(self, box: int, centre: Vector) -> None:
+        pybullet.resetBasePositionAndOrientation(box, centre, UPRIGHT, physicsClientId=self.client)
+
+    def close(self) -> None:
+        if self.client >= 0:
+            pybullet.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    def _advance(self) -> None:
+        pybullet.stepSimulation(physicsClientId=self.client)
+
+    def _shape(self, size: Vector, colour: Colour) -> tuple[int, int]:
+        """The shapes of such a box; boxes alike share theirs."""
+        if (size, colour) not in self._shapes:
+            half_extents = [edge_m / 2 for edge_m in size]
+            self._shapes[size, colour] = (
+                pybullet.createCollisionShape(
+                    pybullet.GEOM_BOX, halfExtents=half_extents, physicsClientId=self.client
+                ),
+                pybullet.createVisualShape(
+                    pybullet.GEOM_BOX,
+                    halfExtents=half_extents,
+                    rgbaColor=colour,
+                    physicsClientId=self.client,
+                ),
+            )
+        return self._shapes[size, colour]

@@ -1,0 +1,108 @@
+"""DroneEngine: where one simulated drone is and how it flies (reference, section 11)."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from typing import Callable, NamedTuple
+
+from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.world.flight_path import FlightPath, Vector
+from drone_mesh.world.interfaces import World
+
+ARRIVED_M = 0.01  # on each axis, reference, section 11
+
+_log = logging.getLogger(__name__)
+
+
+class DroneState(NamedTuple):
+    """Where a drone was at the end of one step. Never changes, so any thread may keep it."""
+
+    position: Vector  # of the box's centre, metres, world frame: what DroneInfo carries
+    path: FlightPath | None  # the flight it is on; None: it stands (or hovers) still
+    now_s: float  # simulated time of the last change
+
+    @property
+    def is_flying(self) -> bool:
+        return self.path is not None
+
+
+StateListener = Callable[[DroneState], None]
+"""Is called in the world's thread, inside a step: be quick and do not step the world."""
+
+
+class DroneEngine(IDroneEngine):
+    """Flight path and pose of one drone.
+
+    The pose belongs to the world's thread. `set_goal`, `state` and `get_location` may be used by
+    any thread: a goal is queued and takes effect in the next step; the other two read the snapshot
+    of the last one.
+    """
+
+    def __init__(self, world: World, box: int, centre: Vector, half_height_m: float) -> None:
+        """`box` is the drone's body in `world`, `centre` where that is now."""
+        self._world = world
+        self._box = box
+        self._half_height_m = half_height_m
+        self._goals: deque[Vector] = (
+            deque()
+        )  # centres; filled by any thread, emptied by the world's
+        self._listeners: list[StateListener] = []
+        self._state = DroneState(centre, None, world.now_s)
+
+    @property
+    def state(self) -> DroneState:
+        """The drone after the last step in which it moved."""
+        return self._state
+
+    def add_listener(self, listener: StateListener) -> None:
+        """Call `listener` with the new state in each step that moves the drone.
+
+        The last call of a flight has no path any more. World's thread.
+        """
+        self._listeners.append(listener)
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly to this place (metres, world frame, height of the underside). Returns at once.
+
+        The goal it already flies to, or already stands on, changes nothing; any other one replans
+        the flight from where the drone is. Raises GoalRefused for NaN, infinity and places out of
+        bounds.
+        """
+        check_goal(latitude, longitude, height)
+        self._goals.append((longitude, latitude, height + self._half_height_m))
+        self._world.wake(self)
+
+    def get_location(self) -> Location:
+        """Where the underside is, in metres, after the last step. Never raises LocationUnknown."""
+        x, y, z = self._state.position
+        return Location(latitude=y, longitude=x, height=z - self._half_height_m)
+
+    def step(self, now_s: float) -> bool:
+        """Take the goals that wait, fly on to `now_s`; True while in flight. For the world."""
+        while self._goals:
+            self._take_goal(self._goals.popleft(), now_s)
+        path = self._state.path
+        if path is None:
+            return False
+        position = path.position_at(now_s)
+        # Only a drone that comes down can arrive: a flight straight up passes its goal on the way.
+        if path.is_descending(now_s) and _is_close(position, path.goal):
+            position, path = path.goal, None
+        self._world.move_box(self._box, position)
+        self._state = DroneState(position, path, now_s)
+        for listener in self._listeners:
+            listener(self._state)
+        return path is not None
+
+    def _take_goal(self, goal: Vector, now_s: float) -> None:
+        position, path, _ = self._state
+        if _is_close(goal, position if path is None else path.goal):
+            return
+        self._state = DroneState(position, FlightPath(position, goal, now_s), now_s)
+        _log.debug("box %d flies from %s to %s", self._box, position, goal)
+
+
+def _is_close(place: Vector, other: Vector) -> bool:
+    return all(abs(a - b) <= ARRIVED_M for a, b in zip(place, other))

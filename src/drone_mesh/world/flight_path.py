@@ -1,0 +1,77 @@
+"""The way a drone flies from place to place (reference, section 11): geometry and time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Tuple
+
+Vector = Tuple[float, float, float]  # x (longitude), y (latitude), z (up): metres, world frame
+
+SPEED_M_S = 2.0  # reference, section 11
+CLIMB_ENDS_AT = 0.1  # share of the flight's duration, reference, section 11
+DESCENT_STARTS_AT = 0.9  # share of the flight's duration, reference, section 11
+
+
+def _between(start: Vector, end: Vector, share: float) -> Vector:
+    """The point at `share` (0..1) of the straight line from `start` to `end`."""
+    return (
+        start[0] + (end[0] - start[0]) * share,
+        start[1] + (end[1] - start[1]) * share,
+        start[2] + (end[2] - start[2]) * share,
+    )
+
+
+@dataclass(frozen=True)
+class FlightPath:
+    """One flight in straight lines: up, across, down.
+
+    A flight over a straight distance d takes d / SPEED_M_S and climbs d / 2. The way flown is
+    longer than d, so a drone is faster than that for most of it.
+    """
+
+    start: Vector
+    goal: Vector
+    start_s: float  # when it leaves `start`, simulated seconds
+    duration_s: float = field(init=False)
+    above_start: Vector = field(init=False)  # where it is at 10 %
+    above_goal: Vector = field(init=False)  # where it is at 90 %
+
+    def __post_init__(self) -> None:
+        distance_m = math.dist(self.start, self.goal)
+        climb_m = distance_m / 2
+        derived = {
+            "duration_s": distance_m / SPEED_M_S,
+            "above_start": (self.start[0], self.start[1], self.start[2] + climb_m),
+            "above_goal": (self.goal[0], self.goal[1], self.goal[2] + climb_m),
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def waypoints(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """The corners of the path, to draw it."""
+        return (self.start, self.above_start, self.above_goal, self.goal)
+
+    def share_flown(self, now_s: float) -> float:
+        """How much of the flight's time is over: 0.0 before the start, 1.0 from the end on."""
+        if self.duration_s == 0.0:
+            return 1.0
+        return min(1.0, max(0.0, (now_s - self.start_s) / self.duration_s))
+
+    def position_at(self, now_s: float) -> Vector:
+        """Where the drone is at this time: at `start` before the flight, at `goal` after it."""
+        share = self.share_flown(now_s)
+        if share >= 1.0:
+            return self.goal
+        if share < CLIMB_ENDS_AT:
+            return _between(self.start, self.above_start, share / CLIMB_ENDS_AT)
+        if share < DESCENT_STARTS_AT:
+            across = (share - CLIMB_ENDS_AT) / (DESCENT_STARTS_AT - CLIMB_ENDS_AT)
+            return _between(self.above_start, self.above_goal, across)
+        descent = (share - DESCENT_STARTS_AT) / (1.0 - DESCENT_STARTS_AT)
+        return _between(self.above_goal, self.goal, descent)
+
+    def is_descending(self, now_s: float) -> bool:
+        """Whether the last, vertical part has begun."""
+        return self.share_flown(now_s) >= DESCENT_STARTS_AT

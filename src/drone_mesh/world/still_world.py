@@ -1,0 +1,27 @@
+"""StillWorld: a world without physics, for tests that do not need any."""
+
+from __future__ import annotations
+
+from drone_mesh.world.flight_path import Vector
+from drone_mesh.world.interfaces import Colour, World
+
+
+class StillWorld(World):
+    """Time passes and drones fly, as in BulletWorld; a body is only the place of its centre."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.centres: list[Vector] = []  # by handle
+
+    def add_box(self, size: Vector, colour: Colour, centre: Vector) -> int:
+        self.centres.append(centre)
+        return len(self.centres) - 1
+
+    def move_box(self, box: int, centre: Vector) -> None:
+        self.centres[box] = centre
+
+    def close(self) -> None:
+        """There is nothing to free."""
+
+    def _advance(self) -> None:
+        """There is no physics."""

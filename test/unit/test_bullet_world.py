@@ -1,0 +1,129 @@
+"""BulletWorld: time, bodies, more than one world; and what it shares with StillWorld."""
+
+from __future__ import annotations
+
+import pybullet
+import pytest
+
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.drones import RouterDrone
+from drone_mesh.world.still_world import StillWorld
+
+
+@pytest.fixture
+def bullet():
+    with BulletWorld() as world:
+        yield world
+
+
+@pytest.fixture(params=[BulletWorld, StillWorld])
+def world(request):
+    with request.param() as world:
+        yield world
+
+
+class Countdown:
+    """Wants so many turns."""
+
+    def __init__(self, turns):
+        self.left, self.times = turns, []
+
+    def step(self, now_s):
+        self.left -= 1
+        self.times.append(now_s)
+        return self.left > 0
+
+
+def place_of(world, body):
+    return pybullet.getBasePositionAndOrientation(body, physicsClientId=world.client)[0]
+
+
+def test_a_step_is_ten_milliseconds_and_time_does_not_drift(world):
+    assert world.step() == 0.01
+    for _ in range(99_999):
+        now_s = world.step()
+    assert now_s == 1000.0 == world.now_s
+
+
+def test_who_was_woken_gets_turns_until_it_rests(world):
+    mover = Countdown(3)
+    world.wake(mover)
+    for _ in range(10):
+        world.step()
+    assert mover.times == [0.01, 0.02, 0.03]
+
+
+def test_who_is_woken_twice_gets_one_turn_in_a_step(world):
+    mover = Countdown(2)
+    world.wake(mover)
+    world.wake(mover)
+    world.step()
+    assert mover.times == [0.01]
+
+
+def test_movers_take_their_turns_in_the_order_of_waking(world):
+    turns = []
+
+    class Named:
+        def __init__(self, name):
+            self.name = name
+
+        def step(self, now_s):
+            turns.append(self.name)
+            return True
+
+    for name in "cab":
+        world.wake(Named(name))
+    world.step()
+    world.step()
+    assert turns == list("cabcab")
+
+
+def test_a_box_stays_where_it_is_put_however_long_gravity_pulls(bullet):
+    box = bullet.add_box((0.2, 0.2, 0.1), (0.0, 1.0, 0.0, 1.0), (1.0, 2.0, 3.0))
+    for _ in range(200):
+        bullet.step()
+    assert place_of(bullet, box) == (1.0, 2.0, 3.0)
+    bullet.move_box(box, (4.0, 5.0, 6.0))
+    bullet.step()
+    assert place_of(bullet, box) == (4.0, 5.0, 6.0)
+
+
+def test_a_loose_body_falls_and_comes_to_rest_on_the_ground(bullet):
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_BOX, halfExtents=[0.1, 0.1, 0.1], physicsClientId=bullet.client
+    )
+    body = pybullet.createMultiBody(1.0, shape, -1, [0, 0, 5], physicsClientId=bullet.client)
+    for _ in range(50):
+        bullet.step()
+    fallen_m = 9.81 / 2 * 0.5**2
+    assert place_of(bullet, body)[2] == pytest.approx(
+        5 - fallen_m, abs=0.05
+    )  # the air damps a little
+    for _ in range(350):
+        bullet.step()
+    assert place_of(bullet, body)[2] == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_flying_drone_moves_its_body(bullet):
+    drone = RouterDrone(bullet, node_id=1, longitude=0.0, latitude=0.0)
+    drone.engine.set_goal(latitude=4.0, longitude=3.0, height=0.0)
+    for _ in range(300):
+        bullet.step()
+        assert place_of(bullet, drone.box) == pytest.approx(drone.engine.state.position)
+    assert place_of(bullet, drone.box) == pytest.approx((3.0, 4.0, 0.05))
+
+
+def test_two_worlds_know_nothing_of_each_other(bullet):
+    with BulletWorld() as other:
+        here = bullet.add_box((1.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
+        there = other.add_box((1.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0), (2.0, 2.0, 2.0))
+        bullet.step()
+        assert (bullet.now_s, other.now_s) == (0.01, 0.0)
+        assert place_of(bullet, here) == (1.0, 1.0, 1.0)
+        assert place_of(other, there) == (2.0, 2.0, 2.0)
+
+
+def test_closing_twice_changes_nothing(world):
+    world.close()
+    world.close()
