@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+
 from drone_mesh.execution import MeshExecutor
 
 PATIENCE_S = 5.0  # for threads; nothing here takes a hundredth of it
@@ -57,9 +58,8 @@ def executor(clock):
 
 def settle(executor):
     """Returns when the worker has done what was submitted so far and what is due now."""
-    for _ in range(2):
-        done = threading.Event()
-        executor.submit(lambda _now_s: done.set())
+    for done in (threading.Event(), threading.Event()):
+        executor.submit(lambda _now_s, done=done: done.set())
         assert done.wait(PATIENCE_S), "the worker did not come to the submitted function"
 
 

@@ -1,0 +1,160 @@
+"""The rules of the simulated air: reference, sections 6 and 14.1."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+
+import pytest
+
+from drone_mesh.signal import Node, SignalError, SignalRegister
+
+NOWHERE = (0.0, 0.0, 0.0)  # what an antenna gives as its position
+
+
+def register_of(*places, max_distance_m=9.0):
+    """Nodes 0, 1, ... at these places, as antenna and engine announce them."""
+    register = SignalRegister(max_distance_m)
+    for node_id, place in enumerate(places):
+        register.drone_info(node_id, place, "", True)
+        register.drone_info(node_id, NOWHERE, f"/Node/{node_id}", True)
+    return register
+
+
+def test_a_stranger_is_registered_where_it_says_it_is():
+    register = SignalRegister()
+    register.drone_info(7, (1.0, 2.0, 3.0), "/stranger", True)
+    assert register.node(7) == Node(7, "/stranger", True)
+    assert register.position(7) == (1.0, 2.0, 3.0)
+
+
+def test_an_unknown_node_without_sub_is_not_registered_but_its_position_is_kept():
+    register = SignalRegister()
+    register.drone_info(7, (1.0, 2.0, 3.0), "", True)
+    assert register.node(7) is None
+    register.drone_info(7, (50.0, 0.0, 0.0), "/Node/7", True)
+    assert register.position(7) == (1.0, 2.0, 3.0)
+
+
+def test_an_antenna_never_moves_a_known_node():
+    register = register_of((1.0, 2.0, 0.05))
+    register.drone_info(0, (8.0, 8.0, 8.0), "/Node/0", True)
+    assert register.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_an_engine_moves_its_node():
+    register = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    assert register.in_range(0) == (1,)
+    register.drone_info(1, (20.0, 0.0, 0.05), "", True)
+    assert register.in_range(0) == ()
+    assert register.link(0, 1) is None
+
+
+def test_a_flying_drone_does_not_switch_its_antenna_back_on():
+    register = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    register.drone_info(1, NOWHERE, "/Node/1", False)
+    register.drone_info(1, (6.0, 0.0, 0.05), "", True)
+    assert register.node(1) == Node(1, "/Node/1", False)
+    assert register.position(1) == (6.0, 0.0, 0.05)
+
+
+def test_power_off_without_sub_leaves_the_position_alone():
+    register = register_of((1.0, 2.0, 0.05))
+    register.drone_info(0, (9.0, 9.0, 9.0), "", False)
+    assert register.node(0) == Node(0, "/Node/0", False)
+    assert register.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_exactly_the_origin_without_sub_switches_on_a_node_that_is_off():
+    register = register_of((1.0, 2.0, 0.05))
+    register.drone_info(0, NOWHERE, "", False)
+    register.drone_info(0, NOWHERE, "", True)
+    assert register.node(0) == Node(0, "/Node/0", True)
+    assert register.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_exactly_the_origin_is_a_position_for_a_node_that_is_on():
+    register = register_of((1.0, 2.0, 0.05))
+    register.drone_info(0, NOWHERE, "", True)
+    assert register.position(0) == NOWHERE
+
+
+def test_a_new_sub_replaces_the_topic():
+    register = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    register.drone_info(1, NOWHERE, "/elsewhere", True)
+    assert register.link(0, 1) == "/elsewhere"
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "heard"), [(8.999, True), (9.0, False), (9.001, False), (0.0, True)]
+)
+def test_in_range_means_nearer_than_the_maximum(distance_m, heard):
+    register = register_of((1.0, 1.0, 1.0), (1.0, 1.0, 1.0 + distance_m))
+    assert (register.link(0, 1) == "/Node/1") is heard
+    assert (register.in_range(0) == (1,)) is heard
+
+
+def test_the_distance_is_euclidean_in_three_dimensions():
+    assert register_of((0, 0, 0.1), (3, 4, 0.1), max_distance_m=5.01).in_range(0) == (1,)
+    assert register_of((0, 0, 0.1), (3, 4, 1.0), max_distance_m=5.01).in_range(0) == ()
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_a_node_that_is_off_neither_sends_nor_receives(off):
+    register = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    register.drone_info(off, NOWHERE, f"/Node/{off}", False)
+    assert register.link(0, 1) is None
+    assert register.in_range(0) == ()
+
+
+def test_unknown_nodes_are_not_linked_and_may_not_ask_who_is_near():
+    register = register_of((0.0, 0.0, 0.05))
+    assert register.link(0, 9) is None
+    assert register.link(9, 0) is None
+    with pytest.raises(SignalError, match="node 9 is not registered"):
+        register.in_range(9)
+
+
+@pytest.mark.parametrize(
+    ("node_id", "position", "sub", "why"),
+    [
+        (254, (1.0, 1.0, 1.0), "/Node/254", "id 254: node ids are 0..253"),
+        (255, (1.0, 1.0, 1.0), "", "id 255: node ids are 0..253"),
+        (3, (math.nan, 1.0, 1.0), "", "not three finite numbers"),
+        (3, (1.0, math.inf, 1.0), "/Node/3", "not three finite numbers"),
+        (3, (1.0, 1.0), "", "not three finite numbers"),
+        (3, NOWHERE, "/", "'/' is not the name of a topic"),
+        (3, NOWHERE, "a b", "is not the name of a topic"),
+        (3, NOWHERE, "~private", "is not the name of a topic"),
+        (3, NOWHERE, "/Node/3\n", "is not the name of a topic"),
+        (3, NOWHERE, "/" + "x" * 300, "is not the name of a topic"),
+    ],
+)
+def test_bad_information_is_refused_and_changes_nothing(node_id, position, sub, why):
+    register = register_of((1.0, 1.0, 1.0))
+    with pytest.raises(SignalError, match=why):
+        register.drone_info(node_id, position, sub, True)
+    assert register.node(node_id) is None
+    assert register.position(node_id) is None
+
+
+@pytest.mark.parametrize("distance_m", [0.0, -1.0, math.nan])
+def test_a_maximum_distance_that_is_none_is_refused(distance_m):
+    with pytest.raises(SignalError, match="must be above 0"):
+        SignalRegister(distance_m)
+
+
+def test_both_questions_agree_whatever_is_moved_and_switched():
+    rng = random.Random(4)
+    register = register_of(*[(rng.uniform(0, 30), rng.uniform(0, 30), 0.05) for _ in range(40)])
+    for _ in range(200):
+        node_id = rng.randrange(40)
+        if rng.random() < 0.5:
+            place = (rng.uniform(0, 30), rng.uniform(0, 30), rng.uniform(0, 9))
+            register.drone_info(node_id, place, "", True)
+        else:
+            register.drone_info(node_id, NOWHERE, f"/Node/{node_id}", rng.random() < 0.7)
+    links = {pair for pair in itertools.permutations(range(40), 2) if register.link(*pair)}
+    assert links == {(a, b) for a in range(40) for b in register.in_range(a)}
+    assert 100 < len(links) < 40 * 39
