@@ -135,6 +135,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))
             if self._antenna.on():
                 self._check(due_s)
+            else:
+                self._antenna_is_off()
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """Learn from a packet, then process it or send it on. Bad packets are dropped."""
@@ -166,11 +168,13 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._process(payload, creator, from_, kind)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
-        """Switched on: introduce soon."""
+        """Switched on: introduce soon. Switched off: a router is not connected at once."""
         self._now_s = now_s
         self._report(MeshEventKind.POWER_ON if on else MeshEventKind.POWER_OFF)
         introduce_s = now_s + INTRODUCE_AFTER_POWER_S if on else math.inf
         self._deadlines.set(Due.INTRODUCE, introduce_s)
+        if not on:
+            self._antenna_is_off()
 
     def on_antenna_registered(self, now_s: float) -> None:
         """The medium came back: introduce soon, each node at its own moment."""
@@ -251,6 +255,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     @abc.abstractmethod
     def _check(self, due_s: float) -> None:
         """What is to be done once a period while the antenna is on; it was due at `due_s`."""
+
+    @abc.abstractmethod
+    def _antenna_is_off(self) -> None:
+        """The antenna was switched off, or a check finds it off."""
 
     @abc.abstractmethod
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:

@@ -78,6 +78,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _check(self, due_s: float) -> None:
         self._routing.maintain_routing()
 
+    def _antenna_is_off(self) -> None:
+        """A gateway stays one without an antenna."""
+
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
         if not know_gateway:
             self.send_heartbeat(neighbour)

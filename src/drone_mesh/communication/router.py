@@ -74,14 +74,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
         """Whether a gateway answered last time, or may still answer."""
         return self._connected or self._awaiting_answer
 
-    def on_antenna_power(self, on: bool, now_s: float) -> None:
-        """Switched off: not connected at once."""
-        super().on_antenna_power(on, now_s)
-        if not on:
-            self._disconnect()
-            self._lost_since_s = None
-            self._end_negotiation()
-
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`; the one to the preferred gateway wants an answer."""
         if other == self._preferred_gateway:
@@ -102,6 +94,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._send_heartbeat_to_gateway()
         elif self._flight is None:
             self._lost_connection(due_s)
+
+    def _antenna_is_off(self) -> None:
+        self._disconnect()
+        self._lost_since_s = None
+        self._end_negotiation()
 
     def _ask_for_locations(self) -> None:
         next_hop = self.get_route_to_gateway()
