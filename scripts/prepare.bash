@@ -1,0 +1,116 @@
+# Sourced by run, test and bench: installs what is missing and builds. Nothing outside the
+# checkout changes, but for system packages.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+venv="$root/.venv"
+noetic=/opt/ros/noetic/setup.bash
+
+if [ -e "$noetic" ]; then
+  ros_packages=(
+    cmake g++ make python3-setuptools
+    ros-noetic-{catkin,diagnostic-msgs,geometry-msgs,message-generation,message-runtime,rosbag}
+    ros-noetic-{rosbash,rosgraph-msgs,roslaunch,rosmsg,rosnode,rosparam,rospy,rosservice,rostest}
+    ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
+  )
+  rviz_package=ros-noetic-rviz
+else
+  ros_packages=(
+    catkin cmake g++ make python3-setuptools
+    ros-core ros-message-generation ros-message-runtime rosbash
+    libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev librostest-dev
+    libstd-msgs-dev libtf2-msgs-dev libvisualization-msgs-dev
+    python3-{diagnostic,geometry,tf2,visualization}-msgs python3-rospy python3-rostest
+  )
+  rviz_package=rviz
+fi
+
+say() { printf '== %s\n' "$*"; }
+fail() { printf '%s: %s\n' "${0##*/}" "$*" >&2; exit 1; }
+
+# apt_install PACKAGE...: those that are missing, as root or through sudo.
+apt_install() {
+  local package missing=() as_root=() apt
+  for package in "$@"; do
+    dpkg-query -W -f '${Status}\n' "$package" 2>/dev/null | grep -q 'ok installed' ||
+      missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return
+  command -v apt-get >/dev/null || fail "no apt-get here to install what is missing: ${missing[*]}"
+  if [ "$(id -u)" -ne 0 ]; then
+    as_root=(sudo)
+    if ! command -v sudo >/dev/null || { [ ! -t 0 ] && ! sudo -n true 2>/dev/null; }; then
+      fail "neither root nor sudo; ask for: apt-get install --no-install-recommends ${missing[*]}"
+    fi
+  fi
+  say "installing ${#missing[@]} system packages and what they need: ${missing[*]}"
+  apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive
+    apt-get -q -y -o DPkg::Lock::Timeout=600 -o Dpkg::Use-Pty=0)
+  "${apt[@]}" update </dev/null || fail "apt-get update failed; is the network there?"
+  "${apt[@]}" install --no-install-recommends "${missing[@]}" </dev/null ||
+    fail "apt-get could not install: ${missing[*]}"
+}
+
+# make_venv: on the system's Python, since that is the one which sees ROS.
+make_venv() {
+  "$venv/bin/python" -m pip --version >/dev/null 2>&1 && return
+  /usr/bin/python3 -c 'import ensurepip, venv' 2>/dev/null || apt_install python3 python3-venv
+  say "making the virtual environment .venv"
+  /usr/bin/python3 -m venv --clear --system-site-packages "$venv" || fail "could not make .venv"
+}
+
+# pip_install [--no-deps] FILE...: requirement files, unless this very content is installed.
+pip_install() {
+  local options=() file stamp
+  [ "$1" = --no-deps ] && { options=(--no-deps); shift; }
+  for file in "$@"; do
+    stamp="$venv/.installed-$(basename "$file")"
+    cmp -s "$root/$file" "$stamp" && continue
+    say "installing Python packages into .venv: $file"
+    "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --prefer-binary \
+      --progress-bar off "${options[@]}" -r "$root/$file" </dev/null ||
+      fail "pip could not install $file"
+    cp "$root/$file" "$stamp"
+  done
+}
+
+# build_step WHAT COMMAND...: with its output in a log, of which the end is shown if it fails.
+build_step() {
+  local log="$root/build/build.log"
+  say "$1 in build/"
+  "${@:2}" >"$log" 2>&1 || { tail -n 30 "$log" >&2; fail "$1 failed; see build/build.log"; }
+}
+
+# build: plain CMake; it finds out by itself what has changed since the last time.
+build() {
+  local cache="$root/build/CMakeCache.txt"
+  # shellcheck disable=SC1090
+  [ -e "$noetic" ] && . "$noetic"
+  if [ ! -e "$root/build/Makefile" ] ||
+    ! grep -qx "PYTHON_EXECUTABLE:[A-Z]*=$venv/bin/python" "$cache"; then
+    build_step configuring cmake -S "$root" -B "$root/build" \
+      -DPYTHON_EXECUTABLE="$venv/bin/python" -DCMAKE_INSTALL_PREFIX="$root/build/install"
+  fi
+  build_step building cmake --build "$root/build"
+}
+
+# alone COMMAND...: only one at a time installs or builds in this checkout.
+alone() {
+  mkdir -p "$root/build"
+  (
+    flock -n 9 || { say "waiting for another build in this checkout"; flock 9; }
+    "$@" 9>&-
+  ) 9>"$root/build/.lock" || exit
+}
+
+prepare_simulation() {
+  apt_install "${ros_packages[@]}"
+  make_venv
+  pip_install requirements/simulation.txt
+  build
+}
+
+prepare_tests_without_ros() {
+  make_venv
+  pip_install requirements/simulation.txt requirements/test.txt
+  pip_install --no-deps requirements/test-bare.txt
+}
