@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pybullet  # type: ignore[import-not-found]  # a compiled module without types
+import pybullet
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.flight_path import Vector

@@ -45,9 +45,7 @@ class DroneEngine(IDroneEngine):
         self._world = world
         self._box = box
         self._half_height_m = half_height_m
-        self._goals: deque[Vector] = (
-            deque()
-        )  # centres; filled by any thread, emptied by the world's
+        self._goals: deque[Vector] = deque()  # filled by any thread, emptied by the world's
         self._listeners: list[StateListener] = []
         self._state = DroneState(centre, None, world.now_s)
 

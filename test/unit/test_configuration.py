@@ -1,0 +1,185 @@
+"""The factory's configuration: the shipped file, overrides, and what is refused in which words."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import pytest
+import yaml
+
+from drone_mesh.configuration import FactoryConfiguration, load_configuration
+from drone_mesh.errors import ConfigurationError
+
+SHIPPED = Path(__file__).parents[2] / "config" / "factory.yaml"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text):
+        path = tmp_path / "mine.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_the_shipped_file_holds_the_documented_numbers():
+    assert load_configuration(SHIPPED, {"seed": 7}) == FactoryConfiguration(
+        seed=7,
+        gateways=1,
+        routers=17,
+        gridsize=6,
+        spacing=1.0,
+        gui=False,
+        real_time_factor=1.0,
+        max_distance=9.0,
+        routing="child_table_tree",
+        check_period=10.0,
+        connection_lost_after=30.0,
+        debug=True,
+    )
+
+
+def test_the_shipped_file_names_every_key_with_a_comment_that_explains_it():
+    lines = SHIPPED.read_text(encoding="utf-8").splitlines()
+    named = [line for line in lines if line and not line.startswith("#")]
+    assert {line.split(":")[0] for line in named} == set(FactoryConfiguration.__dataclass_fields__)
+    assert all("  # " in line or " # " in line for line in named)
+
+
+def test_a_key_that_is_left_out_has_the_value_of_the_shipped_file(write):
+    assert load_configuration(write(""), {"seed": 7}) == load_configuration(SHIPPED, {"seed": 7})
+    assert load_configuration(write("routers: 3"), {"seed": 7}) == FactoryConfiguration(
+        seed=7, routers=3
+    )
+
+
+def test_an_override_wins_over_the_file_and_an_empty_one_leaves_it(write):
+    path = write("routers: 3\nspacing: 6\ngui: true\nseed: 1")
+    overrides = {"routers": "16", "spacing": "", "gui": " ", "routing": "flooding"}
+    assert load_configuration(path, overrides) == FactoryConfiguration(
+        seed=1, routers=16, spacing=6.0, gui=True, routing="flooding"
+    )
+
+
+@pytest.mark.parametrize("routers", [5, "5", " 5", 5.0, "5.0"])
+def test_a_number_may_come_as_yaml_ros_or_a_shell_made_it(write, routers):
+    configuration = load_configuration(write(""), {"routers": routers})
+    assert configuration.routers == 5
+    assert type(configuration.routers) is int
+
+
+@pytest.mark.parametrize(
+    ("word", "value"),
+    [
+        (True, True),
+        ("true", True),
+        ("True", True),
+        (1, True),
+        (False, False),
+        ("false", False),
+        ("0", False),
+    ],
+)
+def test_a_switch_may_come_as_yaml_ros_or_a_shell_made_it(write, word, value):
+    assert load_configuration(write(""), {"gui": word}).gui is value
+
+
+def test_as_fast_as_possible_is_a_factor_of_zero(write):
+    assert load_configuration(write("real_time_factor: 0")).real_time_factor == 0.0
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("gateways: -1", "gateways is -1, want a whole number of drones, 0..254"),
+        ("routers: 255", "routers is 255, want a whole number of drones, 0..254"),
+        ("routers: 1.5", "routers is 1.5, want a whole"),
+        ("routers: many", "routers is 'many', want a whole"),
+        ("routers: true", "routers is True, want a whole"),
+        ("routers: [1]", r"routers is \[1\], want a whole"),
+        ("routers:", "routers is nothing, want a whole"),
+        ("gridsize: 0", "gridsize is 0, want a whole number of routers in a row, 1..254"),
+        ("spacing: 0", "spacing is 0, want metres, above 0, at most 1000"),
+        ("spacing: .nan", "spacing is nan, want metres"),
+        ("max_distance: .inf", "max_distance is inf, want metres, above 0"),
+        ("real_time_factor: -0.1", "real_time_factor is -0.1, want a factor"),
+        ("check_period: 0", "check_period is 0, want seconds, 0.1..3600"),
+        ("connection_lost_after: soon", "connection_lost_after is 'soon', want seconds"),
+        ("debug: maybe", "debug is 'maybe', want true or false"),
+        ("gui: 2", "gui is 2, want true or false"),
+        ("routing: 3", "routing is 3, want the name of a routing technique"),
+        ("seed: -1", "seed is -1, want a whole number, 0..4294967295, or random"),
+        ("seed: 1.5", "seed is 1.5, want a whole number"),
+        ("routters: 3", "unknown key routters; did you mean routers?"),
+        ("colour: red", "unknown key colour; known are check_period, "),
+        ("7: 3", "unknown key 7; known are"),
+    ],
+)
+def test_a_bad_line_is_refused_with_file_key_value_and_what_is_allowed(write, line, why):
+    path = write(line)
+    with pytest.raises(ConfigurationError, match=why) as refused:
+        load_configuration(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_bad_override_is_refused_as_an_argument(write):
+    with pytest.raises(ConfigurationError, match="^argument: spacing is '-1', want metres"):
+        load_configuration(write(""), {"spacing": "-1"})
+    with pytest.raises(
+        ConfigurationError, match="^argument: unknown key space; did you mean spacing?"
+    ):
+        load_configuration(write(""), {"space": "1"})
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("routers: 1\nrouters: 2\n", "line 2: routers stands there twice"),
+        ("routers: [1\n", "line 2: "),
+        ("- routers\n", "want 'key: value' lines, not a list"),
+        ("routers 3\n", "want 'key: value' lines, not a str"),
+        ("? [1, 2]\n: 3\n", "line 1: "),
+        ("routers: !!python/object:os.system {}\n", "line 1: "),
+        ("routers: \x00\n", "mine.yaml: "),
+    ],
+)
+def test_a_file_that_is_no_configuration_is_refused_in_one_line(write, text, why):
+    with pytest.raises(ConfigurationError, match=why) as refused:
+        load_configuration(write(text))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_that_is_not_there_or_no_text_is_refused_by_name(tmp_path):
+    with pytest.raises(ConfigurationError, match="nowhere.yaml: No such file"):
+        load_configuration(tmp_path / "nowhere.yaml")
+    with pytest.raises(ConfigurationError, match="Is a directory"):
+        load_configuration(tmp_path)
+    picture = tmp_path / "picture.png"
+    picture.write_bytes(b"\x89PNG\xff\xfe")
+    with pytest.raises(ConfigurationError, match="picture.png: not a text file"):
+        load_configuration(picture)
+
+
+def test_the_seed_of_the_file_is_used_and_shown(write, caplog):
+    caplog.set_level(logging.INFO)
+    assert load_configuration(write("seed: 42")).seed == 42
+    assert "seed:=42 repeats this run" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("text", "overrides"),
+    [("", {}), ("seed: null", {}), ("seed: null", {"seed": ""}), ("seed: 42", {"seed": "random"})],
+)
+def test_without_a_seed_a_new_one_is_chosen_each_time_and_shown(write, caplog, text, overrides):
+    caplog.set_level(logging.INFO)
+    path = write(text)
+    seeds = [load_configuration(path, overrides).seed for _ in range(5)]
+    assert len(set(seeds)) == 5
+    assert all(f"seed:={seed} repeats this run" in caplog.text for seed in seeds)
+
+
+def test_the_shipped_file_is_plain_yaml():
+    assert yaml.safe_load(SHIPPED.read_text(encoding="utf-8"))["seed"] is None
