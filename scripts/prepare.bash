@@ -25,7 +25,7 @@ else
 fi
 
 say() { printf '== %s\n' "$*"; }
-fail() { printf '%s: %s\n' "${0##*/}" "$*" >&2; exit 1; }
+fail() { printf 'scripts/%s: %s\n' "${0##*/}" "$*" >&2; exit 1; }
 
 # apt_install PACKAGE...: those that are missing, as root or through sudo.
 apt_install() {
@@ -90,7 +90,7 @@ build() {
     build_step configuring cmake -S "$root" -B "$root/build" \
       -DPYTHON_EXECUTABLE="$venv/bin/python" -DCMAKE_INSTALL_PREFIX="$root/build/install"
   fi
-  build_step building cmake --build "$root/build"
+  build_step building cmake --build "$root/build" -j "$(nproc)"
 }
 
 # alone COMMAND...: only one at a time installs or builds in this checkout.
