@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import logging
+import math
 import random
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
+    NO_ROUTE,
     IGatewayCommands,
     IInternetConnection,
     IRoutingTechnique,
     IWirelessCommunication,
+    KnownNode,
 )
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
@@ -45,6 +48,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._connected = True
         self._preferred_gateway = node_id
         self._hops = 0
+        self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
 
     def stop(self) -> None:
         """Internet, antenna and debugging off."""
@@ -72,6 +76,19 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._report(MeshEventKind.NO_ROUTE, node_id)
         return False
 
+    def get_known_nodes(self) -> list[KnownNode]:
+        """All other nodes that it has a route to or has heard from, by id."""
+        nodes = []
+        for node in range(MAX_NODE_ID + 1):
+            if node == self._node_id:
+                continue
+            next_hop = self._routing.get_direction_to_node(node)
+            hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
+            heard_s = max(heard_s, self._heard_s.get(node, -math.inf))
+            if next_hop != NO_ROUTE or heard_s > -math.inf:
+                nodes.append(KnownNode(node, next_hop, hops, heard_s))
+        return nodes
+
     def _begin(self) -> None:
         self._internet.connect(self)
 
@@ -88,6 +105,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _on_heartbeat(
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
+        self._heartbeats[creator] = (min(hops + 1, NO_ROUTE), self._now_s)
         if creator != preferred_gateway:  # gateways do not answer each other
             self.send_heartbeat(creator)
 

@@ -8,6 +8,7 @@ snapshots and may be read from any thread.
 from __future__ import annotations
 
 import abc
+from typing import NamedTuple
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = 253  # reference, section 3
@@ -67,6 +68,15 @@ class IMeshDebugInfo(abc.ABC):
         """Known nodes; one that is known through two neighbours counts twice."""
 
 
+class KnownNode(NamedTuple):
+    """What a gateway knows of another node."""
+
+    node_id: int
+    next_hop: int  # the neighbour that leads to it; NO_ROUTE: there is none now
+    hops: int  # that its last heartbeat to this gateway took; NO_ROUTE: none came
+    heard_s: float  # when it was last heard, in seconds of the core's clock; -inf: never
+
+
 class IGatewayCommands(abc.ABC):
     """What the world outside may ask of a gateway (SDD 2.2.2)."""
 
@@ -78,6 +88,14 @@ class IGatewayCommands(abc.ABC):
 
         Nothing is told back about its arrival. Raises GoalRefused for what is no order.
         """
+
+    @abc.abstractmethod
+    def get_node_id(self) -> int:
+        """The gateway's own id, 0..253."""
+
+    @abc.abstractmethod
+    def get_known_nodes(self) -> list[KnownNode]:
+        """All other nodes that it has a route to or has heard from, by id."""
 
 
 class IWirelessCommunication(abc.ABC):
