@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import random
 from typing import Callable, Iterable
@@ -44,7 +45,7 @@ class Node:
         self, clock: VirtualClock, air: InProcessAir, node_id: int, start: Location
     ) -> None:
         self._clock = clock
-        self.drone = InProcessDrone(clock, start, air.flight)
+        self.drone = InProcessDrone(clock, start, functools.partial(air.flight, node_id))
         self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
         self.component: MeshnetworkComponent
         self._planned_s = math.inf

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from typing import Callable
+from typing import Callable, Iterable
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import (
@@ -44,61 +44,82 @@ class InProcessAir:
         self._jitter_s = jitter_s
         self._antennas: dict[int, InProcessAntenna] = {}
         self._cut: set[frozenset[int]] = set()
-        self._flying = 0
-        # Remembered while everybody stands still.
-        self._in_range: dict[int, dict[int, InProcessAntenna]] = {}
+        # Who hears whom among those that stand still: it changes with who comes, goes and flies,
+        # and is looked up for each packet.
+        self._links: dict[int, dict[int, InProcessAntenna]] = {}
+        self._flying: set[int] = set()
         self.delivered = 0
 
     def add(self, antenna: InProcessAntenna) -> None:
         """An antenna comes into reach of the others."""
         self._antennas[antenna.node_id] = antenna
-        self._in_range.clear()
+        self._link(antenna.node_id)
 
     def remove(self, antenna: InProcessAntenna) -> None:
         """An antenna is gone."""
+        self._unlink(antenna.node_id)
         self._antennas.pop(antenna.node_id, None)
-        self._in_range.clear()
 
-    def flight(self, started: bool) -> None:
+    def flight(self, node: int, started: bool) -> None:
         """A drone took off (True) or came to a stop."""
-        self._flying += 1 if started else -1
-        self._in_range.clear()
+        if started:
+            self._unlink(node)
+            self._flying.add(node)
+        else:
+            self._flying.discard(node)
+            self._link(node)
 
     def cut(self, one: int, other: int, off: bool = True) -> None:
         """Cut the link between two nodes, or mend it."""
-        pair = frozenset((one, other))
-        (self._cut.add if off else self._cut.discard)(pair)
-        self._in_range.clear()
+        (self._cut.add if off else self._cut.discard)(frozenset((one, other)))
+        self._unlink(one)
+        self._link(one)
 
     def in_range(self, node: int) -> dict[int, InProcessAntenna]:
         """The antennas that `node` could reach if they were on, by id. Do not change it."""
-        found = self._in_range.get(node)
-        if found is None:
-            found = {
-                other: antenna
-                for other, antenna in self._antennas.items()
-                if other != node and self._hears(node, other)
-            }
-            if not self._flying:
-                self._in_range[node] = found
-        return found
+        links = self._links.get(node)
+        if links is None:
+            return self._heard_by(node, self._antennas)
+        if self._flying:
+            return {**links, **self._heard_by(node, self._flying & self._antennas.keys())}
+        return links
 
-    def _hears(self, one: int, other: int) -> bool:
-        if self._cut and frozenset((one, other)) in self._cut:
-            return False
-        here = self._antennas[one].drone.get_location()
-        there = self._antennas[other].drone.get_location()
-        return here.distance_m(there) < self._max_distance_m
+    def _heard_by(self, node: int, others: Iterable[int]) -> dict[int, InProcessAntenna]:
+        antennas = self._antennas
+        if node not in antennas:
+            return {}
+        here = antennas[node].drone.get_location()
+        reach_m = self._max_distance_m
+        heard = {
+            other: antennas[other]
+            for other in others
+            if here.distance_m(antennas[other].drone.get_location()) < reach_m
+        }
+        heard.pop(node, None)
+        if self._cut:
+            return {n: heard[n] for n in heard if frozenset((node, n)) not in self._cut}
+        return heard
+
+    def _link(self, node: int) -> None:
+        """Find the links of a node that stands; nothing for one that flies or is not there."""
+        if node in self._antennas and node not in self._flying:
+            links = self._heard_by(node, self._links)
+            self._links[node] = links
+            for other in links:
+                self._links[other][node] = self._antennas[node]
+
+    def _unlink(self, node: int) -> None:
+        for other in self._links.pop(node, ()):
+            del self._links[other][node]
 
     def send(self, payload: bytes) -> bool:
         """Hand a packet over; True when the receiver has it, or will in a moment."""
         sender, to = payload[messages.FROM], payload[messages.TO]
-        if self._flying:
-            receiver = self._antennas.get(to)
-            if receiver is None or not self._hears(sender, to):
-                return False
+        if self._flying and (sender in self._flying or to in self._flying):
+            receiver = self._heard_by(sender, self._antennas.keys() & {to}).get(to)
         else:
-            receiver = (self._in_range.get(sender) or self.in_range(sender)).get(to)
+            links = self._links.get(sender)
+            receiver = links.get(to) if links else None
         if receiver is None or not receiver.powered:
             return False
         if self.loss and self._rng.random() < self.loss:
@@ -107,7 +128,7 @@ class InProcessAir:
         at_s = self._clock.now_s + self._delay_s
         if self._jitter_s:
             at_s += self._rng.random() * self._jitter_s
-        self._clock.call_at(at_s, receiver.receive, payload)
+        self._clock.call_in_line(at_s, receiver.receive, payload)
         return True
 
 
