@@ -1,0 +1,152 @@
+// Puts the page together: one mesh, one connection, and the views of it.
+
+import { Charts } from "./charts.js";
+import { Connection } from "./connection.js";
+import { EventLog } from "./log.js";
+import { MapView } from "./map.js";
+import { Mesh } from "./mesh.js";
+import { NodePanel } from "./panel.js";
+import { NodeTable } from "./table.js";
+
+const TOAST_MS = 5000;
+const FAILURE_MS = 9000;
+const THEME_KEY = "drone-mesh-theme";
+
+const byId = (id) => document.getElementById(id);
+const mesh = new Mesh();
+const connection = new Connection(mesh);
+
+function toast(text, bad) {
+  const box = document.createElement("div");
+  box.className = bad ? "toast bad" : "toast";
+  box.textContent = text;
+  byId("toasts").append(box);
+  setTimeout(() => box.remove(), bad ? FAILURE_MS : TOAST_MS);
+}
+
+/** Sends an order and tells how it went. `button` rests meanwhile. */
+async function order(request, button) {
+  if (button) button.disabled = true;
+  try {
+    toast(await connection.order(request), false);
+  } catch (error) {
+    toast(error.message, true);
+  } finally {
+    if (button) button.disabled = false;
+  }
+}
+
+function fly(id, x, y, z) {
+  const node = mesh.nodes.get(id);
+  const height = z ?? Math.round(node?.path.length ? node.path[node.path.length - 1] : (node?.at?.[2] ?? 0));
+  order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: Math.max(0, height) });
+}
+
+const map = new MapView(mesh, byId("map"), byId("map-note"), (id, x, y) => fly(id, x, y));
+new NodeTable(mesh, byId("nodes"));
+const panel = new NodePanel(mesh, (id, on) => order({ do: "power", node: id, on }, byId("power")), fly);
+new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
+const charts = new Charts(mesh);
+
+// The line at the top
+
+function showHead() {
+  const { t, achieved, factor, paused, summary, severity } = mesh.clock;
+  if (t === undefined) return;
+  byId("clock").textContent = paused ? `${t.toFixed(1)} s, paused` : `${t.toFixed(1)} s, ${achieved.toFixed(1)}×`;
+  byId("summary").textContent = summary;
+  byId("summary").dataset.severity = severity;
+  byId("pause").textContent = paused ? "Go on" : "Pause";
+  byId("pause").setAttribute("aria-pressed", paused);
+  const speed = byId("speed");
+  if (document.activeElement !== speed) {
+    if (![...speed.options].some((option) => Number(option.value) === factor)) speed.add(new Option(`${factor}×`, factor));
+    speed.value = String(factor);
+  }
+}
+
+function showLink() {
+  const text = connection.open ? mesh.link : "no connection to the console, trying again";
+  byId("link").textContent = text;
+  byId("link").dataset.severity = 2;
+  byId("link").hidden = !text;
+}
+
+mesh.addEventListener("frame", () => {
+  showHead();
+  showLink();
+});
+connection.addEventListener("change", showLink);
+mesh.addEventListener("layouts", () => {
+  byId("layout").replaceChildren(...mesh.layouts.map(([number, name]) => new Option(name, number)));
+  byId("layout-form").hidden = !mesh.layouts.length;
+});
+
+// Orders to the world
+
+function setSpeed(paused, factor) {
+  order({ do: "speed", paused, factor });
+}
+byId("pause").addEventListener("click", () => setSpeed(!mesh.clock.paused, 0));
+byId("speed").addEventListener("change", (event) => {
+  setSpeed(Boolean(mesh.clock.paused), Number(event.target.value));
+  event.target.blur();
+});
+byId("layout-form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  order({ do: "layout", case: Number(byId("layout").value) }, event.submitter);
+});
+
+// The view
+
+byId("zoom-in").addEventListener("click", () => map.zoom(1.3));
+byId("zoom-out").addEventListener("click", () => map.zoom(1 / 1.3));
+byId("fit").addEventListener("click", () => map.fit());
+byId("show-known").addEventListener("change", (event) => map.setOption("known", event.target.checked));
+byId("show-ranges").addEventListener("change", (event) => map.setOption("ranges", event.target.checked));
+byId("help-button").addEventListener("click", () => byId("help").showModal());
+
+for (const tab of document.querySelectorAll("nav button")) {
+  tab.addEventListener("click", () => {
+    document.body.dataset.tab = tab.dataset.tab;
+    for (const other of document.querySelectorAll("nav button")) other.removeAttribute("aria-current");
+    tab.setAttribute("aria-current", "page");
+  });
+}
+
+const dark = matchMedia("(prefers-color-scheme: dark)");
+function showTheme() {
+  document.documentElement.dataset.theme = localStorage.getItem(THEME_KEY) ?? (dark.matches ? "dark" : "light");
+  map.themeChanged();
+  charts.themeChanged();
+}
+dark.addEventListener("change", showTheme);
+byId("theme").addEventListener("click", () => {
+  localStorage.setItem(THEME_KEY, document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+  showTheme();
+});
+showTheme();
+
+// Keys
+
+const KEYS = {
+  " ": () => byId("pause").click(),
+  n: () => mesh.selectNext(1),
+  b: () => mesh.selectNext(-1),
+  p: () => panel.switchPower(),
+  g: () => panel.focusPlace(),
+  f: () => map.fit(),
+  "?": () => byId("help").showModal(),
+  Escape: () => map.cancelDrag() || mesh.select(null),
+};
+
+document.addEventListener("keydown", (event) => {
+  const typing = event.target.closest("input, select, dialog");
+  const pressing = event.key === " " && event.target.closest("button");
+  if (typing && event.key === "Escape") event.target.blur();
+  if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey) return;
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  if (!(key in KEYS)) return;
+  event.preventDefault();
+  KEYS[key]();
+});

@@ -1,0 +1,136 @@
+// Three small charts over simulated time. Hovering shows the values at one moment.
+
+import { niceStep, readColours } from "./draw.js";
+
+const LEFT_PX = 34;
+const BOTTOM_PX = 17;
+const TOP_PX = 8;
+const RIGHT_PX = 8;
+const RATE_OVER = 10; // samples; one check period of the mesh at normal speed
+
+export class Charts {
+  constructor(mesh) {
+    this.mesh = mesh;
+    this.colours = readColours();
+    this.hover = null; // 0..1 across every chart
+    this.charts = [
+      { id: "share", top: () => 100, lines: [{ colour: "connected", fill: true, value: (s) => 100 * share(s) }], text: (v) => `${v[0].toFixed(0)} %` },
+      { id: "rate", lines: [{ colour: "accent", fill: true, value: (s) => s.rate }], text: (v) => v[0].toFixed(0) },
+      { id: "hops", lines: [{ colour: "flight", value: (s) => s.most_hops }, { colour: "gateway", value: (s) => s.mean_hops }], text: (v) => `${v[1].toFixed(1)} / ${v[0]}` },
+    ];
+    for (const chart of this.charts) {
+      chart.canvas = document.getElementById(`chart-${chart.id}`);
+      chart.now = document.getElementById(`${chart.id}-now`);
+      new ResizeObserver(() => this.#draw(chart)).observe(chart.canvas);
+      chart.canvas.addEventListener("pointermove", (event) => this.#point(event.offsetX / chart.canvas.clientWidth));
+      chart.canvas.addEventListener("pointerleave", () => this.#point(null));
+    }
+    mesh.addEventListener("frame", (event) => (event.detail.samples.length || event.detail.full) && this.redraw());
+  }
+
+  redraw() {
+    this.samples = withRates(this.mesh.samples);
+    for (const chart of this.charts) this.#draw(chart);
+  }
+
+  themeChanged() {
+    this.colours = readColours();
+    this.redraw();
+  }
+
+  #point(at) {
+    this.hover = at;
+    this.redraw();
+  }
+
+  #draw(chart) {
+    const samples = this.samples ?? [];
+    const { clientWidth: width, clientHeight: height } = chart.canvas;
+    if (!width || !height) return;
+    const ratio = window.devicePixelRatio;
+    chart.canvas.width = width * ratio;
+    chart.canvas.height = height * ratio;
+    const context = chart.canvas.getContext("2d");
+    context.scale(ratio, ratio);
+    context.font = "11px system-ui, sans-serif";
+    if (samples.length < 2) {
+      context.fillStyle = this.colours.muted;
+      context.fillText("a few seconds of data are needed", LEFT_PX, height / 2);
+      chart.now.textContent = "–";
+      return;
+    }
+    const [start, end] = [samples[0].stamp_s, samples[samples.length - 1].stamp_s];
+    const values = chart.lines.map((line) => samples.map(line.value));
+    const step = niceStep(Math.max(...values.flat(), 1) / 3);
+    const top = chart.top?.() ?? Math.max(step, Math.ceil(Math.max(...values.flat()) / step) * step);
+    const x = (t) => LEFT_PX + ((t - start) / (end - start || 1)) * (width - LEFT_PX - RIGHT_PX);
+    const y = (value) => height - BOTTOM_PX - (value / top) * (height - BOTTOM_PX - TOP_PX);
+    this.#axes(context, x, y, width, height, start, end, top, chart.top ? 50 : step);
+    chart.lines.forEach((line, index) => this.#line(context, samples.map((s) => x(s.stamp_s)), values[index].map(y), line, y(0)));
+    chart.now.textContent = this.#reading(context, chart, samples, values, x, y, start, end, height);
+  }
+
+  #axes(context, x, y, width, height, start, end, top, step) {
+    context.strokeStyle = this.colours.grid;
+    context.fillStyle = this.colours.muted;
+    context.lineWidth = 1;
+    context.textAlign = "right";
+    context.beginPath();
+    for (let value = 0; value <= top * 1.001; value += step) {
+      context.moveTo(LEFT_PX, Math.round(y(value)) + 0.5);
+      context.lineTo(width - RIGHT_PX, Math.round(y(value)) + 0.5);
+      context.fillText(Number(value.toPrecision(3)), LEFT_PX - 5, y(value) + 4);
+    }
+    context.stroke();
+    context.textAlign = "center";
+    const spacing = niceStep(((end - start) * 80) / Math.max(width - LEFT_PX, 1) || 1);
+    for (let t = Math.ceil(start / spacing) * spacing; t <= end; t += spacing) {
+      if (x(t) < width - 26) context.fillText(`${Number(t.toPrecision(6))} s`, x(t), height - 4);
+    }
+  }
+
+  #line(context, xs, ys, line, base) {
+    context.strokeStyle = this.colours[line.colour];
+    context.lineWidth = 1.75;
+    context.lineJoin = "round";
+    context.beginPath();
+    xs.forEach((px, i) => (i ? context.lineTo(px, ys[i]) : context.moveTo(px, ys[i])));
+    context.stroke();
+    if (!line.fill) return;
+    context.lineTo(xs[xs.length - 1], base);
+    context.lineTo(xs[0], base);
+    context.globalAlpha = 0.12;
+    context.fillStyle = this.colours[line.colour];
+    context.fill();
+    context.globalAlpha = 1;
+  }
+
+  /** The words above a chart: the newest values, or those under the pointer. */
+  #reading(context, chart, samples, values, x, y, start, end, height) {
+    let index = samples.length - 1;
+    if (this.hover !== null) {
+      const px = this.hover * chart.canvas.clientWidth;
+      index = samples.reduce((best, s, i) => (Math.abs(x(s.stamp_s) - px) < Math.abs(x(samples[best].stamp_s) - px) ? i : best), 0);
+      context.strokeStyle = this.colours.muted;
+      context.beginPath();
+      context.moveTo(x(samples[index].stamp_s), TOP_PX);
+      context.lineTo(x(samples[index].stamp_s), height - BOTTOM_PX);
+      context.stroke();
+    }
+    const reading = chart.text(values.map((list) => list[index]));
+    return this.hover === null ? reading : `${reading} at ${samples[index].stamp_s.toFixed(0)} s`;
+  }
+}
+
+function share(sample) {
+  return sample.routers_on ? sample.routers_connected / sample.routers_on : 1;
+}
+
+/** Messages per simulated second, over a few samples: nodes speak in bursts. */
+function withRates(samples) {
+  return samples.map((sample, i) => {
+    const before = samples[Math.max(0, i - RATE_OVER)];
+    const seconds = sample.stamp_s - before.stamp_s;
+    return { ...sample, rate: seconds > 0 ? Math.max(0, sample.messages - before.messages) / seconds : 0 };
+  });
+}

@@ -1,0 +1,192 @@
+// The map: pan, zoom, choose, drag. Drawing itself is in draw.js.
+
+import { Camera } from "./camera.js";
+import { drawMesh, droneRadius, readColours } from "./draw.js";
+
+const DRAG_AFTER_PX = 6;
+const NEAR_PX = 8; // how far beside a drone a click still means it
+const KEY_STEP_PX = 60;
+const ZOOM_STEP = 1.3;
+
+export class MapView {
+  /** `fly(id, x, y)` is called when a drone was dragged to a place. */
+  constructor(mesh, canvas, note, fly) {
+    this.mesh = mesh;
+    this.canvas = canvas;
+    this.note = note;
+    this.fly = fly;
+    this.camera = new Camera();
+    this.options = { known: true, ranges: false };
+    this.colours = readColours();
+    this.drag = null;
+    this.fitted = false; // to the first mesh that was seen
+    this.pointers = new Map();
+    this.pending = false;
+    new ResizeObserver(() => this.#resize()).observe(canvas);
+    for (const what of ["frame", "select"]) mesh.addEventListener(what, () => this.redraw());
+    canvas.addEventListener("pointerdown", (event) => this.#down(event));
+    canvas.addEventListener("pointermove", (event) => this.#move(event));
+    canvas.addEventListener("pointerup", (event) => this.#up(event));
+    canvas.addEventListener("pointercancel", (event) => this.#cancel(event));
+    canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
+    canvas.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  redraw() {
+    if (this.pending) return;
+    this.pending = true;
+    requestAnimationFrame(() => this.#draw());
+  }
+
+  setOption(name, value) {
+    this.options[name] = value;
+    this.redraw();
+  }
+
+  themeChanged() {
+    this.colours = readColours();
+    this.redraw();
+  }
+
+  zoom(factor) {
+    this.camera.zoom(factor);
+    this.redraw();
+  }
+
+  fit() {
+    const points = [];
+    for (const node of this.mesh.nodes.values()) {
+      if (node.at) points.push(node.at);
+      if (node.path.length) points.push(node.path.slice(-3));
+    }
+    this.camera.fit(points);
+    this.redraw();
+  }
+
+  /** Lets go of a drone that is being dragged. True if there was one. */
+  cancelDrag() {
+    const dragged = this.drag !== null;
+    this.drag = null;
+    this.pointers.clear();
+    this.redraw();
+    return dragged;
+  }
+
+  #draw() {
+    this.pending = false;
+    if (!this.fitted && this.mesh.nodes.size && this.camera.width > 1) {
+      this.fitted = true;
+      this.fit();
+    }
+    const context = this.canvas.getContext("2d");
+    const ratio = window.devicePixelRatio;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const drawn = drawMesh(context, this.camera, this.mesh, this.colours, this.options, this.drag);
+    this.#describe(drawn);
+    if (drawn.lost) setTimeout(() => this.redraw(), 1000);
+  }
+
+  #describe(drawn) {
+    const left = this.options.known && drawn.linksDrawn < drawn.links ? " (those of the selected node are shown)" : "";
+    const text = `${drawn.drones} drones, ${drawn.links} links${left}, ${drawn.ways} on the way to a gateway`;
+    if (this.note.textContent !== text) this.note.textContent = text;
+    Object.assign(this.note.dataset, drawn);
+  }
+
+  #resize() {
+    const ratio = window.devicePixelRatio;
+    const { clientWidth, clientHeight } = this.canvas;
+    if (!clientWidth) return;
+    this.canvas.width = Math.round(clientWidth * ratio);
+    this.canvas.height = Math.round(clientHeight * ratio);
+    this.camera.width = clientWidth;
+    this.camera.height = clientHeight;
+    this.#draw();
+  }
+
+  #nodeAt(px, py) {
+    let nearest = null;
+    let best = droneRadius(this.camera, this.mesh) + NEAR_PX;
+    for (const node of this.mesh.nodes.values()) {
+      if (!node.at) continue;
+      const [x, y] = this.camera.toScreen(node.at[0], node.at[1]);
+      const distance = Math.hypot(x - px, y - py);
+      if (distance < best) [nearest, best] = [node, distance];
+    }
+    return nearest;
+  }
+
+  #down(event) {
+    if (event.button !== 0) return;
+    this.canvas.focus({ preventScroll: true });
+    this.canvas.setPointerCapture(event.pointerId);
+    const node = this.#nodeAt(event.offsetX, event.offsetY);
+    // A finger that moves the map must not send away a drone that happens to be under it.
+    const mayDrag = node && (event.pointerType === "mouse" || node.id === this.mesh.selected);
+    this.pointers.set(event.pointerId, {
+      x: event.offsetX, y: event.offsetY, startX: event.offsetX, startY: event.offsetY,
+      node: node?.id ?? null, mayDrag, moved: false,
+    });
+    if (this.pointers.size > 1) this.drag = null;
+  }
+
+  #move(event) {
+    const pointer = this.pointers.get(event.pointerId);
+    if (!pointer) {
+      this.canvas.style.cursor = this.#nodeAt(event.offsetX, event.offsetY) ? "pointer" : "grab";
+      return;
+    }
+    const [dx, dy] = [event.offsetX - pointer.x, event.offsetY - pointer.y];
+    if (Math.hypot(event.offsetX - pointer.startX, event.offsetY - pointer.startY) > DRAG_AFTER_PX) pointer.moved = true;
+    if (this.pointers.size > 1) this.#pinch(pointer, event);
+    else if (pointer.moved && pointer.mayDrag) {
+      const [x, y] = this.camera.toWorld(event.offsetX, event.offsetY);
+      this.drag = { id: pointer.node, x, y };
+      this.mesh.select(pointer.node);
+    } else if (pointer.moved) this.camera.pan(dx, dy);
+    pointer.x = event.offsetX;
+    pointer.y = event.offsetY;
+    this.redraw();
+  }
+
+  #pinch(pointer, event) {
+    const other = [...this.pointers.values()].find((one) => one !== pointer);
+    const before = Math.hypot(pointer.x - other.x, pointer.y - other.y);
+    const after = Math.hypot(event.offsetX - other.x, event.offsetY - other.y);
+    if (before > 0 && after > 0) this.camera.zoom(after / before, other.x, other.y);
+  }
+
+  #up(event) {
+    const pointer = this.pointers.get(event.pointerId);
+    this.pointers.delete(event.pointerId);
+    if (!pointer) return;
+    if (this.drag) {
+      const { id, x, y } = this.drag;
+      this.drag = null;
+      this.fly(id, x, y);
+    } else if (!pointer.moved) this.mesh.select(pointer.node);
+    this.redraw();
+  }
+
+  #cancel(event) {
+    this.pointers.delete(event.pointerId);
+    this.drag = null;
+    this.redraw();
+  }
+
+  #wheel(event) {
+    event.preventDefault();
+    this.camera.zoom(Math.exp(-event.deltaY * 0.0015), event.offsetX, event.offsetY);
+    this.redraw();
+  }
+
+  #key(event) {
+    const step = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (step) this.camera.pan(step[0] * KEY_STEP_PX, step[1] * KEY_STEP_PX);
+    else if (event.key === "+" || event.key === "=") this.camera.zoom(ZOOM_STEP);
+    else if (event.key === "-") this.camera.zoom(1 / ZOOM_STEP);
+    else return;
+    event.preventDefault();
+    this.redraw();
+  }
+}

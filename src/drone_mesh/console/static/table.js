@@ -1,0 +1,145 @@
+// The table of nodes: one row per node, sorted by the column that was clicked.
+
+import { Mesh, orDash } from "./mesh.js";
+
+const COLUMNS = [
+  { name: "Node", title: "Id", sort: (n) => n.id, text: (n) => String(n.id) },
+  { name: "State", title: "", sort: (n) => Mesh.stateOf(n), text: (n) => words(n), state: true },
+  { name: "GW", title: "The gateway that it uses", sort: (n) => n.gateway, text: (n) => orDash(n.gateway) },
+  { name: "Hops", title: "Hops to that gateway", sort: (n) => n.hops, text: (n) => orDash(n.hops) },
+  { name: "Next", title: "The neighbour that leads there", sort: (n) => n.next, text: (n) => orDash(n.next) },
+  { name: "Nb", title: "Neighbours", sort: (n) => n.ids.length, text: (n) => String(n.ids.length) },
+  { name: "Known", title: "Known nodes; one known through two neighbours counts twice", sort: (n) => n.known, text: (n) => String(n.known) },
+  { name: "Sent", title: "Messages sent successfully", sort: (n) => n.sent, text: (n) => String(n.sent) },
+  { name: "Place", title: "The node whose place it would fly to", sort: (n) => n.place, text: (n) => orDash(n.place) },
+  { name: "x", title: "m", sort: (n) => n.at?.[0] ?? 0, text: (n) => metres(n, 0) },
+  { name: "y", title: "m", sort: (n) => n.at?.[1] ?? 0, text: (n) => metres(n, 1) },
+  { name: "z", title: "m", sort: (n) => n.at?.[2] ?? 0, text: (n) => metres(n, 2) },
+];
+
+export function words(node) {
+  return {
+    gateway: "gateway", connected: "connected", lost: "not connected", flying: "flying", off: "off", stale: "silent",
+  }[Mesh.stateOf(node)];
+}
+
+function metres(node, axis) {
+  return node.at ? node.at[axis].toFixed(1) : "–";
+}
+
+export class NodeTable {
+  constructor(mesh, table) {
+    this.mesh = mesh;
+    this.body = table.tBodies[0];
+    this.head = table.tHead.rows[0];
+    this.rows = new Map();
+    this.sortBy = 0;
+    this.ascending = true;
+    this.#makeHead();
+    mesh.addEventListener("frame", (event) => this.#update(event.detail));
+    mesh.addEventListener("select", () => this.#mark(true));
+    this.body.addEventListener("click", (event) => this.#choose(event));
+    this.body.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  #makeHead() {
+    COLUMNS.forEach((column, index) => {
+      const th = document.createElement("th");
+      th.scope = "col";
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = column.name;
+      button.title = column.title;
+      button.addEventListener("click", () => {
+        this.ascending = this.sortBy === index ? !this.ascending : true;
+        this.sortBy = index;
+        this.#sort();
+      });
+      th.append(button);
+      this.head.append(th);
+    });
+    this.#showSort();
+  }
+
+  #showSort() {
+    [...this.head.cells].forEach((th, index) => {
+      if (index === this.sortBy) th.setAttribute("aria-sort", this.ascending ? "ascending" : "descending");
+      else th.removeAttribute("aria-sort");
+    });
+  }
+
+  #update({ changed, full, gone }) {
+    for (const id of full ? [...this.rows.keys()] : gone) {
+      if (full && this.mesh.nodes.has(id)) continue;
+      this.rows.get(id)?.remove();
+      this.rows.delete(id);
+    }
+    for (const id of changed) this.#fill(this.mesh.nodes.get(id));
+    this.#sort();
+    this.#mark(false);
+  }
+
+  #fill(node) {
+    let row = this.rows.get(node.id);
+    if (!row) {
+      row = document.createElement("tr");
+      row.dataset.id = node.id;
+      row.tabIndex = -1;
+      for (const column of COLUMNS) {
+        const cell = row.insertCell();
+        if (column.state) cell.append(Object.assign(document.createElement("span"), { className: "state" }));
+      }
+      this.rows.set(node.id, row);
+    }
+    row.dataset.state = Mesh.stateOf(node);
+    COLUMNS.forEach((column, index) => {
+      const cell = column.state ? row.cells[index].firstChild : row.cells[index];
+      const text = column.text(node);
+      if (cell.textContent !== text) cell.textContent = text;
+    });
+  }
+
+  #sort() {
+    const key = COLUMNS[this.sortBy].sort;
+    const sign = this.ascending ? 1 : -1;
+    const nodes = [...this.mesh.nodes.values()].sort((a, b) => {
+      const [x, y] = [key(a), key(b)];
+      return sign * (x < y ? -1 : x > y ? 1 : 0) || a.id - b.id;
+    });
+    let at = this.body.firstElementChild;
+    for (const node of nodes) {
+      const row = this.rows.get(node.id);
+      if (row === at) at = at.nextElementSibling;
+      else this.body.insertBefore(row, at);
+    }
+    this.#showSort();
+  }
+
+  #mark(scroll) {
+    for (const [id, row] of this.rows) {
+      const selected = id === this.mesh.selected;
+      if (row.hasAttribute("aria-selected") === selected) continue;
+      if (selected) row.setAttribute("aria-selected", "true");
+      else row.removeAttribute("aria-selected");
+      if (selected && scroll) row.scrollIntoView({ block: "nearest" });
+    }
+    const focusable = this.rows.get(this.mesh.selected) ?? this.body.firstElementChild;
+    for (const row of this.body.rows) row.tabIndex = row === focusable ? 0 : -1;
+  }
+
+  #choose(event) {
+    const row = event.target.closest("tr");
+    if (row) this.mesh.select(Number(row.dataset.id));
+  }
+
+  #key(event) {
+    const row = event.target.closest("tr");
+    const to = { ArrowDown: row.nextElementSibling, ArrowUp: row.previousElementSibling }[event.key];
+    if (event.key === "Enter") this.#choose(event);
+    else if (to) {
+      event.preventDefault();
+      this.mesh.select(Number(to.dataset.id));
+      to.focus();
+    }
+  }
+}

@@ -1,0 +1,53 @@
+"""Looks at a node and at a drone, and writes down what is there."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.state.model import NodeStatus, Role
+from drone_mesh.state.register import DroneView
+from drone_mesh.world.drones import DroneRole, VirtualDrone
+from drone_mesh.world.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
+
+OLDEST_AGE_S = 255  # what one byte holds
+
+
+def describe_component(
+    status: NodeStatus, component: MeshnetworkComponent, on: bool, now_s: float
+) -> None:
+    """Fill in what the mesh software knows of itself. May be called in any thread.
+
+    `on` is whether its antenna has power; place, flight, route and report_age stay untouched.
+    """
+    status.on = on
+    status.connected = component.get_connected_to_gateway()
+    status.gateway = component.get_preferred_gateway()
+    status.hops = component.get_hops_from_gateway_away()
+    status.next_hop = component.get_route_to_gateway()
+    status.pref_loc = component.get_last_good_known_location_id()
+    status.known_nodes = component.get_router_tech_table_size()
+    status.total_messages = component.get_total_message_sent()
+    heard_s = component.get_neighbours()
+    ids = sorted(heard_s)
+    status.neighbours = bytes(ids)
+    status.neighbour_ages = bytes(
+        [max(0, min(OLDEST_AGE_S, int(now_s - heard_s[node]))) for node in ids]
+    )
+
+
+def view_drone(drone: VirtualDrone, now_s: float) -> DroneView:
+    """Where a drone of the world is and where it goes. May be called in any thread."""
+    x, y, z = drone.engine.state.position
+    path = drone.engine.state.path
+    half_height_m = drone.SIZE_M[2] / 2
+    role = Role.GATEWAY if drone.ROLE is DroneRole.GATEWAY else Role.ROUTER
+    ahead = way_ahead(path, now_s, half_height_m) if path else ()
+    return DroneView(drone.node_id, role, (x, y, z - half_height_m), ahead)
+
+
+def way_ahead(path: FlightPath, now_s: float, lower_by_m: float = 0.0) -> tuple[float, ...]:
+    """x y z of each corner of a flight that is still to come, the goal last, in metres."""
+    share = path.share_flown(now_s)
+    _start, above_start, above_goal, goal = path.waypoints
+    corners = [(CLIMB_ENDS_AT, above_start), (DESCENT_STARTS_AT, above_goal), (1.0, goal)]
+    ahead = [corner for reached_at, corner in corners if share < reached_at] or [goal]
+    return tuple(value for x, y, z in ahead for value in (x, y, z - lower_by_m))

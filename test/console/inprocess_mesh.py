@@ -1,0 +1,110 @@
+"""A real mesh under a virtual clock behind the console: everything but ROS is the real thing."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from drone_mesh.console.orders import OrderRefused
+from drone_mesh.inprocess.network import Network, Node
+from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.state.events import EventBatcher
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.state.observation import describe_component, way_ahead
+from drone_mesh.state.register import DroneView, MeshRegister
+
+STEP_S = 0.05  # wall time between two steps of the clock
+
+
+class InProcessMesh:
+    """Owns the network; a lock is held for each step, order and look, none of which waits."""
+
+    def __init__(self, routers: int, gridsize: int, spacing: float, max_distance: float = 9.0):
+        self._lock = threading.Lock()
+        self._network = Network(seed=1, max_distance_m=max_distance)
+        self._network.add_fleet(1, routers, gridsize, spacing)
+        self._register = MeshRegister()
+        self._max_distance = max_distance
+        self._layouts = Layouts({})
+        self._batcher = EventBatcher()
+        self._told = 0
+        self.factor, self.paused = 1.0, False
+
+    def run(self, stop: threading.Event) -> None:
+        """Let time pass until told to stop."""
+        before = time.monotonic()
+        while not stop.wait(STEP_S):
+            now = time.monotonic()
+            with self._lock:
+                if not self.paused:
+                    self._network.run_for((now - before) * self.factor)
+            before = now
+
+    def skip(self, seconds: float) -> None:
+        """Let simulated time pass at once."""
+        with self._lock:
+            self._network.run_for(seconds)
+
+    def look(self) -> tuple[MeshStatus, list[EventRecord]]:
+        """The mesh now, and what happened since the last look."""
+        with self._lock:
+            now_s = self._network.clock.now_s
+            statuses = [self._describe(n, node) for n, node in self._network.nodes.items()]
+            views = [self._view(n, node) for n, node in self._network.nodes.items()]
+            self._register.merge_report("in process", statuses, now_s)
+            nodes = self._register.snapshot(views, now_s)
+            for event in self._network.events[self._told :]:
+                self._batcher.observe(event)
+            self._told = len(self._network.events)
+            achieved = 0.0 if self.paused else self.factor
+            mesh = MeshStatus(
+                now_s, nodes, self._max_distance, self.factor, achieved, self.paused
+            )
+            return mesh, self._batcher.take()
+
+    def place_of(self, node: int) -> tuple[float, float]:
+        """x, y in metres."""
+        with self._lock:
+            place = self._network.location(node)
+        return place.longitude, place.latitude
+
+    def power(self, node: int, on: bool) -> str:
+        with self._lock:
+            self._network.power(node, on)
+        return f"node {node} is {'on' if on else 'off'}"
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:
+        with self._lock:
+            taken = self._network.order(node, x, y, round(z))
+        if not taken:
+            raise OrderRefused(f"the gateway has no route to drone {node}")
+        return f"drone {node} is sent to ({x:g}, {y:g}, {z:g})"
+
+    def layout(self, case: int) -> str:
+        try:
+            orders = self._layouts.orders(case)
+        except UnknownCase as error:
+            raise OrderRefused(str(error)) from error
+        with self._lock:
+            for node, goal in orders:
+                if node in self._network.nodes:
+                    self._network.order(node, goal.longitude, goal.latitude, int(goal.height))
+        return f"layout {case} is ordered"
+
+    def speed(self, paused: bool, factor: float) -> str:
+        self.paused, self.factor = paused, factor or self.factor
+        return "paused" if paused else f"speed {self.factor:g}"
+
+    def _describe(self, node_id: int, node: Node) -> NodeStatus:
+        status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
+        describe_component(
+            status, node.component, node.antenna.powered, self._network.clock.now_s
+        )
+        return status
+
+    def _view(self, node_id: int, node: Node) -> DroneView:
+        place = node.drone.get_location()
+        flight = node.drone._path  # noqa: SLF001
+        ahead = way_ahead(flight, self._network.clock.now_s) if flight else ()
+        role = Role.GATEWAY if node.is_gateway else Role.ROUTER
+        return DroneView(node_id, role, (place.longitude, place.latitude, place.height), ahead)
