@@ -1,0 +1,56 @@
+"""Names of the ROS graph: the wire contract (reference, section 4), and what we added to it."""
+
+from __future__ import annotations
+
+SIGNAL_TOPIC = "/WirelessSignalSimulator"  # DroneInfo: every engine and antenna -> simulator
+SIGNAL_QUEUE = 4096  # DroneInfo that may wait for a simulator that is slow; the oldest is dropped
+MESSAGE_SERVICE = "/SignalSimulator/message"
+OTHERS_IN_RANGE_SERVICE = "/SignalSimulator/othersinRange"
+BROADCAST_SERVICE = "/SignalSimulator/broadcast"  # ours: one call instead of one per neighbour
+
+GATEWAY_TOPIC = "/gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
+REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"
+SET_TO_CASUS_SERVICE = "/DroneManager/SetToCasus"
+
+CLOCK_TOPIC = "/clock"
+FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the factor reached, once a second
+SPEED_SERVICE = "/DroneFactory/setSpeed"  # SetSpeed
+PROGRESS_TOPIC = "/mesh/progress"  # Header: how far a host in another process has worked
+FLEET_PARAM = "/drone_mesh/fleet"  # what hosts in other processes need to know; set by the factory
+
+REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
+STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> people
+EVENTS_TOPIC = "/mesh/events"  # MeshEvent: DroneFactory -> people
+DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory -> people
+MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz
+MAP_FRAME = "map"
+
+
+def drone_frame(node_id: int) -> str:
+    """tf frame of a drone, at its underside."""
+    return f"drone_{node_id}"
+
+
+def node_topic(node_id: int) -> str:
+    """NRF24: simulator -> antenna."""
+    return f"/Node/{node_id}"
+
+
+def debug_topic(node_id: int) -> str:
+    """NodeDebugInfo: antenna -> people."""
+    return f"/Nodes/{node_id}/debug"
+
+
+def power_switch(node_id: int) -> str:
+    """PowerSwitch, offered by the antenna."""
+    return f"/Nodes/{node_id}/powerSwitch"
+
+
+def goal_topic(node_id: int) -> str:
+    """Location: connector -> engine."""
+    return f"/Drones/{node_id}/goal"
+
+
+def gps_service(node_id: int) -> str:
+    """RequestGPS, offered by the engine."""
+    return f"/Drones/{node_id}/gps"

@@ -1,0 +1,47 @@
+"""The private parameters of our nodes: the launch arguments, over the file that ~config names."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Callable, TypeVar
+
+import rospkg
+import rospy
+
+from drone_mesh.configuration import FactoryConfiguration, load_configuration
+from drone_mesh.errors import ConfigurationError
+
+PACKAGE = "drone_mesh"
+
+Result = TypeVar("Result")
+
+
+def or_stop(read: Callable[[], Result]) -> Result:
+    """What `read` returns; a ConfigurationError ends the program with the one line it says."""
+    try:
+        return read()
+    except ConfigurationError as error:
+        sys.exit(f"{rospy.get_name()}: {error}")
+
+
+def factory_configuration(*keys: str) -> FactoryConfiguration:
+    """The configuration file, overruled by those of the private parameters `keys` that are set.
+
+    Raises ConfigurationError.
+    """
+    given = {key: rospy.get_param(f"~{key}", "") for key in keys}
+    return load_configuration(file_parameter("config", "factory.yaml"), given)
+
+
+def file_parameter(name: str, default: str) -> Path:
+    """The file that parameter `name` tells; by default `default` in the package's config folder."""
+    given = str(rospy.get_param(f"~{name}", ""))
+    if given:
+        return Path(given).expanduser()
+    try:
+        return Path(rospkg.RosPack().get_path(PACKAGE)) / "config" / default
+    except rospkg.ResourceNotFound:
+        raise ConfigurationError(
+            f"package {PACKAGE} is not on ROS_PACKAGE_PATH; source its setup.bash, or set ~{name}"
+        ) from None

@@ -1,0 +1,187 @@
+"""WirelessSignalSimulator: the simulated air as a ROS node (reference, sections 6 and 14.1)."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import struct
+import threading
+import warnings
+
+import rospy
+from rospy.impl.transport import Transport
+
+from drone_mesh.msg import NRF24, DroneInfo
+from drone_mesh.ros import names
+from drone_mesh.ros.logs import ThrottledLog, show_library_logs_on_rosout
+from drone_mesh.ros.parameters import factory_configuration, or_stop
+from drone_mesh.signal import SignalError, SignalRegister
+from drone_mesh.srv import (
+    AreaScan,
+    AreaScanResponse,
+    Broadcast,
+    BroadcastResponse,
+    WirelessMessage,
+    WirelessMessageResponse,
+)
+
+STUCK_RECEIVER_S = 0.2  # our choice: who does not empty its socket for so long is cut off
+_TO = 3  # byte of the packet that names the receiver of this hop, reference, section 5
+
+_log = logging.getLogger(__name__)
+
+
+class _Listener(rospy.SubscribeListener):
+    """The topic of one antenna. `deliver` tells the truth about whether somebody is there."""
+
+    def __init__(self, topic: str) -> None:
+        with warnings.catch_warnings():
+            # Synchronous on purpose: a queue costs a thread and two switches per packet, and hides
+            # that the receiver is gone. What it protects from is seen to in peer_subscribe.
+            warnings.simplefilter("ignore", SyntaxWarning)
+            self._publisher = rospy.Publisher(
+                topic, NRF24, subscriber_listener=self, tcp_nodelay=True, queue_size=None
+            )
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """A receiver that is stuck may hold up a sender for a moment only, then it is cut off."""
+        timeval = struct.pack("@ll", 0, int(STUCK_RECEIVER_S * 1e6))
+        for connection in self._connections():
+            if connection.socket is not None:
+                connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
+
+    def deliver(self, message: NRF24) -> bool:
+        """Publish; False if nobody is there to take it."""
+        if not self.has_receiver():
+            return False
+        self._publisher.publish(message)
+        return self._has_connections()
+
+    def has_receiver(self) -> bool:
+        """Whether somebody subscribes to the topic, and is still there."""
+        if not self._has_connections():
+            return False
+        # A killed process leaves its connection behind; rospy notices at the second write only.
+        self._publisher.impl.check()
+        return self._has_connections()
+
+    def close(self) -> None:
+        self._publisher.unregister()
+
+    def _connections(self) -> list[Transport]:
+        implementation = self._publisher.impl  # None once it is closed
+        return [] if implementation is None else implementation.connections
+
+    def _has_connections(self) -> bool:
+        return bool(self._connections())
+
+
+class WirelessSignalSimulator:
+    """Knows where each antenna is, and hands packets to those in range.
+
+    Parameters (private): ~max_distance (float, metres), ~config (the YAML file to take it from
+                otherwise; config/factory.yaml by default)
+    Subscribes: /WirelessSignalSimulator (DroneInfo)
+    Publishes:  the topic that each antenna asked for, usually /Node/<id> (NRF24)
+    Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
+                (AreaScan), /SignalSimulator/broadcast (Broadcast)
+
+    The handlers run in the threads of rospy's connections. `_lock` guards the register, and is
+    never held while something is sent; `_opening` guards the set of topics.
+    """
+
+    def __init__(self, max_distance_m: float) -> None:
+        """Raises SignalError for a distance that is none."""
+        self._register = SignalRegister(max_distance_m)
+        self._lock = threading.Lock()
+        self._opening = threading.Lock()
+        self._listeners: dict[str, _Listener] = {}
+        self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
+        self._complaints = ThrottledLog(_log)
+        # The services first: who sees that we subscribe may call at once.
+        rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
+        rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
+        rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
+        rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
+
+    def _drone_info(self, info: DroneInfo) -> None:
+        try:
+            if info.sub:
+                self._check_topic_type(info)
+            with self._lock:
+                known = self._register.node(info.nodeID)
+                self._register.drone_info(info.nodeID, info.position, info.sub, info.on)
+        except SignalError as error:
+            self._complaints.warning("DroneInfo dropped", str(error))
+            return
+        if info.sub and (known is None or known.topic != info.sub):
+            self._listen_on(info.nodeID, info.sub)
+
+    def _listen_on(self, node_id: int, topic: str) -> None:
+        with self._opening:
+            old_topic = self._topics.get(node_id)
+            self._topics[node_id] = topic
+            if topic not in self._listeners:
+                self._listeners[topic] = _Listener(topic)
+            if old_topic is not None and old_topic not in self._topics.values():
+                self._listeners.pop(old_topic).close()
+        _log.debug("node %d listens on %s", node_id, topic)
+
+    def _check_topic_type(self, info: DroneInfo) -> None:
+        """Nobody may have packets sent to a topic of another kind, such as /clock."""
+        if info.sub in self._listeners or info.sub == names.node_topic(info.nodeID):
+            return
+        for topic, kind in rospy.get_published_topics():
+            if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
+                raise SignalError(f"node {info.nodeID}: {info.sub[:60]} is a topic of {kind}")
+
+    def _message(self, request: WirelessMessage) -> WirelessMessageResponse:
+        with self._lock:
+            topic = self._register.link(request.from_, request.to)
+        return WirelessMessageResponse(topic is not None and self._send(topic, request.message))
+
+    def _broadcast(self, request: Broadcast) -> BroadcastResponse:
+        with self._lock:
+            nodes = self._in_range(request.from_)
+            topics = [self._register.link(request.from_, node) for node in nodes]
+        packet = request.message.payload
+        before, after = packet[:_TO], packet[_TO + 1 :]
+        return BroadcastResponse(
+            [
+                node
+                for node, topic in zip(nodes, topics)
+                if topic is not None and self._send(topic, NRF24(before + bytes((node,)) + after))
+            ]
+        )
+
+    def _others_in_range(self, request: AreaScan) -> AreaScanResponse:
+        with self._lock:
+            nodes = self._in_range(request.id)
+            topics = [self._register.link(request.id, node) for node in nodes]
+        return AreaScanResponse(
+            [node for node, topic in zip(nodes, topics) if self._is_heard(topic)]
+        )
+
+    def _in_range(self, node_id: int) -> tuple[int, ...]:
+        try:
+            return self._register.in_range(node_id)
+        except SignalError as error:
+            raise rospy.ServiceException(str(error)) from None
+
+    def _is_heard(self, topic: str | None) -> bool:
+        listener = None if topic is None else self._listeners.get(topic)
+        return listener is not None and listener.has_receiver()
+
+    def _send(self, topic: str, message: NRF24) -> bool:
+        listener = self._listeners.get(topic)
+        return listener is not None and listener.deliver(message)
+
+
+def main() -> None:
+    """Run the node."""
+    rospy.init_node("WirelessSignalSimulator")
+    max_distance_m = or_stop(lambda: factory_configuration("max_distance")).max_distance
+    show_library_logs_on_rosout()
+    WirelessSignalSimulator(max_distance_m)
+    _log.info("in range means nearer than %g m", max_distance_m)
+    rospy.spin()
