@@ -50,8 +50,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
     ) -> None:
         """As MeshnetworkComponent."""
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
-        # Connected, but for the moment between a heartbeat to the gateway and its answer.
+        # Between a heartbeat to the gateway and its answer; and the flag as noted for that moment.
         self._awaiting_answer = False
+        self._was_connected = False
         self._heartbeat_sent_s = -math.inf
         self._answered_s = -math.inf
         # False from the moment a check finds the connection gone: the next answer is a new start.
@@ -72,7 +73,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered last time, or may still answer."""
-        return self._connected or self._awaiting_answer
+        return self._knows_gateway()
 
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`; the one to the preferred gateway wants an answer."""
@@ -86,13 +87,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
         pass
 
     def _check(self, due_s: float) -> None:
-        was_connected = self._knows_gateway()
+        was_connected, was_waiting = self._knows_gateway(), self._awaiting_answer
         self._routing.maintain_routing()
         if was_connected:
             self._lost_since_s = None
             self._ask_for_locations()
             self._send_heartbeat_to_gateway()
-        elif self._flight is None:
+        elif self._flight is None and not was_waiting:
             self._lost_connection(due_s)
 
     def _antenna_is_off(self) -> None:
@@ -110,7 +111,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
     # Connection ------------------------------------------------------------------------------
 
     def _knows_gateway(self) -> bool:
-        return self._connected or self._awaiting_answer
+        return self._connected or (self._awaiting_answer and self._was_connected)
 
     def _send_heartbeat_to_gateway(self) -> bool:
         now_s = self._now_s
@@ -118,6 +119,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             return True  # one is under way
         gateway = self._preferred_gateway
         body = self._heartbeat_body()
+        self._was_connected = self._knows_gateway()
         self._connected = False
         self._awaiting_answer = True
         self._deadlines.set(Due.ANSWER, now_s + HEARTBEAT_ANSWER_S)
@@ -166,7 +168,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
         knows = self._knows_gateway()
         if know_gateway != knows:
-            self.send_heartbeat(neighbour)
+            if knows or not self._awaiting_answer:
+                self.send_heartbeat(neighbour)
         elif (
             knows
             and hops + 1 < self._hops
@@ -180,10 +183,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if creator == preferred_gateway:
             self._on_gateway_answer(creator, hops + 1)
         elif know_gateway != self._knows_gateway():
-            if know_gateway:
-                self._take_gateway(preferred_gateway, from_)
-            else:
+            if not know_gateway:
                 self.send_heartbeat(creator)
+            elif not self._awaiting_answer:
+                self._take_gateway(preferred_gateway, from_)
 
     def _take_gateway(self, gateway: int, neighbour: int) -> None:
         """Try the gateway of a neighbour; other ways to it did not work."""
