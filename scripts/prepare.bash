@@ -109,8 +109,13 @@ prepare_simulation() {
   build
 }
 
-prepare_tests_without_ros() {
+prepare_unit_tests() {
   make_venv
   pip_install requirements/simulation.txt requirements/test.txt
   pip_install --no-deps requirements/test-bare.txt
+}
+
+prepare_checks() {
+  prepare_unit_tests
+  pip_install requirements/checks.txt
 }
