@@ -1,0 +1,192 @@
+"""What may be asked of a gateway over HTTP, and what it answers.
+
+No `from __future__ import annotations` here: FastAPI reads the annotations at run time, and has to
+be able to on Python 3.8.
+"""
+
+import hmac
+import logging
+import math
+from typing import Any, Dict, List, Optional, Union
+
+from fastapi import Depends, FastAPI, Path, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from fastapi_offline import FastAPIOffline
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+from typing_extensions import Annotated
+
+from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, IGatewayCommands, KnownNode
+from drone_mesh.console.access import Access
+from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
+from drone_mesh.errors import GoalRefused
+from drone_mesh.internet.asking import AnswerLate, GatewayDesk, NotCarriedOut
+from drone_mesh.internet.request_guard import RequestGuard
+
+_log = logging.getLogger(__name__)
+
+DroneId = Annotated[int, Path(ge=0, le=MAX_NODE_ID, description="Node id of the drone.")]
+Coordinate = Annotated[
+    float,
+    Path(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False, description="Metres."),
+]
+Height = Annotated[
+    int, Path(ge=0, le=int(MAX_HEIGHT_M), description="Of the drone's underside, whole metres.")
+]
+
+
+Responses = Dict[Union[int, str], Dict[str, Any]]
+
+
+class Refusal(BaseModel):
+    """Why something was not done."""
+
+    detail: str
+
+
+class Ready(BaseModel):
+    """The gateway works."""
+
+    ready: bool
+    gateway: int = Field(description="Its node id.")
+
+
+class OrderSent(BaseModel):
+    """The order is on its way through the mesh. Nothing is told back about the arrival."""
+
+    drone: int
+    latitude: float = Field(description="y, metres")
+    longitude: float = Field(description="x, metres")
+    height: int = Field(description="metres")
+
+
+class NodeReport(BaseModel):
+    """What the gateway knows of one node."""
+
+    id: int
+    next_hop: Optional[int] = Field(description="The neighbour that leads to it; null: no route.")
+    hops: Optional[int] = Field(description="As its last heartbeat said; null: none came.")
+    heard_s_ago: Optional[float] = Field(description="Seconds since it was heard; null: never.")
+
+
+class NodeReports(BaseModel):
+    """What the gateway knows of the mesh. It does not list itself among the nodes."""
+
+    gateway: int
+    nodes: List[NodeReport]
+
+
+def make_api(desk: GatewayDesk, access: Access) -> FastAPI:
+    """The application. Its page /docs needs nothing from elsewhere."""
+    app = FastAPIOffline(
+        title="drone_mesh gateway",
+        description="Sends drones to places, and tells what this gateway knows of the mesh.",
+        version="1",
+        redoc_url=None,
+        # Only the operations of this page are answered, in one spelling each.
+        redirect_slashes=False,
+    )
+    app.add_middleware(RequestGuard, access=access)
+    _answer_errors_with_a_reason(app)
+    bearer = HTTPBearer(auto_error=False, description="Not needed if started without a token.")
+
+    async def check_token(
+        credentials: Annotated[Optional[HTTPAuthorizationCredentials], Depends(bearer)],
+    ) -> None:
+        if access.token is None:
+            return
+        given = credentials.credentials if credentials is not None else ""
+        if not hmac.compare_digest(given.encode(), access.token.encode()):
+            reason = "the token is wrong" if given else "a token is wanted: Authorization: Bearer"
+            raise HTTPException(401, reason, headers={"WWW-Authenticate": "Bearer"})
+
+    refusals: Responses = {
+        401: {"model": Refusal, "description": "No token, or a wrong one"},
+        503: {"model": Refusal, "description": "Not done, and it will not be"},
+        504: {"model": Refusal, "description": "Begun, but the gateway has not finished"},
+    }
+    order_refusals: Responses = {
+        **refusals,
+        422: {"model": Refusal, "description": "Not a drone, or not a place"},
+    }
+    guards = [Depends(check_token)]
+
+    @app.get("/ready", dependencies=guards, responses=refusals)
+    async def ready() -> Ready:
+        """Whether the gateway works: its own thread answers this."""
+        return await desk.ask(
+            lambda gateway, _now_s: Ready(ready=True, gateway=gateway.get_node_id())
+        )
+
+    @app.get("/nodes", dependencies=guards, responses=refusals)
+    async def nodes() -> NodeReports:
+        """The nodes that the gateway knows, and its routes to them."""
+        return await desk.ask(_report_nodes)
+
+    @app.post(
+        "/DroneMovement/{id}/{latitude}/{longitude}/{height}",
+        dependencies=guards,
+        responses=order_refusals,
+    )
+    async def move_drone(
+        id: DroneId, latitude: Coordinate, longitude: Coordinate, height: Height
+    ) -> OrderSent:
+        """Send a drone to a place, through the mesh."""
+        order = OrderSent(drone=id, latitude=latitude, longitude=longitude, height=height)
+        taken = await desk.ask(
+            lambda gateway, now_s: gateway.send_goal_request_to_drone(
+                id, latitude, longitude, height, now_s
+            )
+        )
+        if not taken:
+            raise HTTPException(503, f"the gateway has no route to drone {id}: it stays")
+        _log.info(
+            "drone %d is ordered to latitude %g m, longitude %g m, height %d m",
+            id,
+            latitude,
+            longitude,
+            height,
+        )
+        return order
+
+    return app
+
+
+def _report_nodes(gateway: IGatewayCommands, now_s: float) -> NodeReports:
+    return NodeReports(
+        gateway=gateway.get_node_id(),
+        nodes=[_report_node(node, now_s) for node in gateway.get_known_nodes()],
+    )
+
+
+def _report_node(node: KnownNode, now_s: float) -> NodeReport:
+    heard = math.isfinite(node.heard_s)
+    return NodeReport(
+        id=node.node_id,
+        next_hop=None if node.next_hop == NO_ROUTE else node.next_hop,
+        hops=None if node.hops == NO_ROUTE else node.hops,
+        heard_s_ago=round(max(0.0, now_s - node.heard_s), 3) if heard else None,
+    )
+
+
+def _answer_errors_with_a_reason(app: FastAPI) -> None:
+    def refuse(status: int, reason: str) -> JSONResponse:
+        return JSONResponse({"detail": reason}, status)
+
+    @app.exception_handler(RequestValidationError)
+    async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
+        return refuse(422, "; ".join(f"{e['loc'][-1]}: {e['msg']}" for e in error.errors()))
+
+    @app.exception_handler(GoalRefused)
+    async def bad_goal(_request: Request, error: GoalRefused) -> JSONResponse:
+        return refuse(422, str(error))
+
+    @app.exception_handler(NotCarriedOut)
+    async def not_carried_out(_request: Request, error: NotCarriedOut) -> JSONResponse:
+        return refuse(503, str(error))
+
+    @app.exception_handler(AnswerLate)
+    async def answer_late(_request: Request, error: AnswerLate) -> JSONResponse:
+        return refuse(504, str(error))
