@@ -1,0 +1,45 @@
+"""How long things take: states [DS 6.1.7, Table 16] and frames on the air [DS 7.3, 7.4].
+
+All times are integer nanoseconds, so that nothing is ever rounded: one bit lasts 4000, 1000 or
+500 ns.
+"""
+
+from __future__ import annotations
+
+NS_PER_US = 1_000
+NS_PER_S = 1_000_000_000
+
+SETTLING_NS = 130_000  # Tstby2a: standby -> TX or RX, and every turnaround
+CE_PULSE_MIN_NS = 10_000  # Thce: a shorter pulse of CE sends nothing
+CE_TO_CSN_NS = 4_000  # Tpece2csn: CE rising -> CSN low
+POWER_UP_NS = 1_500_000  # Tpd2stby with a crystal of Ls <= 30 mH; up to 4.5 ms with others
+ARD_STEP_NS = 250_000  # SETUP_RETR: ARD = (n + 1) steps
+
+PREAMBLE_BITS = 8
+PCF_BITS = 9  # packet control field: 6 bit length, 2 bit PID, 1 bit NO_ACK
+
+
+def frame_bits(
+    address_bytes: int, payload_bytes: int, crc_bytes: int, enhanced: bool = True
+) -> int:
+    """Bits on the air of one frame; `enhanced`: with packet control field [DS 7.3]."""
+    bits = PREAMBLE_BITS + 8 * (address_bytes + payload_bytes + crc_bytes)
+    return bits + PCF_BITS if enhanced else bits
+
+
+def bit_ns(bits_per_s: int) -> int:
+    """Duration of one bit in ns."""
+    return NS_PER_S // bits_per_s
+
+
+def acknowledged_cycle_ns(data_ns: int, ack_ns: int) -> int:
+    """From the rise of CE to TX_DS, when the first attempt is acknowledged."""
+    return SETTLING_NS + data_ns + SETTLING_NS + ack_ns
+
+
+def failed_cycle_ns(data_ns: int, ard_ns: int, retransmits: int) -> int:
+    """From the rise of CE to MAX_RT.
+
+    ARD runs from the end of a frame; the settling before the next comes on top [DS Fig. 17].
+    """
+    return SETTLING_NS + (retransmits + 1) * (data_ns + ard_ns) + retransmits * SETTLING_NS

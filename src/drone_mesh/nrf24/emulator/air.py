@@ -1,0 +1,213 @@
+"""The air: frames on their way from one chip to the others.
+
+A frame is heard by chips that listened on its channel and at its rate since before it began,
+until it ended. Two frames that overlap on one channel destroy each other at a receiver, unless
+one is stronger by the capture ratio. Neighbouring channels do not disturb each other, and the
+speed of light is infinite.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Callable, Protocol, Sequence, Tuple
+
+from drone_mesh.nrf24.emulator.clock import EmulatorClock
+from drone_mesh.nrf24.emulator.frames import Frame
+from drone_mesh.nrf24.emulator.links import Hop, LinkModel
+
+CAPTURE_DB = {250_000: 12.0, 1_000_000: 9.0, 2_000_000: 7.0}  # co-channel C/I [DS 5.7]
+RPD_DBM = -64.0  # [DS 6.4]
+RPD_NS = 40_000  # power must last that long to be noticed [DS 6.4]
+
+Position = Tuple[float, float, float]  # metres
+
+
+class Antenna(Protocol):
+    """What the air sees of a chip."""
+
+    name: str
+    position: Position
+    listening_since_ns: int | None  # None: it does not listen
+
+    def recognises(self, frame: Frame) -> bool:
+        """Whether the frame begins with an address that the chip looks for now."""
+
+    def frame_arrived(self, frame: Frame, power_dbm: float) -> None:
+        """A frame that it recognises has ended, its bits perhaps damaged."""
+
+    def frame_left(self) -> None:
+        """The chip's own frame has ended."""
+
+
+class Flight:
+    """One frame on the air."""
+
+    __slots__ = (
+        "aborted", "bits_per_s", "channel", "end_ns", "frame",
+        "listeners", "others", "packet", "sender", "start_ns", "tx_dbm",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        sender: Antenna,
+        frame: Frame,
+        radio: tuple[int, int, float],
+        span_ns: tuple[int, int],
+        packet: object,
+    ) -> None:
+        self.sender = sender
+        self.frame = frame
+        self.channel, self.bits_per_s, self.tx_dbm = radio
+        self.start_ns, self.end_ns = span_ns
+        self.packet = packet  # see links.Hop
+        self.aborted = False
+        self.others: list[Flight] = []  # that overlap with it on the channel
+        self.listeners: Sequence[Antenna] = ()
+
+
+FlightObserver = Callable[[Flight], None]
+
+
+class Air:
+    """One shared medium. Its state belongs to whoever has access to the clock."""
+
+    def __init__(self, clock: EmulatorClock, links: LinkModel, rng: random.Random) -> None:
+        self.clock = clock
+        self._links = links
+        self._rng = rng  # decides which bits of a damaged frame are wrong
+        self._listening: dict[tuple[int, int], dict[Antenna, None]] = {}
+        self._on_channel: dict[int, list[Flight]] = {}
+        self._distances: dict[tuple[Antenna, Antenna], float] = {}
+        self._observers: list[FlightObserver] = []
+        self.frames = 0  # that have been on the air
+        self.collisions = 0  # frames that a receiver would have heard, had there not been another
+
+    def observe(self, observer: FlightObserver) -> None:
+        """Have it called with each frame when that has ended."""
+        self._observers.append(observer)
+
+    def replace_links(self, links: LinkModel) -> None:
+        """Have another model of the space from now on."""
+        with self.clock.access():
+            self._links = links
+
+    def moved(self) -> None:
+        """An antenna has another place now."""
+        self._distances.clear()
+
+    def listen(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:
+        """The antenna hears frames that begin from now on."""
+        antenna.listening_since_ns = self.clock.now_ns
+        self._listening.setdefault((channel, bits_per_s), {})[antenna] = None
+
+    def stop_listening(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:
+        """It hears nothing more, nor the frame that is on the air now."""
+        antenna.listening_since_ns = None
+        self._listening[channel, bits_per_s].pop(antenna, None)
+
+    def transmit(
+        self, sender: Antenna, frame: Frame, radio: tuple[int, int, float], packet: object
+    ) -> Flight:
+        """Put a frame on the air now; `radio`: channel, bits per second, dBm."""
+        start_ns = self.clock.now_ns
+        end_ns = start_ns + frame.bit_count * 1_000_000_000 // radio[1]
+        flight = Flight(sender, frame, radio, (start_ns, end_ns), packet)
+        active = self._on_channel.setdefault(flight.channel, [])
+        for other in active:
+            other.others.append(flight)
+            flight.others.append(other)
+        active.append(flight)
+        flight.listeners = tuple(self._listening.get(radio[:2], ()))
+        self.clock.call_at(end_ns, self._end, flight)
+        return flight
+
+    def abort(self, flight: Flight) -> None:
+        """The sender lost its power in mid-frame: nobody can make sense of what was sent."""
+        flight.aborted = True
+        flight.end_ns = self.clock.now_ns
+        self._on_channel[flight.channel].remove(flight)
+
+    def energy_dbm(self, antenna: Antenna, channel: int, since_ns: int) -> float:
+        """The strongest frame on the channel that has lasted long enough to be noticed."""
+        enough_ns = self.clock.now_ns - RPD_NS
+        return max(
+            (
+                self._power_dbm(flight, antenna)
+                for flight in self._on_channel.get(channel, ())
+                if flight.sender is not antenna and max(flight.start_ns, since_ns) <= enough_ns
+            ),
+            default=-math.inf,
+        )
+
+    def address_passed(self, antenna: Antenna, channel: int, address_bits: int) -> bool:
+        """Whether a frame that the antenna recognises is on the air, already past its address."""
+        since_ns = antenna.listening_since_ns
+        for flight in self._on_channel.get(channel, ()):
+            passed_ns = flight.start_ns + address_bits * 1_000_000_000 // flight.bits_per_s
+            if (
+                since_ns is not None
+                and antenna in flight.listeners
+                and since_ns <= flight.start_ns
+                and passed_ns <= self.clock.now_ns
+                and antenna.recognises(flight.frame)
+            ):
+                return True
+        return False
+
+    def _end(self, flight: Flight) -> None:
+        for observer in self._observers:
+            observer(flight)
+        if flight.aborted:
+            return
+        self.frames += 1
+        self._on_channel[flight.channel].remove(flight)
+        # First the sender: it must be listening when the answer to its frame begins.
+        flight.sender.frame_left()
+        for antenna in flight.listeners:
+            since_ns = antenna.listening_since_ns
+            if since_ns is None or since_ns > flight.start_ns:
+                continue
+            if antenna.recognises(flight.frame):
+                self._arrive(flight, antenna)
+
+    def _arrive(self, flight: Flight, antenna: Antenna) -> None:
+        power_dbm = self._power_dbm(flight, antenna)
+        bit_count = flight.frame.bit_count
+        errors = self._links.bit_errors(
+            Hop(
+                flight.sender.name,
+                antenna.name,
+                self._distance_m(flight.sender, antenna),
+                power_dbm,
+                flight.bits_per_s,
+                bit_count,
+                flight.packet,
+            )
+        )
+        if errors is None:
+            return
+        needed_dbm = power_dbm - CAPTURE_DB[flight.bits_per_s]
+        if any(self._power_dbm(other, antenna) > needed_dbm for other in flight.others):
+            self.collisions += 1
+            return
+        frame = flight.frame
+        if errors:
+            frame = frame.with_errors(*self._rng.sample(range(bit_count), min(errors, bit_count)))
+            if not antenna.recognises(frame):
+                return
+        antenna.frame_arrived(frame, power_dbm)
+
+    def _power_dbm(self, flight: Flight, antenna: Antenna) -> float:
+        if flight.sender is antenna:
+            return -math.inf  # its own: it did not listen then
+        distance_m = self._distance_m(flight.sender, antenna)
+        return self._links.received_dbm(distance_m, flight.tx_dbm, 2400 + flight.channel)
+
+    def _distance_m(self, one: Antenna, other: Antenna) -> float:
+        distance_m = self._distances.get((one, other))
+        if distance_m is None:
+            (ax, ay, az), (bx, by, bz) = one.position, other.position
+            distance_m = math.sqrt((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2)
+            self._distances[one, other] = distance_m
+        return distance_m

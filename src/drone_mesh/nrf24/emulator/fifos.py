@@ -1,0 +1,122 @@
+"""The two FIFOs, three payloads deep each [DS 7.5.2, Fig. 13]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat
+from drone_mesh.nrf24.registers import FIFO_DEPTH
+
+
+@dataclass(eq=False)
+class Outgoing:
+    """A payload in the TX FIFO; the object itself is what tells one packet from the next."""
+
+    payload: bytes
+    pid: int = 0
+    no_ack: bool = False
+    ack_pipe: int | None = None  # rides on an acknowledgement of that pipe
+    was_sent: bool = False  # an ack payload that was on the air, perhaps in vain
+    _frame: Frame | None = None
+    _made_for: object = None
+
+    def frame(self, address: bytes, form: FrameFormat, no_ack_bit: int) -> Frame:
+        """Its frame, made anew only when something about it changed since the last attempt."""
+        key = (address, form, self.pid, no_ack_bit)
+        if self._frame is None or self._made_for != key:
+            self._frame = Frame.encode(address, self.payload, form, self.pid, no_ack_bit)
+            self._made_for = key
+        return self._frame
+
+
+@dataclass(frozen=True)
+class Incoming:
+    """A payload in the RX FIFO."""
+
+    pipe: int
+    payload: bytes
+    reported_width: int
+
+
+class RxFifo:
+    """What was received and not yet read."""
+
+    def __init__(self, partial_read_removes: bool) -> None:
+        self._partial_read_removes = partial_read_removes
+        self._payloads: list[Incoming] = []
+        self._last_byte = 0
+
+    def __len__(self) -> int:
+        return len(self._payloads)
+
+    @property
+    def full(self) -> bool:
+        return len(self._payloads) == FIFO_DEPTH
+
+    @property
+    def oldest(self) -> Incoming | None:
+        return self._payloads[0] if self._payloads else None
+
+    def push(self, incoming: Incoming) -> None:
+        """The caller has looked whether it is full."""
+        self._payloads.append(incoming)
+
+    def flush(self) -> None:
+        self._payloads.clear()
+
+    def read(self, count: int) -> bytes:
+        """R_RX_PAYLOAD: what leaves the chip while `count` bytes are clocked out.
+
+        Past the end of a payload the next one follows; in an empty FIFO the last byte is repeated.
+        """
+        out = b""
+        while self._payloads and len(out) < count:
+            payload = self._payloads[0].payload
+            wanted = count - len(out)
+            out += payload[:wanted]
+            if wanted >= len(payload) or self._partial_read_removes:
+                del self._payloads[0]
+        if out:
+            self._last_byte = out[-1]
+        return out + bytes((self._last_byte,)) * (count - len(out))
+
+
+class TxFifo:
+    """What is to be sent: payloads of a transmitter, ack payloads of a receiver."""
+
+    def __init__(self) -> None:
+        self._payloads: list[Outgoing] = []
+
+    def __len__(self) -> int:
+        return len(self._payloads)
+
+    @property
+    def full(self) -> bool:
+        return len(self._payloads) == FIFO_DEPTH
+
+    @property
+    def oldest(self) -> Outgoing | None:
+        return self._payloads[0] if self._payloads else None
+
+    def push(self, outgoing: Outgoing) -> bool:
+        """False: it is full, and the payload is lost."""
+        if self.full:
+            return False
+        self._payloads.append(outgoing)
+        return True
+
+    def push_back(self, outgoing: Outgoing) -> None:
+        """REUSE_TX_PL: have the payload that was sent last in front again."""
+        self._payloads.insert(0, outgoing)
+
+    def remove(self, outgoing: Outgoing) -> None:
+        """It was sent; nothing happens if it was flushed meanwhile."""
+        if outgoing in self._payloads:
+            self._payloads.remove(outgoing)
+
+    def flush(self) -> None:
+        self._payloads.clear()
+
+    def for_pipe(self, pipe: int) -> Outgoing | None:
+        """The oldest ack payload for a pipe."""
+        return next((out for out in self._payloads if out.ack_pipe == pipe), None)

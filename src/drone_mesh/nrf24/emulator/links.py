@@ -1,0 +1,188 @@
+"""How strong a frame arrives, and how many of its bits are wrong.
+
+Models may be scaled: a world of a few metres can be given a radio whose reach ends where that of
+the ideal disc would, without changing what happens near the edge.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+import random
+from typing import Callable, Hashable, NamedTuple
+
+SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
+_FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
+_NEAREST_M = 0.1  # antennas may share a point; log10(0) may not
+_SAME_POINT_DBM = 0.0  # the strongest input that is specified [DS 5.7]
+
+
+class Hop(NamedTuple):
+    """One frame on its way to one receiver."""
+
+    sender: Hashable
+    receiver: Hashable
+    distance_m: float
+    power_dbm: float  # at the receiver
+    bits_per_s: int
+    bit_count: int
+    packet: object  # the same object for each attempt to send one packet; None: acknowledgement
+
+
+class LinkModel(abc.ABC):
+    """What the space between two antennas does to frames."""
+
+    @abc.abstractmethod
+    def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
+        """Power at the receiver; decides who survives when frames overlap, and RPD."""
+
+    @abc.abstractmethod
+    def bit_errors(self, hop: Hop) -> int | None:
+        """How many bits arrive wrong; None: the receiver does not notice the frame at all."""
+
+
+def free_space_dbm(distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
+    """Power between isotropic antennas (ITU-R P.525); 40.06 dB are lost on 1 m at 2401 MHz."""
+    distance_m = max(distance_m, _NEAREST_M)
+    loss_db = 20 * math.log10(distance_m) + 20 * math.log10(carrier_mhz) + _FSPL_CONSTANT_DB
+    return min(tx_dbm - loss_db, _SAME_POINT_DBM)
+
+
+class IdealDisc(LinkModel):
+    """Everything arrives within a range, nothing beyond."""
+
+    def __init__(self, range_m: float = math.inf) -> None:
+        self._range_m = range_m
+
+    def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
+        return free_space_dbm(distance_m, tx_dbm, carrier_mhz)
+
+    def bit_errors(self, hop: Hop) -> int | None:
+        return 0 if hop.distance_m < self._range_m else None
+
+
+def bit_error_rate(margin_db: float) -> float:
+    """Share of wrong bits at so many dB above the sensitivity; 0.1 % at 0 dB, as specified."""
+    return 0.5 * math.exp(-6.215 * 10 ** (margin_db / 10))
+
+
+class LogDistance(LinkModel):
+    """Power falls with a power of the distance; bits go wrong near the receiver's sensitivity."""
+
+    def __init__(
+        self,
+        rng: random.Random,
+        *,
+        exponent: float = 2.7,
+        gain_db: float = 0.0,
+        metres_per_metre: float = 1.0,
+    ) -> None:
+        """`gain_db`: of both antennas and amplifiers; `metres_per_metre`: see with_edge_at."""
+        self._rng = rng
+        self._exponent = exponent
+        self._gain_db = gain_db
+        self._scale = metres_per_metre
+
+    @classmethod
+    def with_edge_at(
+        cls, range_m: float, rng: random.Random, *, exponent: float = 2.7
+    ) -> LogDistance:
+        """Distances are stretched so that at `range_m` the power is the sensitivity at 250 kbit/s.
+
+        About one frame in four is lost there, when it is sent with 0 dBm.
+        """
+        model = cls(rng, exponent=exponent)
+        at_1_m_dbm = model.received_dbm(1.0, 0.0, 2401)
+        edge_m = 10 ** ((at_1_m_dbm - SENSITIVITY_DBM[250_000]) / (10 * exponent))
+        return cls(rng, exponent=exponent, metres_per_metre=edge_m / range_m)
+
+    def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
+        at_1_m_dbm = free_space_dbm(1.0, tx_dbm + self._gain_db, carrier_mhz)
+        metres = max(distance_m * self._scale, _NEAREST_M)
+        return min(at_1_m_dbm - 10 * self._exponent * math.log10(metres), _SAME_POINT_DBM)
+
+    def bit_errors(self, hop: Hop) -> int | None:
+        rate = bit_error_rate(hop.power_dbm - SENSITIVITY_DBM[hop.bits_per_s])
+        if rate < 1e-12:
+            return 0
+        if rate > 0.1:
+            return None  # not even the address is found
+        if self._rng.random() < (1 - rate) ** hop.bit_count:
+            return 0
+        return max(1, round(rate * hop.bit_count))
+
+
+class ScriptedLoss(LinkModel):
+    """Another model, but some frames get lost by decision: for tests and for what-ifs."""
+
+    def __init__(self, model: LinkModel, loses: Callable[[Hop], bool]) -> None:
+        self._model = model
+        self._loses = loses
+
+    def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
+        return self._model.received_dbm(distance_m, tx_dbm, carrier_mhz)
+
+    def bit_errors(self, hop: Hop) -> int | None:
+        return None if self._loses(hop) else self._model.bit_errors(hop)
+
+
+class LossCurve(LinkModel):
+    """Packets get lost as often as was measured over distance.
+
+    What is known is the share of packets that were lost after all retries, not the fate of single
+    frames; these are lost in bursts. So the fate is drawn once for each packet on each link, and
+    every attempt to send that packet shares it. Acknowledgements of a packet that came are not
+    lost. Beyond the last distance nothing was measured, and nothing arrives; below the first, the
+    share is that of the first.
+    """
+
+    def __init__(
+        self,
+        points: tuple[tuple[float, float], ...],
+        rng: random.Random,
+        *,
+        metres_per_metre: float = 1.0,
+    ) -> None:
+        """`points`: distance in metres and share of lost packets, by rising distance."""
+        if not points or any(b[0] <= a[0] for a, b in zip(points, points[1:])):
+            raise ValueError("a loss curve needs points of rising distance")
+        self._points = points
+        self._rng = rng
+        self._scale = metres_per_metre
+        self._fates: dict[tuple[Hashable, Hashable], tuple[object, bool]] = {}
+
+    @property
+    def range_m(self) -> float:
+        """Nothing arrives beyond."""
+        return self._points[-1][0] / self._scale
+
+    def loss(self, distance_m: float) -> float | None:
+        """Share of lost packets, straight lines between the points; None: out of range."""
+        metres = distance_m * self._scale
+        if metres > self._points[-1][0]:
+            return None
+        last_m, last_loss = self._points[0]
+        for point_m, point_loss in self._points:
+            if metres <= point_m:
+                if point_m == last_m:
+                    return point_loss
+                part = (metres - last_m) / (point_m - last_m)
+                return last_loss + max(part, 0.0) * (point_loss - last_loss)
+            last_m, last_loss = point_m, point_loss
+        return last_loss
+
+    def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
+        return free_space_dbm(distance_m * self._scale, tx_dbm, carrier_mhz)
+
+    def bit_errors(self, hop: Hop) -> int | None:
+        loss = self.loss(hop.distance_m)
+        if loss is None:
+            return None
+        if hop.packet is None:
+            return 0
+        link = (hop.sender, hop.receiver)
+        packet, lost = self._fates.get(link, (None, False))
+        if packet is not hop.packet:
+            lost = self._rng.random() < loss
+            self._fates[link] = (hop.packet, lost)
+        return None if lost else 0

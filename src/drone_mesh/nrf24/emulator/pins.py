@@ -1,0 +1,65 @@
+"""The two pins of an emulated chip beside SPI."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.nrf24.emulator.clock import EmulatorClock
+
+
+class EmulatedCe:
+    """Chip enable, an output of the host. Usable like a DigitalInOut of CircuitPython, too."""
+
+    def __init__(self, clock: EmulatorClock, changed: Callable[[bool], None]) -> None:
+        self._clock = clock
+        self._changed = changed
+        self._value = False
+
+    @property
+    def value(self) -> bool:
+        """The level of the pin."""
+        return self._value
+
+    @value.setter
+    def value(self, high: bool) -> None:
+        with self._clock.access():
+            if bool(high) != self._value:
+                self._value = bool(high)
+                self._changed(self._value)
+
+    def switch_to_output(self, value: bool = False) -> None:
+        """CircuitPython's way to begin."""
+        self.value = value
+
+    def close(self) -> None:
+        """Nothing to give back; the level stays as it is."""
+
+
+class EmulatedIrq:
+    """Interrupt request, an input of the host: low while a flag that is not masked is set."""
+
+    def __init__(self, clock: EmulatorClock) -> None:
+        self._clock = clock
+        self._signal = clock.signal()
+        self._value = True
+        self.fell_ns: int | None = None  # when it went low last
+
+    @property
+    def value(self) -> bool:
+        """The level of the pin."""
+        return self._value
+
+    def wait_low(self, timeout_s: float) -> bool:
+        """Wait until the pin is low; False if it is still high when the time is over."""
+        return self._signal.wait_for(lambda: not self._value, timeout_s)
+
+    def set(self, high: bool) -> None:
+        """The chip drives the pin; called with access."""
+        if high != self._value:
+            self._value = high
+            if not high:
+                self.fell_ns = self._clock.now_ns
+                self._signal.notify()
+
+    def close(self) -> None:
+        """Nothing to give back."""

@@ -1,0 +1,60 @@
+"""The SPI device in front of an emulated chip, as spidev.SpiDev shows it."""
+
+from __future__ import annotations
+
+from typing import Protocol, Sequence
+
+from drone_mesh.nrf24.emulator.clock import EmulatorClock
+
+_FASTEST_HZ = 10_000_000  # [DS 8.3.2]
+_BITS_PER_NS = 8 * 1_000_000_000
+
+
+class SpiTarget(Protocol):
+    """The chip at the other end of the wires."""
+
+    def chip_selected(self) -> int:
+        """CSN falls; the STATUS that goes out as the first byte."""
+
+    def chip_deselected(self, mosi: bytes) -> bytes:
+        """CSN rises, the command takes effect; what went out after STATUS."""
+
+    def warn(self, text: str) -> None:
+        """The host did something that the datasheet forbids."""
+
+
+class EmulatedSpiDev:
+    """One transfer is one period of CSN low; it takes the time its bits take."""
+
+    def __init__(self, clock: EmulatorClock, target: SpiTarget) -> None:
+        self._clock = clock
+        self._target = target
+        self._busy = False
+        self.max_speed_hz = 8_000_000
+        self.mode = 0
+        self.no_cs = False
+        self.transfers = 0
+
+    def open(self, bus: int, device: int) -> None:
+        """There is but one chip behind this device, wherever it is said to be."""
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def xfer2(self, data: Sequence[int], speed_hz: int = 0) -> list[int]:
+        """Clock out `data`, and return what came in meanwhile: STATUS, then the answer."""
+        clock, target = self._clock, self._target
+        speed_hz = speed_hz or self.max_speed_hz
+        with clock.access():
+            if self._busy:
+                target.warn("two SPI transfers at once")
+            if speed_hz > _FASTEST_HZ or self.mode != 0:
+                target.warn("SPI must be mode 0 with at most 10 MHz")
+            self._busy = True
+            self.transfers += 1
+            status = target.chip_selected()
+        clock.elapse(len(data) * _BITS_PER_NS // speed_hz)
+        with clock.access():
+            answer = target.chip_deselected(bytes(data))
+            self._busy = False
+        return [status, *answer]

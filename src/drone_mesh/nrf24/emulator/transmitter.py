@@ -1,0 +1,172 @@
+"""The transmitting side of the protocol engine: Enhanced ShockBurst PTX [DS 7.5.1, Fig. 10, 17]."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from drone_mesh.nrf24.airtime import PREAMBLE_BITS, SETTLING_NS
+from drone_mesh.nrf24.emulator.fifos import Incoming, Outgoing
+from drone_mesh.nrf24.emulator.frames import Frame
+from drone_mesh.nrf24.emulator.states import State
+from drone_mesh.nrf24.registers import MAX_RT, RX_DR, TX_DS
+
+if TYPE_CHECKING:
+    from drone_mesh.nrf24.emulator.chip import EmulatedChip
+
+_COUNTER_MAX = 15  # PLOS_CNT stops there
+_LONGEST_TX_NS = 4_000_000  # [DS 6.1.5]
+_ANSWER_WINDOW_NS = {250_000: 500_000, 1_000_000: 250_000, 2_000_000: 250_000}  # [DS 7.4.2]
+
+
+class Transmitter:
+    """Sends what is in the TX FIFO, waits for acknowledgements, and sends again."""
+
+    def __init__(self, chip: EmulatedChip) -> None:
+        self._chip = chip
+        self._pid = 0
+        self._current: Outgoing | None = None
+        self._last_sent: Outgoing | None = None
+        self._in_tx_since_ns = 0
+        self.reuse = False  # REUSE_TX_PL is active
+        self.retransmits = 0  # ARC_CNT
+        self.packets_lost = 0  # PLOS_CNT
+
+    def next_pid(self) -> int:
+        """For each payload that comes over SPI, and each time one is used again."""
+        self._pid = self._pid + 1 & 3
+        return self._pid
+
+    def has_work(self) -> bool:
+        """Whether there is something to send, and MAX_RT does not forbid it."""
+        return self._chip.tx_fifo.oldest is not None and not self._chip.flags & MAX_RT.mask
+
+    def payload_written(self) -> None:
+        """A payload came into the FIFO; with CE high it goes out at once."""
+        self.reuse = False
+        if self._chip.state is State.STANDBY_II and self.has_work():
+            self.start(SETTLING_NS)
+
+    def flushed(self) -> None:
+        """FLUSH_TX: a packet that is under way ends without TX_DS or MAX_RT."""
+        self.reuse = False
+
+    def ce_rose(self) -> None:
+        """CE rises in standby."""
+        if self._chip.flags & MAX_RT.mask and self._chip.tx_fifo.oldest is not None:
+            self._chip.warn("CE high while MAX_RT is set: nothing is sent")
+        elif self.reuse:
+            again = self._chip.tx_fifo.oldest
+            if again is None and self._last_sent is not None:
+                last = self._last_sent
+                again = Outgoing(last.payload, no_ack=last.no_ack)
+                self._chip.tx_fifo.push_back(again)
+            if again is not None:
+                again.pid = self.next_pid()
+
+    def start(self, settling_ns: int) -> None:
+        """Send the oldest payload, as a new packet."""
+        chip = self._chip
+        self._current = chip.tx_fifo.oldest
+        self.retransmits = 0
+        chip.overtake()
+        chip.state = State.TX_SETTLING
+        if settling_ns:
+            self._in_tx_since_ns = chip.clock.now_ns + settling_ns
+            chip.after(settling_ns, self._send_frame)
+        else:
+            self._send_frame()
+
+    def _send_frame(self) -> None:
+        chip, packet = self._chip, self._current
+        if packet is None or packet is not chip.tx_fifo.oldest:
+            chip.settle()  # flushed meanwhile
+            return
+        registers = chip.registers
+        if registers.rate_reserved:
+            chip.warn("RF_DR_LOW and RF_DR_HIGH are both set")
+        form = registers.tx_format(len(packet.payload))
+        no_ack_bit = chip.variant.no_ack_bit if packet.no_ack else 1 - chip.variant.no_ack_bit
+        chip.state = State.TX
+        chip.transmit(packet.frame(registers.tx_address, form, no_ack_bit), packet)
+
+    def frame_left(self) -> None:
+        """The frame has ended; what next depends on whether an answer is wanted."""
+        chip, packet = self._chip, self._current
+        if packet is None or packet is not chip.tx_fifo.oldest:
+            chip.settle()
+            return
+        registers = chip.registers
+        if not registers.auto_ack[0] or packet.no_ack:
+            self._sent(packet)
+            self._chain()
+            return
+        if registers.bits_per_s == 250_000 and registers.ard_ns < 500_000:
+            chip.warn("ARD below 500 us at 250 kbit/s: no acknowledgement can arrive in time")
+        chip.state = State.ACK_TURN
+        chip.after(SETTLING_NS, self._wait_for_answer)
+        chip.after(registers.ard_ns, self._no_answer)
+
+    def _wait_for_answer(self) -> None:
+        chip = self._chip
+        chip.listen(State.ACK_WAIT)
+        chip.after(_ANSWER_WINDOW_NS[chip.registers.bits_per_s], self._window_over)
+
+    def _window_over(self) -> None:
+        chip = self._chip
+        if chip.state is not State.ACK_WAIT:
+            return
+        registers = chip.registers
+        address_bits = PREAMBLE_BITS + 8 * registers.address_bytes
+        if not chip.air.address_passed(chip, registers.channel, address_bits):
+            chip.stop_listening()
+            chip.state = State.RETRY_WAIT
+
+    def _no_answer(self) -> None:
+        chip = self._chip
+        chip.overtake()
+        chip.stop_listening()
+        if self._current is None or self._current is not chip.tx_fifo.oldest:
+            chip.settle()
+        elif self.retransmits < chip.registers.arc:
+            self.retransmits += 1
+            chip.state = State.TX_SETTLING
+            chip.after(SETTLING_NS, self._send_frame)
+        else:
+            self.packets_lost = min(self.packets_lost + 1, _COUNTER_MAX)
+            # Back in standby whatever CE says; another rise of CE is needed to go on.
+            chip.state = State.STANDBY_I
+            chip.set_flags(MAX_RT.mask)
+            if chip.registers.receiver:
+                chip.settle()
+
+    def answer_arrived(self, frame: Frame) -> bool:
+        """A frame with the address of pipe 0, while one waits for it; True if it was good."""
+        chip = self._chip
+        answer = frame.decode(chip.registers.ack_formats[0])
+        if answer is None:
+            return False
+        packet = self._current
+        flags = 0
+        if answer.payload and not chip.rx_fifo.full:
+            chip.rx_fifo.push(Incoming(0, answer.payload, len(answer.payload)))
+            flags = RX_DR.mask
+        if packet is not None and packet is chip.tx_fifo.oldest:
+            self._sent(packet)
+        chip.set_flags(flags)
+        chip.settle()
+        return True
+
+    def _sent(self, packet: Outgoing) -> None:
+        self._last_sent = packet
+        self._chip.tx_fifo.remove(packet)
+        self._chip.set_flags(TX_DS.mask)
+
+    def _chain(self) -> None:
+        """After a frame without acknowledgement the next one needs no settling [Fig. 10]."""
+        chip = self._chip
+        if chip.clock.now_ns - self._in_tx_since_ns > _LONGEST_TX_NS:
+            chip.warn("in TX for more than 4 ms")
+        if chip.ce.value and not chip.registers.receiver and self.has_work():
+            self.start(0)
+        else:
+            chip.settle()

@@ -1,0 +1,111 @@
+"""An air in the time of the wall: for trying things out, and for a simulation that people watch.
+
+One thread works off the events when their time has come. Whoever touches a chip first works off
+what is overdue, so that a chip never answers from the past. Events carry the time for which they
+were meant: chips acknowledge and repeat in time, however late the machine is.
+
+The lock guards the air, its chips and the queue; every access and every event holds it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import logging
+import threading
+import time
+from typing import Any, Callable, Iterator
+
+from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.nrf24.emulator.clock import EmulatorClock, Signal
+from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
+
+logger = logging.getLogger(__name__)
+
+
+class WallClock(EmulatorClock):
+    """Starts its thread at once; `close` ends it."""
+
+    def __init__(self) -> None:
+        self._start_ns = time.monotonic_ns()
+        self._now_ns = 0
+        self._events: list[tuple[int, int, Callable[..., None], tuple[Any, ...]]] = []
+        self._count = 0
+        self._lock = threading.RLock()
+        self._earlier = threading.Condition(self._lock)
+        self._closed = False
+        self._runtime = SystemRuntime()
+        self.latest_ns = 0  # the most that an event was ever late: how well the machine keeps up
+        self._thread = threading.Thread(target=self._run, name="emulated air", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread; events that are still queued never happen."""
+        with self._lock:
+            self._closed = True
+            self._earlier.notify()
+        self._thread.join()
+
+    @property
+    def now_ns(self) -> int:
+        return self._now_ns
+
+    @property
+    def runtime(self) -> Runtime:
+        return self._runtime
+
+    def call_at(self, time_ns: int, event: Callable[..., None], *arguments: object) -> None:
+        with self._lock:
+            self._count += 1
+            heapq.heappush(self._events, (time_ns, self._count, event, arguments))
+            if self._events[0][1] == self._count:
+                self._earlier.notify()
+
+    @contextlib.contextmanager
+    def access(self) -> Iterator[None]:
+        with self._lock:
+            self._catch_up()
+            yield
+
+    def elapse(self, duration_ns: int) -> None:
+        """An emulated transfer takes the time it takes: the host is slower than SPI anyway."""
+
+    def signal(self) -> Signal:
+        return _WallSignal()
+
+    def _catch_up(self) -> None:
+        while True:
+            wall_ns = time.monotonic_ns() - self._start_ns
+            if not self._events or self._events[0][0] > wall_ns:
+                self._now_ns = max(self._now_ns, wall_ns)
+                return
+            time_ns, _, event, arguments = heapq.heappop(self._events)
+            self._now_ns = max(self._now_ns, time_ns)
+            self.latest_ns = max(self.latest_ns, wall_ns - time_ns)
+            try:
+                event(*arguments)
+            except Exception:
+                logger.exception("an event of the emulated air failed; the air goes on")
+
+    def _run(self) -> None:
+        with self._lock:
+            while not self._closed:
+                self._catch_up()
+                if self._events:
+                    due_ns = self._events[0][0] - (time.monotonic_ns() - self._start_ns)
+                    self._earlier.wait(max(due_ns, 0) / NS_PER_S)
+                else:
+                    self._earlier.wait()
+
+
+class _WallSignal(Signal):
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        with self._condition:
+            return self._condition.wait_for(condition, timeout_s)
+
+    def notify(self) -> None:
+        with self._condition:
+            self._condition.notify_all()

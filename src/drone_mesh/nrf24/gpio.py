@@ -1,0 +1,154 @@
+"""CE and IRQ on the header of a Raspberry Pi, through gpiod 2 (the bindings of libgpiod).
+
+The GPIO chip is found by its label, because its number differs between models and kernels.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol
+
+from drone_mesh.nrf24.errors import HardwareUnavailable
+
+CE_GPIO = 25  # pin 22 of the header (reference, section 13)
+IRQ_GPIO = 24  # pin 18
+HEADER_LABELS = ("pinctrl-bcm2835", "pinctrl-bcm2711", "pinctrl-rp1")  # up to Pi 3, Pi 4, Pi 5
+_CONSUMER = "drone_mesh nRF24L01+"
+
+
+class CePin(Protocol):
+    """Chip enable, an output."""
+
+    value: bool
+
+    def close(self) -> None:
+        """Give the pin back."""
+
+
+class IrqPin(Protocol):
+    """Interrupt request, an input, low while the chip wants something. One thread waits for it."""
+
+    def wait_low(self, timeout_s: float) -> bool:
+        """Wait until it is low; False if it is still high when the time is over."""
+
+    def close(self) -> None:
+        """Give the pin back."""
+
+
+def _gpiod() -> ModuleType:
+    try:
+        import gpiod
+    except ImportError as error:
+        raise HardwareUnavailable(
+            "the Python package gpiod is missing, which switches the CE pin: pip install 'gpiod>=2'"
+        ) from error
+    module: ModuleType = gpiod
+    if not hasattr(module, "request_lines"):
+        raise HardwareUnavailable(
+            "the installed gpiod is older than version 2, another interface under the same name "
+            "(python3-libgpiod of Debian 12 is): pip install 'gpiod>=2' in a virtual environment"
+        )
+    return module
+
+
+def find_header(devices: Path = Path("/dev")) -> str:
+    """Path of the GPIO chip that has the header's pins."""
+    gpiod = _gpiod()
+    refused = False
+    labels = []
+    for path in sorted(devices.glob("gpiochip*")):
+        try:
+            with gpiod.Chip(str(path)) as chip:
+                label = chip.get_info().label
+        except PermissionError:
+            refused = True
+            continue
+        except OSError:
+            continue
+        if label in HEADER_LABELS:
+            return str(path)
+        labels.append(label)
+    if refused:
+        raise HardwareUnavailable(
+            "no permission to open /dev/gpiochip*: sudo usermod -aG gpio $USER, and log in again"
+        )
+    raise HardwareUnavailable(
+        f"no GPIO chip of a Raspberry Pi found (looked for {', '.join(HEADER_LABELS)} in "
+        f"{devices}/gpiochip*, found {', '.join(labels) or 'none'}): is this a Raspberry Pi?"
+    )
+
+
+def _request(gpio: int, settings: Any) -> Any:
+    gpiod = _gpiod()
+    path = find_header()
+    try:
+        return gpiod.request_lines(path, consumer=_CONSUMER, config={gpio: settings})
+    except OSError as error:
+        raise HardwareUnavailable(
+            f"cannot use GPIO{gpio} of {path}: {error.strerror or error} "
+            "(another program that uses it must be stopped)"
+        ) from error
+
+
+class GpiodCe:
+    """CE on a pin of the header; low from the start, and when it is closed."""
+
+    def __init__(self, gpio: int = CE_GPIO) -> None:
+        line = _gpiod().line
+        self._gpio, self._line = gpio, line
+        self._lines = _request(
+            gpio,
+            _gpiod().LineSettings(
+                direction=line.Direction.OUTPUT, output_value=line.Value.INACTIVE
+            ),
+        )
+        self._value = False
+
+    @property
+    def value(self) -> bool:
+        """The level of the pin."""
+        return self._value
+
+    @value.setter
+    def value(self, high: bool) -> None:
+        level = self._line.Value.ACTIVE if high else self._line.Value.INACTIVE
+        self._lines.set_value(self._gpio, level)
+        self._value = high
+
+    def close(self) -> None:
+        """Low, then given back."""
+        self.value = False
+        self._lines.release()
+
+
+class GpiodIrq:
+    """IRQ on a pin of the header. Levels decide, edges only wake: none can be missed."""
+
+    def __init__(self, gpio: int = IRQ_GPIO) -> None:
+        line = _gpiod().line
+        self._gpio, self._low = gpio, line.Value.INACTIVE
+        self._lines = _request(
+            gpio,
+            _gpiod().LineSettings(
+                direction=line.Direction.INPUT,
+                edge_detection=line.Edge.FALLING,
+                bias=line.Bias.PULL_UP,
+            ),
+        )
+
+    def wait_low(self, timeout_s: float) -> bool:
+        """See IrqPin."""
+        until_s = time.monotonic() + timeout_s
+        while self._lines.get_value(self._gpio) != self._low:
+            left_s = until_s - time.monotonic()
+            if left_s <= 0:
+                return False
+            if self._lines.wait_edge_events(left_s):
+                self._lines.read_edge_events()  # perhaps an old one, so look again
+        return True
+
+    def close(self) -> None:
+        """Given back."""
+        self._lines.release()

@@ -1,0 +1,157 @@
+"""The antenna of the mesh on a real radio (SDD: NRF24HighLevelInterface)."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from typing import Callable
+
+from drone_mesh.communication.interfaces import (
+    BROADCAST,
+    MAX_NODE_ID,
+    PAYLOAD_BYTES,
+    IMeshDebugInfo,
+    IMeshNetwork,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.messages import FROM, TO
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
+from drone_mesh.nrf24.settings import BROADCAST_PIPE
+from drone_mesh.nrf24.statistics import RadioStatistics
+from drone_mesh.nrf24.transceiver import Received
+
+logger = logging.getLogger(__name__)
+
+RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices that it shall end
+DUPLICATE_S = 0.5  # our choice, as in reference 14.10: the same bytes again so soon are a duplicate
+
+Submit = Callable[[Callable[[float], None]], None]
+"""Run a function, with now_s, on the thread that owns the node."""
+
+
+class NRF24HighLevelInterface(IWirelessCommunication):
+    """Turns node ids into addresses, and hands on what arrives.
+
+    Threads: `start_antenna` starts one that receives; it owns the memory for duplicates. Sending
+    happens in the thread that calls. What arrives reaches the mesh through `submit`.
+    """
+
+    def __init__(
+        self,
+        radio: NRF24LowLevelInterface,
+        submit: Submit,
+        *,
+        runtime: Runtime | None = None,
+        on_payload: Callable[[bytes], None] | None = None,
+    ) -> None:
+        """`on_payload` is shown each payload as the mesh gets it, in the receiving thread."""
+        self._radio = radio
+        self._submit = submit
+        self._runtime = runtime or SystemRuntime()
+        self._on_payload = on_payload
+        self._mesh: IMeshNetwork | None = None
+        self._receiving: Task | None = None
+        self._info: IMeshDebugInfo | None = None
+        self._powered = False
+        self._seen: dict[int, tuple[bytes, float]] = {}  # node -> its last payload, and when
+        self._duplicates = 0
+
+    def start_antenna(self, mesh: IMeshNetwork) -> None:
+        """Set the radio up and listen; RadioError if there is none."""
+        if mesh.get_node_id() != self._radio.node_id:
+            raise ConfigurationError(
+                f"the radio is set up as node {self._radio.node_id}, "
+                f"but the mesh is node {mesh.get_node_id()}"
+            )
+        if self._receiving is not None:
+            return
+        self._radio.begin()
+        self._mesh = mesh
+        self._powered = True
+        self._receiving = self._runtime.start(self._receive, f"nRF24 {self._radio.node_id}")
+
+    def stop_antenna(self) -> None:
+        receiving, self._receiving = self._receiving, None
+        if receiving is None:
+            return
+        self._powered = False
+        receiving.join()
+        self._radio.close()
+        self._mesh = None
+
+    def switch_power(self, on: bool) -> None:
+        """Switch the antenna of a running node off or on, and tell the mesh.
+
+        RadioError if it is switched on and the chip is gone.
+        """
+        mesh = self._mesh
+        if mesh is None or on == self._powered:
+            return
+        if on:
+            self._radio.begin()
+        else:
+            self._radio.power_down()
+        self._powered = on
+        self._submit(lambda now_s: mesh.on_antenna_power(on, now_s))
+
+    def send_message_to(self, payload: bytes) -> bool:
+        """See the interface; what cannot be sent (not 32 bytes, no such node) is not sent."""
+        if not self._powered or len(payload) != PAYLOAD_BYTES:
+            return False
+        receiver = payload[TO]
+        if receiver > MAX_NODE_ID or receiver == self._radio.node_id:
+            return False
+        return self._radio.send(receiver, bytes(payload))
+
+    def broadcast_message(self, payload: bytes) -> None:
+        """One frame for all; each receiver's antenna puts its own id into byte 3."""
+        if self._powered and len(payload) == PAYLOAD_BYTES:
+            self._radio.broadcast(_with_receiver(payload, BROADCAST))
+
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        self._info = info if on else None
+
+    @property
+    def debug_info(self) -> IMeshDebugInfo | None:
+        """What debugging_mode wants to be shown, or None."""
+        return self._info
+
+    def on(self) -> bool:
+        return self._powered
+
+    def statistics(self) -> RadioStatistics:
+        """Counters of the radio, and the duplicates that were seen."""
+        return replace(self._radio.statistics(), duplicates=self._duplicates)
+
+    def _receive(self) -> None:
+        while self._receiving is not None:
+            if not self._powered:
+                self._runtime.sleep(RECEIVE_TIMEOUT_S)
+                continue
+            for received in self._radio.receive(RECEIVE_TIMEOUT_S):
+                self._hand_on(received)
+
+    def _hand_on(self, received: Received) -> None:
+        mesh, payload = self._mesh, received.payload
+        if mesh is None or not self._powered:
+            return
+        self._note(payload)
+        if received.pipe == BROADCAST_PIPE:
+            payload = _with_receiver(payload, self._radio.node_id)
+        if self._on_payload is not None:
+            self._on_payload(payload)
+        self._submit(lambda now_s: mesh.on_msg(payload, now_s))
+
+    def _note(self, payload: bytes) -> None:
+        """Count repetitions; they are handed on, for the same packet again is normal."""
+        now_s = self._runtime.now_s()
+        before, then_s = self._seen.get(payload[FROM], (b"", now_s))
+        if before == payload and now_s - then_s < DUPLICATE_S:
+            self._duplicates += 1
+        self._seen[payload[FROM]] = (payload, now_s)
+
+
+def _with_receiver(payload: bytes, node_id: int) -> bytes:
+    return payload[:TO] + bytes((node_id,)) + payload[TO + 1 :]

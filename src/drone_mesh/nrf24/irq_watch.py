@@ -1,0 +1,32 @@
+"""Whether the IRQ pin can be believed, or the chip must be polled."""
+
+from __future__ import annotations
+
+_PATIENCE = 3  # in a row; once may be a race between the pin and the look
+
+
+class IrqWatch:
+    """Compares what the pin says with what is found in the chip. For the receiving thread."""
+
+    def __init__(self) -> None:
+        self.trusted = True
+        self._slept = False
+        self._contradictions = 0
+
+    def woken(self, low: bool) -> None:
+        """The wait for the pin is over."""
+        self._slept = not low
+
+    def looked(self, found: bool, low_for_nothing: bool) -> bool:
+        """What the look after it found; True if that ends the trust in the pin.
+
+        `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all
+        flags are clear, and still the pin is low.
+        """
+        contradiction = low_for_nothing or (found and self._slept)
+        self._slept = False
+        self._contradictions = self._contradictions + 1 if contradiction else 0
+        if self._contradictions < _PATIENCE or not self.trusted:
+            return False
+        self.trusted = False
+        return True

@@ -1,0 +1,249 @@
+"""The driver of the nRF24L01+ (SDD: NRF24LowLevelInterface), written from the datasheet."""
+
+from __future__ import annotations
+
+import logging
+import random
+from dataclasses import replace
+
+from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.nrf24.errors import RadioError
+from drone_mesh.nrf24.gpio import CePin, IrqPin
+from drone_mesh.nrf24.irq_watch import IrqWatch
+from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
+from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.nrf24.spi import SpiDevice
+from drone_mesh.nrf24.statistics import RadioStatistics
+from drone_mesh.nrf24.transceiver import Received, Transceiver
+
+logger = logging.getLogger(__name__)
+
+POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
+VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed by a listener
+RESTART_PERIOD_S = 1.0  # our choice: a chip that is gone is looked for no more often
+BACK_OFF_S = (5e-3, 40e-3)  # our choice: two nodes rarely draw times closer than a packet (2.5 ms)
+
+
+class NRF24LowLevelInterface:
+    """One radio: sends with and without acknowledgement, and receives.
+
+    `spi`, `ce` and `irq` are handed in, so anything that behaves like a chip can stand below;
+    without `irq` it is polled. Any number of threads may send, one may call `receive`; a lock
+    makes each sequence of SPI transfers one whole. While it sends, a node is deaf: 1.9 ms if all
+    goes well, 47 ms for each try if nobody answers.
+
+    Use it as a context manager, or call `begin` and `close`. Everything but `begin` puts up with
+    a chip that fails: it is set up anew, at most once a second, and until then nothing can be
+    sent.
+    """
+
+    def __init__(
+        self,
+        spi: SpiDevice,
+        ce: CePin,
+        irq: IrqPin | None = None,
+        *,
+        node_id: int,
+        settings: RadioSettings = RadioSettings(),  # noqa: B008 (frozen)
+        runtime: Runtime | None = None,
+        rng: random.Random | None = None,
+    ) -> None:
+        self.node_id = node_id
+        self.settings = settings
+        self._spi, self._ce, self._irq = spi, ce, irq
+        self._runtime = runtime or SystemRuntime()
+        self._rng = rng or random.Random()
+        self._lock = self._runtime.lock()  # guards the chip and all that follows
+        self._statistics = RadioStatistics()
+        self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self._statistics)
+        self._irq_watch = IrqWatch()
+        self._powered = False
+        self._working = False
+        self._next_restart_s = 0.0
+        self._next_verify_s = 0.0
+
+    def __enter__(self) -> NRF24LowLevelInterface:
+        self.begin()
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def begin(self) -> None:
+        """Set the chip up and listen; RadioError says what is wrong if there is none."""
+        with self._lock:
+            self._set_up()
+            self._powered = True
+
+    def power_down(self) -> None:
+        """Neither send nor receive until `begin`. Nothing happens if the chip is gone."""
+        with self._lock:
+            self._powered = self._working = False
+            try:
+                self._chip.power_down()
+            except RadioError as error:
+                logger.debug("node %d: power down: %s", self.node_id, error)
+
+    def close(self) -> None:
+        """Power the chip down, and give pins and SPI back."""
+        self.power_down()
+        self._ce.close()
+        if self._irq is not None:
+            self._irq.close()
+        self._spi.close()
+
+    def statistics(self) -> RadioStatistics:
+        """A copy of the counters."""
+        return replace(self._statistics)
+
+    @property
+    def working(self) -> bool:
+        """Whether the chip answered, and held its settings, when it was needed last."""
+        return self._working
+
+    def send(self, node_id: int, payload: bytes) -> bool:
+        """Send 32 bytes to a node, and wait; True once its chip has acknowledged them.
+
+        Up to `send_tries` times; in the random pause between it listens, so that two nodes that
+        call each other get through. Each try sends the very same packet, which cannot arrive
+        twice.
+
+        The acknowledgement comes back to pipe 0, which holds the receiver's address as long as
+        this takes. The program of 2019 opened pipe 3 for it, at the address of another node: the
+        sender then heard, and acknowledged, mail that was not for it. So pipe 3 stays shut.
+        """
+        _check(payload)
+        with self._lock:
+            done = self._send(self.settings.node_address(node_id), payload)
+            self._statistics.sent += 1
+            if done:
+                self._statistics.acknowledged += 1
+            else:
+                self._statistics.lost += 1
+            return done
+
+    def broadcast(self, payload: bytes) -> bool:
+        """Send 32 bytes to all that hear them; True if they were sent, whoever heard them."""
+        _check(payload)
+        with self._lock:
+            if not self._ready():
+                return False
+            try:
+                self._chip.transmit_to_all(payload)
+            except RadioError as error:
+                self._failed(error)
+                return False
+            self._statistics.broadcasts += 1
+            return True
+
+    def receive(self, timeout_s: float) -> list[Received]:
+        """What has arrived, oldest first; waits so long for the first. For one thread."""
+        until_s = self._runtime.now_s() + timeout_s
+        inbox = self._chip.inbox
+        while True:
+            with self._lock:
+                self._look()
+            if inbox:
+                return [inbox.popleft() for _ in range(len(inbox))]
+            left_s = until_s - self._runtime.now_s()
+            if left_s <= 0:
+                return []
+            if self._irq is None or not self._irq_watch.trusted or not self._working:
+                self._runtime.sleep(min(left_s, POLL_S))
+            else:
+                self._irq_watch.woken(self._irq.wait_low(left_s))
+
+    def _send(self, address: bytes, payload: bytes) -> bool:
+        if not self._ready():
+            return False
+        chip = self._chip
+        try:
+            chip.become_transmitter(address)
+            chip.load(address, payload)
+            done = chip.transmit()
+            for _ in range(self.settings.send_tries - 1):
+                if done:
+                    break
+                self._statistics.tries += 1
+                chip.listen()
+                self._pause(self._rng.uniform(*BACK_OFF_S))
+                chip.become_transmitter(address)
+                done = chip.transmit()
+            if not done:
+                chip.drop()
+            chip.listen()
+        except RadioError as error:
+            self._failed(error)
+            return False
+        return done
+
+    def _pause(self, duration_s: float) -> None:
+        """Wait, and keep taking what arrives."""
+        until_s = self._runtime.now_s() + duration_s
+        while True:
+            left_s = until_s - self._runtime.now_s()
+            if left_s <= 0:
+                return
+            self._runtime.sleep(min(left_s, POLL_S))
+            self._chip.drain()
+
+    def _look(self) -> None:
+        """Take what is in the FIFO, and see now and then that the chip still holds its settings."""
+        if not self._powered or (not self._working and not self._ready()):
+            return
+        chip = self._chip
+        try:
+            found = chip.drain()
+            if self._irq is not None and self._irq_watch.trusted:
+                low_for_nothing = not chip.flags_seen and self._irq.wait_low(0.0)
+                if self._irq_watch.looked(found, low_for_nothing):
+                    self._statistics.irq_fallbacks += 1
+                    logger.warning("node %d: the IRQ pin does not work; polling", self.node_id)
+            now_s = self._runtime.now_s()
+            if now_s >= self._next_verify_s:
+                self._next_verify_s = now_s + VERIFY_PERIOD_S
+                chip.check_registers()
+        except RadioError as error:
+            self._failed(error)
+            self._ready()
+
+    def _set_up(self) -> None:
+        self._working = False
+        self._chip.set_up()
+        self._working = True
+        self._next_verify_s = self._runtime.now_s() + VERIFY_PERIOD_S
+
+    def _ready(self) -> bool:
+        """Whether the chip can be used; one that lost its settings is set up anew."""
+        if not self._powered:
+            return False
+        if self._working:
+            try:
+                self._chip.check_config()
+                return True
+            except RadioError as error:
+                self._failed(error)
+        now_s = self._runtime.now_s()
+        if now_s < self._next_restart_s:
+            return False
+        self._next_restart_s = now_s + RESTART_PERIOD_S
+        try:
+            self._set_up()
+        except RadioError as error:
+            self._failed(error)
+            return False
+        logger.warning("node %d: the radio was set up anew, and works", self.node_id)
+        return True
+
+    def _failed(self, error: RadioError) -> None:
+        """Note that the chip must be set up anew before it is used."""
+        if self._working:
+            self._statistics.restarts += 1
+            logger.warning("node %d: %s", self.node_id, error)
+        self._working = False
+        self._chip.disable()
+
+
+def _check(payload: bytes) -> None:
+    if len(payload) != PAYLOAD_BYTES:
+        raise ValueError(f"a payload has {PAYLOAD_BYTES} bytes, this one {len(payload)}")

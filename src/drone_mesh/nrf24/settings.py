@@ -1,0 +1,187 @@
+"""How the radios of a mesh are set: the same for all of them, or they do not hear each other."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, replace
+
+from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.nrf24.airtime import ARD_STEP_NS, NS_PER_S, acknowledged_cycle_ns, frame_bits
+from drone_mesh.nrf24.registers import (
+    ADDRESS_BYTES,
+    ARC,
+    ARD,
+    AW,
+    CRCO,
+    EN_CRC,
+    EN_DYN_ACK,
+    PIPES,
+    PRIM_RX,
+    PWR_UP,
+    RF_DR_HIGH,
+    RF_DR_LOW,
+    RF_PWR,
+    Register,
+)
+
+BROADCAST_PIPE = 1
+OWN_PIPE = 2
+_LISTENING_PIPES = 1 << BROADCAST_PIPE | 1 << OWN_PIPE
+_ALL_PIPES = (1 << PIPES) - 1
+
+
+class DataRate(enum.Enum):
+    """Bits per second on the air; a slower one reaches further."""
+
+    KBPS_250 = 250_000
+    MBPS_1 = 1_000_000
+    MBPS_2 = 2_000_000
+
+
+class TxPower(enum.Enum):
+    """Output power in dBm [DS Table 17]."""
+
+    DBM_MINUS_18 = -18
+    DBM_MINUS_12 = -12
+    DBM_MINUS_6 = -6
+    DBM_0 = 0
+
+
+class BroadcastMode(enum.Enum):
+    """How a broadcast is sent."""
+
+    NO_ACK = "no_ack"  # an ordinary frame that asks for no acknowledgement
+    SHOCKBURST = "shockburst"  # a plain frame: clones and chips without "+" understand it, too
+
+
+@dataclass(frozen=True)
+class RadioSettings:
+    """Reference, section 13; `crc_bytes` is 1 for nodes of 2019. All nodes of a mesh alike.
+
+    Raises ConfigurationError for values that the chip does not have.
+    """
+
+    channel: int = 1  # 2400 + n MHz
+    data_rate: DataRate = DataRate.KBPS_250
+    power: TxPower = TxPower.DBM_0
+    crc_bytes: int = 2
+    retransmit_delay: int = 5  # ARD = (n + 1) * 250 us
+    retransmits: int = 15  # ARC, by the chip itself
+    send_tries: int = 4  # by the driver, after a random pause
+    broadcast_mode: BroadcastMode = BroadcastMode.NO_ACK
+    base_address: int = 0x544D526800  # a node's address is this + its id
+    broadcast_id: int = BROADCAST
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("channel", 0, 125),
+            ("crc_bytes", 1, 2),
+            ("retransmit_delay", 0, 15),
+            ("retransmits", 0, 15),
+            ("send_tries", 1, 100),
+            ("base_address", 0, (1 << 8 * ADDRESS_BYTES) - 256),
+            ("broadcast_id", MAX_NODE_ID + 1, 255),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ConfigurationError(f"radio: {name} is {value}, must be {low} to {high}")
+        if self.base_address & 0xFF:
+            raise ConfigurationError(
+                f"radio: base_address is 0x{self.base_address:X}, must end in 00: the id goes there"
+            )
+        if self.data_rate is DataRate.KBPS_250 and self.retransmit_delay < 1:
+            raise ConfigurationError(
+                "radio: retransmit_delay must be at least 1 (500 us) at 250 kbit/s"
+            )
+
+    def skewed(self, node_id: int) -> RadioSettings:
+        """With a retransmit delay of this node's own: 750 us to 4 ms.
+
+        Two nodes that send to a third do not collide again and again then [DS 7.6].
+        """
+        return replace(self, retransmit_delay=2 + node_id % 14)
+
+    def node_address(self, node_id: int) -> bytes:
+        """Five bytes, LSByte first, as the chip wants them."""
+        return (self.base_address + node_id).to_bytes(ADDRESS_BYTES, "little")
+
+    @property
+    def broadcast_address(self) -> bytes:
+        """Where all nodes listen; LSByte first."""
+        return self.node_address(self.broadcast_id)
+
+    @property
+    def config_listening(self) -> int:
+        """CONFIG of a powered receiver."""
+        return PRIM_RX.put(1, self.config_sending)
+
+    @property
+    def config_sending(self) -> int:
+        """CONFIG of a powered transmitter."""
+        return PWR_UP.put(1, self.config_power_down)
+
+    @property
+    def config_power_down(self) -> int:
+        """CONFIG in power down; all interrupts reach the pin."""
+        return EN_CRC.put(1) | CRCO.put(self.crc_bytes - 1)
+
+    @property
+    def auto_ack_pipes(self) -> int:
+        """EN_AA. Sender and receiver must agree on it pipe by pipe, or nothing is received."""
+        if self.broadcast_mode is BroadcastMode.SHOCKBURST:
+            return _ALL_PIPES & ~(1 << BROADCAST_PIPE)
+        return _ALL_PIPES
+
+    @property
+    def listening_pipes(self) -> int:
+        """EN_RXADDR while nothing is being sent."""
+        return _LISTENING_PIPES
+
+    def registers(self, node_id: int) -> dict[Register, bytes]:
+        """Every register that the driver depends on, but for CONFIG: no reset clears the chip.
+
+        Pipe 0 is opened while sending, for the acknowledgement; the pipes 3 to 5 never are.
+        """
+        rate = RF_PWR.put(sorted(p.value for p in TxPower).index(self.power.value))
+        rate |= RF_DR_LOW.put(int(self.data_rate is DataRate.KBPS_250))
+        rate |= RF_DR_HIGH.put(int(self.data_rate is DataRate.MBPS_2))
+        plain = {
+            Register.EN_AA: self.auto_ack_pipes,
+            Register.EN_RXADDR: self.listening_pipes,
+            Register.SETUP_AW: AW.put(ADDRESS_BYTES - 2),
+            Register.SETUP_RETR: ARD.put(self.retransmit_delay) | ARC.put(self.retransmits),
+            Register.RF_CH: self.channel,
+            Register.RF_SETUP: rate,
+            Register.RX_PW_P0: PAYLOAD_BYTES,
+            Register.RX_PW_P1: PAYLOAD_BYTES,
+            Register.RX_PW_P2: PAYLOAD_BYTES,
+            Register.RX_PW_P3: 0,
+            Register.RX_PW_P4: 0,
+            Register.RX_PW_P5: 0,
+            Register.DYNPD: 0,
+            Register.FEATURE: EN_DYN_ACK.put(1),
+        }
+        return {
+            **{register: bytes((value,)) for register, value in plain.items()},
+            Register.RX_ADDR_P1: self.broadcast_address,
+            Register.RX_ADDR_P2: self.node_address(node_id)[:1],
+        }
+
+    @property
+    def data_s(self) -> float:
+        """How long one of our frames is on the air."""
+        return frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) / self.data_rate.value
+
+    @property
+    def acknowledged_s(self) -> float:
+        """From the rise of CE until a packet is acknowledged, if nothing goes wrong."""
+        ack_bits = frame_bits(ADDRESS_BYTES, 0, self.crc_bytes)
+        bit_ns = NS_PER_S // self.data_rate.value
+        data_ns = frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) * bit_ns
+        return acknowledged_cycle_ns(data_ns, ack_bits * bit_ns) / NS_PER_S
+
+    @property
+    def retransmit_delay_s(self) -> float:
+        """ARD: from the end of one frame until the chip turns to sending it again."""
+        return (self.retransmit_delay + 1) * ARD_STEP_NS / NS_PER_S
