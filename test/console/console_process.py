@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import logging
+import signal
 import threading
 import time
 
@@ -12,29 +12,17 @@ from inprocess_mesh import InProcessMesh
 
 from drone_mesh.console.access import access_for
 from drone_mesh.console.frames import FrameStore
-from drone_mesh.console.runner import LOOK_PERIOD_S, run_console
-from drone_mesh.console.server import ConsoleServer
+from drone_mesh.console.runner import ConsoleRunner
+from drone_mesh.console.server import FRAME_PERIOD_S, ConsoleServer
 
 LAYOUTS = [(0, "0: field case, 17 drones"), (100, "100: grid 10 x 10"), (999, "999: none such")]
 
 
-async def feed(mesh: InProcessMesh, store: FrameStore) -> None:
-    while True:
-        status, events = mesh.look()
-        store.update_mesh(status, time.monotonic())
-        if events:
-            store.add_events(events)
-        await asyncio.sleep(LOOK_PERIOD_S)
-
-
-async def serve(options: argparse.Namespace, mesh: InProcessMesh) -> None:
-    store = FrameStore()
-    server = ConsoleServer(store, mesh, access_for(options.address, options.token), LAYOUTS)
-    feeding = asyncio.ensure_future(feed(mesh, store))
-    try:
-        await run_console(server, options.address, options.port)
-    finally:
-        feeding.cancel()
+def feed(mesh: InProcessMesh, store: FrameStore) -> None:
+    status, events = mesh.look()
+    store.update_mesh(status, time.monotonic())
+    if events:
+        store.add_events(events)
 
 
 def main() -> None:
@@ -50,14 +38,20 @@ def main() -> None:
     logging.basicConfig(level=logging.INFO)
     mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
     mesh.skip(options.skip)
+    store = FrameStore()
+    server = ConsoleServer(store, mesh, access_for(options.address, options.token), LAYOUTS)
+    runner = ConsoleRunner(server, options.address, options.port)
     stop = threading.Event()
-    running = threading.Thread(target=mesh.run, args=(stop,), daemon=True)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    running = threading.Thread(target=mesh.run, args=(stop,))
     running.start()
-    try:
-        asyncio.run(serve(options, mesh))
-    finally:
-        stop.set()
-        running.join()
+    runner.start()
+    print(f"serving on port {runner.port}", flush=True)
+    while not stop.wait(FRAME_PERIOD_S):
+        runner.in_loop(lambda: feed(mesh, store))
+    runner.stop()
+    running.join()
 
 
 if __name__ == "__main__":

@@ -57,9 +57,7 @@ class InProcessMesh:
                 self._batcher.observe(event)
             self._told = len(self._network.events)
             achieved = 0.0 if self.paused else self.factor
-            mesh = MeshStatus(
-                now_s, nodes, self._max_distance, self.factor, achieved, self.paused
-            )
+            mesh = MeshStatus(now_s, nodes, self._max_distance, self.factor, achieved, self.paused)
             return mesh, self._batcher.take()
 
     def place_of(self, node: int) -> tuple[float, float]:
@@ -97,9 +95,7 @@ class InProcessMesh:
 
     def _describe(self, node_id: int, node: Node) -> NodeStatus:
         status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
-        describe_component(
-            status, node.component, node.antenna.powered, self._network.clock.now_s
-        )
+        describe_component(status, node.component, node.antenna.powered, self._network.clock.now_s)
         return status
 
     def _view(self, node_id: int, node: Node) -> DroneView:

@@ -1,4 +1,4 @@
-"""The console's HTTP and WebSocket server (aiohttp).
+"""The console's page and WebSocket, as an ASGI application (Starlette).
 
 Everything in here runs in one event loop, which owns the FrameStore; only orders run in threads of
 their own, because they wait for others. Each page has one task that sends: it waits until its page
@@ -9,14 +9,22 @@ that takes nothing for SEND_TIMEOUT_S is cut off.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Awaitable, Callable, Sequence
+from typing import Any, Sequence
 
-from aiohttp import WSMsgType, web
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from drone_mesh.console.access import Access, AccessDenied
 from drone_mesh.console.frames import FrameStore
@@ -27,24 +35,71 @@ log = logging.getLogger(__name__)
 STATIC = Path(__file__).resolve().parent / "static"
 FRAME_PERIOD_S = 0.2  # 5 Hz
 SEND_TIMEOUT_S = 10.0
-PING_PERIOD_S = 10.0
 MOST_PAGES = 32
 MOST_ORDERS_WAITING = 16  # per page
-LARGEST_REQUEST_BYTES = 4096
+ORDER_THREADS = 8
 COOKIE = "drone_mesh_token"
+POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1
+TRY_LATER = 1013  # registry of close codes of RFC 6455
 
-Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
 
 
 @dataclass(eq=False)
 class Page:
     """One open page."""
 
-    socket: web.WebSocketResponse
-    transport: asyncio.WriteTransport | None
+    socket: WebSocket
     version: int = 0  # what it knows
     watching: int | None = None
     orders: set[asyncio.Task[None]] = field(default_factory=set)
+
+
+class Guard:
+    """ASGI middleware: turns away who may not see the console, and sets the pages' headers."""
+
+    def __init__(self, app: ASGIApp, access: Access) -> None:
+        self._app = app
+        self._access = access
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        connection = HTTPConnection(scope)
+        host = connection.headers.get("host", "")
+        try:
+            self._access.check_host(host)
+            self._access.check_token(
+                connection.query_params.get("token") or connection.cookies.get(COOKIE)
+            )
+            if scope["type"] == "websocket":
+                self._access.check_origin(connection.headers.get("origin"), host)
+        except AccessDenied as error:
+            who = connection.client.host if connection.client else "somebody"
+            log.warning("console: refused %s: %s", who, error)
+            if scope["type"] == "websocket":
+                await WebSocket(scope, receive, send).close(POLICY_VIOLATION)
+            else:
+                await PlainTextResponse(f"{error}\n", 403)(scope, receive, send)
+            return
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [
+                    *message["headers"],
+                    *((name.lower().encode(), value.encode()) for name, value in _HEADERS.items()),
+                ]
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
 
 
 class ConsoleServer:
@@ -62,71 +117,60 @@ class ConsoleServer:
     ) -> None:
         self._store = store
         self._controls = controls
-        self._access = access
         self._layouts = layouts
         self._pages: set[Page] = set()
-        self._workers = ThreadPoolExecutor(max_workers=8, thread_name_prefix="order")
-        self.app = web.Application(middlewares=[self._guard], client_max_size=LARGEST_REQUEST_BYTES)
-        self.app.router.add_get("/", self._index)
-        self.app.router.add_get("/ws", self._websocket)
-        self.app.router.add_static("/static", STATIC)
-        self.app.on_shutdown.append(self._close_pages)
-
-    @web.middleware
-    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        try:
-            self._access.check_host(request.host)
-            self._access.check_token(request.query.get("token") or request.cookies.get(COOKIE))
-        except AccessDenied as error:
-            log.warning("console: refused %s: %s", request.remote, error)
-            return web.Response(status=403, text=f"{error}\n")
-        response = await handler(request)
-        if not response.prepared:
-            response.headers["Content-Security-Policy"] = (
-                "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-            )
-            response.headers["X-Content-Type-Options"] = "nosniff"
-            response.headers["Referrer-Policy"] = "no-referrer"
-            response.headers["Cache-Control"] = "no-cache"
-        return response
-
-    async def _index(self, request: web.Request) -> web.StreamResponse:
-        if "token" in request.query:
-            moved = web.Response(status=303, headers={"Location": "/"})
-            moved.set_cookie(COOKIE, request.query["token"], httponly=True, samesite="Strict")
-            return moved
-        return web.FileResponse(STATIC / "index.html")
-
-    async def _websocket(self, request: web.Request) -> web.StreamResponse:
-        try:
-            self._access.check_origin(request.headers.get("Origin"), request.host)
-        except AccessDenied as error:
-            log.warning("console: refused %s: %s", request.remote, error)
-            return web.Response(status=403, text=f"{error}\n")
-        if len(self._pages) >= MOST_PAGES:
-            return web.Response(status=503, text=f"{MOST_PAGES} pages are open already\n")
-        socket = web.WebSocketResponse(
-            heartbeat=PING_PERIOD_S, compress=False, max_msg_size=LARGEST_REQUEST_BYTES
+        self._workers = ThreadPoolExecutor(ORDER_THREADS, thread_name_prefix="order")
+        self.app = Starlette(
+            routes=[
+                Route("/", self._index),
+                Mount("/static", StaticFiles(directory=STATIC)),
+                WebSocketRoute("/ws", self._websocket),
+            ],
+            middleware=[Middleware(Guard, access=access)],
         )
-        await socket.prepare(request)
-        page = Page(socket, request.transport)
+
+    def close(self) -> None:
+        """Take no more orders. Those under way end by themselves."""
+        self._workers.shutdown(wait=False)
+
+    async def _index(self, request: Request) -> Response:
+        if "token" in request.query_params:
+            moved = RedirectResponse("/", 303)
+            moved.set_cookie(
+                COOKIE, request.query_params["token"], httponly=True, samesite="strict"
+            )
+            return moved
+        return FileResponse(STATIC / "index.html")
+
+    async def _websocket(self, socket: WebSocket) -> None:
+        if len(self._pages) >= MOST_PAGES:
+            await socket.close(TRY_LATER)
+            return
+        page = Page(socket)
         self._pages.add(page)
-        sender = asyncio.ensure_future(self._send_frames(page))
+        sender = None
         try:
-            async for message in socket:
-                if message.type == WSMsgType.TEXT:
-                    await self._on_request(page, message.data)
+            await socket.accept()
+            sender = asyncio.ensure_future(self._send_frames(page))
+            receiver = asyncio.ensure_future(self._receive(page))
+            await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
+            receiver.cancel()
+            await asyncio.gather(receiver, return_exceptions=True)
         finally:
             self._pages.discard(page)
-            sender.cancel()
-            await asyncio.gather(sender, return_exceptions=True)
-        return socket
+            if sender is not None:
+                sender.cancel()
+                await asyncio.gather(sender, return_exceptions=True)
+
+    async def _receive(self, page: Page) -> None:
+        async for text in page.socket.iter_text():
+            await self._on_request(page, text)
 
     async def _send_frames(self, page: Page) -> None:
         loop = asyncio.get_running_loop()
         try:
             await self._send(page, json.dumps({"type": "hello", "layouts": list(self._layouts)}))
-            while not page.socket.closed:
+            while True:
                 started = loop.time()
                 if page.version != self._store.version:
                     frame, page.version = self._store.frame_since(page.version), self._store.version
@@ -136,13 +180,11 @@ class ConsoleServer:
                 await asyncio.sleep(max(0.0, started + FRAME_PERIOD_S - loop.time()))
         except asyncio.TimeoutError:
             log.info("console: a page took nothing for %g s and is cut off", SEND_TIMEOUT_S)
-            if page.transport is not None:
-                page.transport.abort()
-        except ConnectionError:
+        except (WebSocketDisconnect, RuntimeError):
             log.debug("console: a page is gone")
 
     async def _send(self, page: Page, text: str) -> None:
-        await asyncio.wait_for(page.socket.send_str(text), SEND_TIMEOUT_S)
+        await asyncio.wait_for(page.socket.send_text(text), SEND_TIMEOUT_S)
 
     def _detail(self, node: int) -> str:
         return json.dumps(
@@ -153,12 +195,12 @@ class ConsoleServer:
         try:
             request = parse_request(text)
         except OrderRefused as error:
-            await self._send(page, _answer(_number_in(text), False, str(error)))
+            await self._answer(page, _number_in(text), False, str(error))
             return
         if isinstance(request, Watch):
             page.watching = request.node
         elif len(page.orders) >= MOST_ORDERS_WAITING:
-            await self._send(page, _answer(request.number, False, "too many orders at once"))
+            await self._answer(page, request.number, False, "too many orders at once")
         else:
             task = asyncio.ensure_future(self._carry_out(page, request))
             page.orders.add(task)
@@ -168,28 +210,22 @@ class ConsoleServer:
         loop = asyncio.get_running_loop()
         try:
             text = await loop.run_in_executor(self._workers, order.carry_out, self._controls)
-            answer = _answer(order.number, True, text)
         except OrderRefused as error:
-            answer = _answer(order.number, False, str(error))
-        try:
-            await self._send(page, answer)
-        except (ConnectionError, asyncio.TimeoutError):
-            log.debug("console: a page went before its answer came")
+            await self._answer(page, order.number, False, str(error))
+        else:
+            await self._answer(page, order.number, True, text)
 
-    async def _close_pages(self, _app: web.Application) -> None:
-        for page in list(self._pages):
-            await page.socket.close(code=1001, message=b"the console stops")
-        self._workers.shutdown(wait=False)
-
-
-def _answer(number: Any, done: bool, text: str) -> str:
-    return json.dumps({"type": "answer", "number": number, "done": done, "text": text})
+    async def _answer(self, page: Page, number: int | None, done: bool, text: str) -> None:
+        answer = {"type": "answer", "number": number, "done": done, "text": text}
+        # A page that went meanwhile wants no answer.
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
+            await self._send(page, json.dumps(answer))
 
 
 def _number_in(text: str) -> int | None:
     """The number of a refused request, so that the page knows which one it was."""
     try:
-        number = json.loads(text).get("number")
+        number: Any = json.loads(text).get("number")
     except (ValueError, AttributeError):
         return None
     return number if isinstance(number, int) else None
