@@ -26,7 +26,12 @@ def create_routing_technique(name: str) -> IRoutingTechnique:
         raise ConfigurationError(
             f"routing technique {name!r} is not known: use one of {known}, or package.module:Class"
         )
-    technique = make()
+    try:
+        technique = make()
+    except TypeError as error:  # no class, or one that wants arguments or lacks functions
+        raise ConfigurationError(
+            f"routing technique {name!r} cannot be made by its name alone: {error}"
+        ) from error
     if not isinstance(technique, IRoutingTechnique):
         raise ConfigurationError(f"routing technique {name!r} is not an IRoutingTechnique")
     return technique
@@ -37,7 +42,7 @@ def _from_module(module_name: str, class_name: str) -> Callable[[], IRoutingTech
         made: Callable[[], IRoutingTechnique] = getattr(
             importlib.import_module(module_name), class_name
         )
-    except (ImportError, AttributeError, ValueError) as error:
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
         raise ConfigurationError(
             f"routing technique {module_name}:{class_name} cannot be loaded: {error}"
         ) from error
