@@ -1,0 +1,22 @@
+"""A routing technique of somebody else, and what is none: for test_routing.py."""
+
+from drone_mesh.communication.child_table_tree import ChildTableTree
+
+
+class ForeignTree(ChildTableTree):
+    """Chosen as routing_for_tests:ForeignTree."""
+
+
+class NotRouting:
+    """Has none of the functions."""
+
+
+class WantsArguments(ChildTableTree):
+    """Cannot be made by name alone."""
+
+    def __init__(self, depth):
+        super().__init__()
+        self.depth = depth
+
+
+A_NUMBER = 7

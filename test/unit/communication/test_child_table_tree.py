@@ -1,0 +1,253 @@
+"""ChildTableTree: the original's own cases, and each rule of the reference, section 8."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drone_mesh.communication.child_table_tree import ChildTableTree
+from drone_mesh.communication.interfaces import NO_ROUTE, IRoutingEssentials, IRoutingTechnique
+
+
+class Essentials(IRoutingEssentials):
+    """A component that keeps what it was asked for; neighbours in `gone` take no heartbeat."""
+
+    def __init__(self, tree=None, gone=()):
+        self.asked = []
+        self._tree = tree
+        self._gone = gone
+
+    def search_other_nodes_in_range(self):
+        self.asked.append("search")
+
+    def send_heartbeat(self, other):
+        self.asked.append(other)
+        if other in self._gone:
+            for node in self._gone:
+                self._tree.cant_communicate_with_node(node)
+            return False
+        return True
+
+
+def tree_with(*pairs):
+    tree = ChildTableTree()
+    for other, node in pairs:
+        tree.other_can_communicate_with_node(other, node)
+    return tree
+
+
+def test_the_original_case_of_a_grandchild_under_two_children():
+    tree = tree_with((1, 4), (2, 5), (3, 5))
+    assert tree.get_direction_to_node(5) == 2
+    assert tree.other_cant_communicate_with_node(2, 5) == 0
+    assert tree.get_direction_to_node(5) == 3
+
+
+def test_the_original_case_of_a_child_that_is_lost():
+    tree = tree_with((1, 4), (2, 5), (3, 6))
+    assert (tree.get_table_size(), tree.get_amount_of_children()) == (6, 3)
+    assert tree.cant_communicate_with_node(2) == 1
+    assert tree.get_direction_to_node(5) == NO_ROUTE
+
+
+def test_a_new_tree_knows_nobody():
+    tree = ChildTableTree()
+    assert tree.empty()
+    assert (tree.get_table_size(), tree.get_amount_of_children()) == (0, 0)
+    assert tree.get_set_of_children() == frozenset()
+    assert tree.get_direction_to_node(0) == NO_ROUTE
+
+
+def test_a_child_is_reached_directly_even_if_another_child_has_it_too():
+    tree = tree_with((1, 4))
+    tree.can_communicate_with_node(4)
+    assert tree.get_direction_to_node(4) == 4
+
+
+def test_the_lowest_child_leads_to_a_grandchild_in_whatever_order_they_were_learned():
+    assert tree_with((9, 5), (3, 5), (7, 5)).get_direction_to_node(5) == 3
+
+
+def test_a_grandchild_under_two_children_counts_twice_in_the_size():
+    assert tree_with((1, 5), (2, 5)).get_table_size() == 4
+
+
+def test_learning_the_same_again_changes_nothing():
+    tree = tree_with((1, 5), (1, 5))
+    tree.can_communicate_with_node(1)
+    assert (tree.get_table_size(), tree.get_direction_to_node(5)) == (2, 1)
+
+
+def test_losing_a_child_that_another_child_has_is_not_losing_the_node():
+    tree = tree_with((1, 4), (2, 1))
+    assert tree.cant_communicate_with_node(1) == 0
+    assert tree.get_direction_to_node(1) == 2
+    assert tree.get_direction_to_node(4) == NO_ROUTE
+
+
+def test_losing_a_grandchild_that_is_a_child_as_well_is_not_losing_the_node():
+    tree = tree_with((1, 4))
+    tree.can_communicate_with_node(4)
+    assert tree.other_cant_communicate_with_node(1, 4) == 0
+    assert tree.get_direction_to_node(4) == 4
+
+
+def test_losing_the_only_way_to_a_grandchild_is_losing_the_node():
+    tree = tree_with((1, 4))
+    assert tree.other_cant_communicate_with_node(1, 4) == 1
+    assert tree.get_direction_to_node(4) == NO_ROUTE
+    assert tree.get_set_of_children() == {1}
+
+
+def test_what_was_not_known_cannot_be_lost():
+    tree = tree_with((1, 4))
+    assert tree.cant_communicate_with_node(4) == 0
+    assert tree.cant_communicate_with_node(7) == 0
+    assert tree.other_cant_communicate_with_node(1, 7) == 0
+    assert tree.other_cant_communicate_with_node(7, 4) == 0
+    assert tree.get_table_size() == 2
+
+
+def test_a_node_that_cannot_reach_itself_is_a_lost_child():
+    tree = tree_with((1, 4))
+    assert tree.other_cant_communicate_with_node(1, 1) == 1
+    assert tree.empty()
+
+
+def test_moving_forgets_everything():
+    tree = tree_with((1, 4), (2, 5))
+    tree.node_moved_location()
+    assert tree.empty()
+    assert tree.get_table_size() == 0
+    assert tree.get_direction_to_node(5) == NO_ROUTE
+
+
+def test_starting_searches_others_and_sends_no_heartbeat():
+    tree, essentials = tree_with((1, 4)), Essentials()
+    tree.start_routing(essentials)
+    assert essentials.asked == ["search"]
+
+
+def test_maintaining_searches_again_and_sends_a_heartbeat_to_each_child():
+    tree, essentials = tree_with((3, 4), (1, 4)), Essentials()
+    tree.start_routing(essentials)
+    tree.maintain_routing()
+    assert essentials.asked == ["search", "search", 1, 3]
+
+
+def test_maintaining_goes_on_when_a_heartbeat_costs_more_than_one_child():
+    tree = tree_with((1, 4), (2, 5), (3, 6))
+    essentials = Essentials(tree, gone=(1, 2))
+    tree.start_routing(essentials)
+    tree.maintain_routing()
+    assert essentials.asked == ["search", "search", 1, 3]
+
+
+def test_maintaining_before_starting_is_a_mistake():
+    with pytest.raises(RuntimeError, match="maintain_routing before start_routing"):
+        ChildTableTree().maintain_routing()
+
+
+def test_a_proven_path_takes_a_node_away_from_all_other_children():
+    tree = tree_with((1, 5), (2, 5), (3, 6))
+    tree.proven_path_to_node(3, 5)
+    assert tree.get_direction_to_node(5) == 3
+    assert tree.get_table_size() == 5  # 1, 2, 3 and 5, 6 under 3
+
+
+def test_a_proven_path_leaves_a_child_a_child():
+    tree = tree_with((1, 5))
+    tree.can_communicate_with_node(5)
+    tree.proven_path_to_node(1, 5)
+    assert tree.get_direction_to_node(5) == 5
+
+
+class Naive(IRoutingTechnique):
+    """The words of section 8, with nothing made fast. `proven_path_to_node` is the interface's."""
+
+    def __init__(self):
+        self.sets = {}
+
+    def reachable(self, node):
+        return node in self.sets or any(node in behind for behind in self.sets.values())
+
+    def get_direction_to_node(self, node):
+        if node in self.sets:
+            return node
+        return min((child for child in self.sets if node in self.sets[child]), default=NO_ROUTE)
+
+    def start_routing(self, essentials):
+        raise NotImplementedError
+
+    def maintain_routing(self):
+        raise NotImplementedError
+
+    def node_moved_location(self):
+        self.sets = {}
+
+    def cant_communicate_with_node(self, node):
+        removed = self.sets.pop(node, None) is not None
+        return int(removed and not self.reachable(node))
+
+    def other_cant_communicate_with_node(self, other, node):
+        if other == node:
+            return self.cant_communicate_with_node(node)
+        removed = node in self.sets.get(other, ())
+        if removed:
+            self.sets[other] = self.sets[other] - {node}
+        return int(removed and not self.reachable(node))
+
+    def can_communicate_with_node(self, node):
+        self.sets.setdefault(node, set())
+
+    def other_can_communicate_with_node(self, other, node):
+        self.can_communicate_with_node(other)
+        if other != node:
+            self.sets[other] = self.sets[other] | {node}
+
+    def get_table_size(self):
+        return sum(1 + len(behind) for behind in self.sets.values())
+
+    def get_amount_of_children(self):
+        return len(self.sets)
+
+    def get_set_of_children(self):
+        return frozenset(self.sets)
+
+    def empty(self):
+        return not self.sets
+
+
+node_id = st.integers(0, 6)  # few, so that they meet
+operation = st.one_of(
+    st.tuples(
+        st.sampled_from(["can_communicate_with_node", "cant_communicate_with_node"]), node_id
+    ),
+    st.tuples(
+        st.sampled_from(
+            [
+                "other_can_communicate_with_node",
+                "other_cant_communicate_with_node",
+                "proven_path_to_node",
+            ]
+        ),
+        node_id,
+        node_id,
+    ),
+    st.tuples(st.just("node_moved_location")),
+)
+
+
+@settings(derandomize=True, deadline=None, database=None, max_examples=150)
+@given(st.lists(operation, max_size=40))
+def test_does_what_the_words_of_the_reference_say(operations):
+    tree, naive = ChildTableTree(), Naive()
+    for name, *ids in operations:
+        assert getattr(tree, name)(*ids) == getattr(naive, name)(*ids), (name, ids)
+        for node in range(8):
+            assert tree.get_direction_to_node(node) == naive.get_direction_to_node(node)
+        assert tree.get_table_size() == naive.get_table_size()
+        assert tree.get_amount_of_children() == naive.get_amount_of_children()
+        assert tree.get_set_of_children() == naive.get_set_of_children()
+        assert tree.empty() == naive.empty()
