@@ -1,0 +1,69 @@
+"""RosDroneEngineConnector: a mesh component's way to the engine of its drone."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+
+import rospy
+
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import LocationUnknown
+from drone_mesh.msg import Location as LocationMsg
+from drone_mesh.ros import names
+from drone_mesh.ros.conversions import location_msg
+from drone_mesh.ros.logs import ThrottledLog
+from drone_mesh.ros.persistent_service import PersistentService, ServiceGone, ServiceRefused
+from drone_mesh.srv import RequestGPS, RequestGPSRequest
+
+CONNECT_AGAIN_AFTER_S = 1.0  # our choice: wall seconds; asking costs the worker's time
+
+_log = logging.getLogger(__name__)
+
+
+class RosDroneEngineConnector(IDroneEngine):
+    """Publishes /Drones/<id>/goal (Location), calls /Drones/<id>/gps (RequestGPS).
+
+    Belongs to the executor's worker. The connection is made when it is first needed and kept.
+    """
+
+    def __init__(self, node_id: int) -> None:
+        self._node_id = node_id
+        self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
+        self._gone_until_s = -math.inf  # monotonic
+        self._complaints = ThrottledLog(_log)
+        self._goal = rospy.Publisher(names.goal_topic(node_id), LocationMsg, queue_size=10)
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly there (metres); the height is rounded to whole metres, as its field is."""
+        self._goal.publish(location_msg(latitude, longitude, height))
+
+    def get_location(self) -> Location:
+        """Where the engine says that it is. Raises LocationUnknown when nobody answers."""
+        try:
+            answer = self._ask()
+        except (ServiceGone, ServiceRefused) as error:
+            self._complaints.warning(f"drone {self._node_id} has no position", str(error))
+            raise LocationUnknown(str(error)) from error
+        return Location(answer.latitude, answer.longitude, float(answer.height))
+
+    def close(self) -> None:
+        """Give connection and topic back."""
+        self._gps.close()
+        self._goal.unregister()
+
+    def _ask(self) -> Location:
+        if not self._gps.is_connected():
+            if time.monotonic() < self._gone_until_s:
+                raise ServiceGone(f"{self._gps.name}: nobody answered a moment ago")
+            try:
+                self._gps.connect()
+            except ServiceGone:
+                self._gone_until_s = time.monotonic() + CONNECT_AGAIN_AFTER_S
+                raise
+        try:
+            return self._gps.call(RequestGPSRequest())
+        except ServiceGone:
+            self._gone_until_s = time.monotonic() + CONNECT_AGAIN_AFTER_S
+            raise

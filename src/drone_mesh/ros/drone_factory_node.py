@@ -1,0 +1,80 @@
+"""The node /DroneFactory: the world, the drones in it, and by default their Raspberry Pis."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import sys
+
+import rospy
+
+from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.ros.engine_server import EngineServer, PositionReporter
+from drone_mesh.ros.fleet import mesh_settings, tell_hosts
+from drone_mesh.ros.logs import show_library_logs_on_rosout
+from drone_mesh.ros.mesh_host import MeshHost
+from drone_mesh.ros.parameters import factory_configuration, or_stop
+from drone_mesh.ros.virtual_raspberry_pi import MeshSettings
+from drone_mesh.ros.world_runner import WorldRunner
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.factory import DroneFactory, plan_fleet
+
+_log = logging.getLogger(__name__)
+
+
+def _read_parameters() -> tuple[FactoryConfiguration, MeshSettings, int]:
+    keys = [key.name for key in dataclasses.fields(FactoryConfiguration)]
+    configuration = factory_configuration(*keys)
+    fleet = (configuration.gateways, configuration.routers)
+    plan_fleet(*fleet, configuration.gridsize, configuration.spacing)
+    hosts = rospy.get_param("~hosts", "") or 1
+    try:
+        return configuration, mesh_settings(configuration), int(hosts)
+    except ValueError:
+        raise ConfigurationError(f"argument: hosts is {hosts!r}, want a whole number") from None
+
+
+def main() -> None:
+    """Run the node.
+
+    Parameters (private): all keys of config/factory.yaml, each overruling the file; ~config, that
+    file; ~hosts (int, 1): 1 = the nodes run in this process, otherwise they are left to others.
+    """
+    rospy.init_node("DroneFactory")
+    show_library_logs_on_rosout()
+    configuration, settings, hosts = or_stop(_read_parameters)
+    host = None
+    with BulletWorld() as world:
+        factory = DroneFactory(
+            world,
+            configuration.gateways,
+            configuration.routers,
+            configuration.gridsize,
+            configuration.spacing,
+            configuration.debug,
+        )
+        _log.info(
+            "%d gateways and %d routers, %g m apart",
+            configuration.gateways,
+            configuration.routers,
+            configuration.spacing,
+        )
+        reporter = PositionReporter(factory.drones)
+        for drone in factory.drones:
+            EngineServer(drone, reporter)
+        if hosts == 1 and factory.drones:
+            host = MeshHost(settings, lambda: world.now_s)
+            host.start()
+            host.wait_for_simulator(rospy.is_shutdown)
+            host.serve(drone.node_id for drone in factory.drones)
+        tell_hosts(configuration)
+        try:
+            runner = WorldRunner(
+                world, configuration.real_time_factor, None if host is None else host.executor
+            )
+            runner.run()
+        finally:
+            if host is not None:
+                host.stop()
+    sys.exit(0)

@@ -1,0 +1,126 @@
+"""The node mesh_host: virtual Raspberry Pis apart from the world, perhaps on another machine."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from typing import Callable
+
+import rospy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
+
+from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.execution import MeshExecutor
+from drone_mesh.ros import names
+from drone_mesh.ros.fleet import fleet_from_parameter, mesh_settings
+from drone_mesh.ros.logs import show_library_logs_on_rosout
+from drone_mesh.ros.mesh_host import MeshHost
+from drone_mesh.ros.parameters import or_stop
+from drone_mesh.ros.persistent_service import PersistentService, ServiceGone
+from drone_mesh.srv import PowerSwitch
+
+LOOK_PERIOD_S = 0.1
+TELL_PERIOD_S = 5.0  # wall; while there is nothing to do but wait
+
+_log = logging.getLogger(__name__)
+
+
+class FollowedClock:
+    """Simulated time as /clock tells it. `now_s` is set by rospy's thread and read by all."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self._executor: MeshExecutor | None = None
+        self._progress = rospy.Publisher(
+            names.PROGRESS_TOPIC, Header, tcp_nodelay=True, queue_size=100
+        )
+        rospy.Subscriber(names.CLOCK_TOPIC, Clock, self._advance, tcp_nodelay=True)
+
+    def drive(self, executor: MeshExecutor) -> None:
+        """Let this executor know of the time, and the world of what it has worked off."""
+        self._executor = executor
+
+    def _advance(self, clock: Clock) -> None:
+        self.now_s = clock.clock.to_sec()
+        if self._executor is not None:
+            progress = Header(stamp=clock.clock, frame_id=rospy.get_name())
+            self._executor.time_advanced()
+            # Comes after everything that was due by now, or was submitted before.
+            self._executor.submit(lambda _now_s: self._progress.publish(progress))
+
+
+def _wait_for(what: str, is_there: Callable[[], bool]) -> None:
+    told_s = time.monotonic()
+    while not is_there() and not rospy.is_shutdown():
+        if time.monotonic() - told_s >= TELL_PERIOD_S:
+            told_s = time.monotonic()
+            _log.info("waiting for %s", what)
+        time.sleep(LOOK_PERIOD_S)
+
+
+def _whole_parameter(name: str) -> int:
+    value = rospy.get_param(f"~{name}", "")
+    try:
+        return int(value)
+    except ValueError:
+        raise ConfigurationError(f"{name} is {value!r}, want a whole number") from None
+
+
+def _is_served(node_id: int) -> bool:
+    switch = PersistentService(names.power_switch(node_id), PowerSwitch)
+    try:
+        switch.connect()
+    except ServiceGone:
+        return False
+    switch.close()
+    return True
+
+
+def ids_to_serve(fleet: FactoryConfiguration) -> range:
+    """The ids that the parameters ask for: ~first..~last, or share ~index of ~hosts equal ones.
+
+    Raises ConfigurationError for ids that the world has not made or somebody serves already.
+    """
+    count = fleet.gateways + fleet.routers
+    if rospy.has_param("~hosts"):
+        hosts, index = _whole_parameter("hosts"), _whole_parameter("index")
+        ids = range(count * (index - 1) // hosts, count * index // hosts)
+    else:
+        ids = range(_whole_parameter("first"), _whole_parameter("last") + 1)
+        if len(ids) == 0 or ids[0] < 0 or ids[-1] >= count:
+            raise ConfigurationError(
+                f"first..last is {ids.start}..{ids.stop - 1}; the world has drones 0..{count - 1}"
+            )
+    served = [node_id for node_id in ids if _is_served(node_id)]
+    if served:
+        raise ConfigurationError(f"node {served[0]} is already served by another process")
+    return ids
+
+
+def main() -> None:
+    """Run the node.
+
+    Parameters (private): ~first and ~last (int): the ids to serve; or ~index and ~hosts (int):
+    share number ~index (from 1) of ~hosts equal shares of all drones.
+    """
+    rospy.init_node("mesh_host")
+    show_library_logs_on_rosout()
+    clock = FollowedClock()
+    _wait_for("/DroneFactory to make the drones", lambda: rospy.has_param(names.FLEET_PARAM))
+    _wait_for("/clock", lambda: clock.now_s > 0.0)
+    if rospy.is_shutdown():
+        return
+    fleet = fleet_from_parameter()
+    ids = or_stop(lambda: ids_to_serve(fleet))
+    _log.info("serving %d drones: %s", len(ids), f"{ids.start}..{ids.stop - 1}" if ids else "none")
+    host = MeshHost(or_stop(lambda: mesh_settings(fleet)), lambda: clock.now_s)
+    clock.drive(host.executor)
+    host.start()
+    host.wait_for_simulator(rospy.is_shutdown)
+    host.serve(ids)
+    rospy.spin()
+    host.stop()
+    sys.exit(0)

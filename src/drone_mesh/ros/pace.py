@@ -1,0 +1,36 @@
+"""Pace: when the next step of the world is due on the wall clock."""
+
+from __future__ import annotations
+
+CATCH_UP_S = 0.5  # our choice: lost wall time up to this is made up for, more is gone
+
+
+class Pace:
+    """Keeps simulated time at a multiple of wall time. Belongs to the thread that steps."""
+
+    def __init__(self, factor: float) -> None:
+        """`factor`: simulated seconds per wall second; 0: as fast as it goes."""
+        self._factor = factor
+        self._simulated_s = self._wall_s = 0.0
+        self._started = False
+
+    @property
+    def factor(self) -> float:
+        """Simulated seconds per wall second; 0: as fast as it goes."""
+        return self._factor
+
+    def restart(self, factor: float) -> None:
+        """From now on go at this factor; the time that went by meanwhile is not made up for."""
+        self._factor = factor
+        self._started = False
+
+    def wait_s(self, simulated_s: float, wall_s: float) -> float:
+        """Wall seconds until the step from `simulated_s` on is due; 0: now."""
+        if self._factor == 0.0:
+            return 0.0
+        if self._started:
+            due_s = self._wall_s + (simulated_s - self._simulated_s) / self._factor
+            if wall_s - due_s <= CATCH_UP_S:
+                return max(0.0, due_s - wall_s)
+        self._simulated_s, self._wall_s, self._started = simulated_s, wall_s, True
+        return 0.0
