@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -16,6 +18,16 @@ def files_below(folder: Path) -> set[str]:
         for path in folder.rglob("*")
         if path.is_file() and path.suffix != ".pyc" and not path.name.startswith(".")
     }
+
+
+def top_level_imports(source: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names.add(node.module.split(".")[0])
+    return names
 
 
 def test_each_file_of_the_python_package_is_installed(tmp_path: Path) -> None:
@@ -35,3 +47,18 @@ def test_each_folder_that_ros_reads_is_installed() -> None:
     (folders,) = re.findall(r"^install\(DIRECTORY ([\w ]+)$", cmake, flags=re.MULTILINE)
     read_by_ros = {"config", "launch", "rviz"} & {path.name for path in ROOT.iterdir()}
     assert set(folders.split()) >= read_by_ros
+
+
+def test_each_ros_package_that_is_used_is_declared() -> None:
+    manifest = ElementTree.parse(str(ROOT / "package.xml"))
+    depends = [element for element in manifest.getroot() if element.tag.endswith("depend")]
+    declared = {(element.text or "").replace("python3-", "") for element in depends}
+    sources = [*(ROOT / "src").rglob("*.py"), *(ROOT / "test" / "rostest").glob("*.py")]
+    imported = {name for source in sources for name in top_level_imports(source)}
+    launched = {
+        match
+        for launch in [*(ROOT / "launch").rglob("*.launch"), *ROOT.glob("test/rostest/*.test")]
+        for match in re.findall(r'pkg="(\w+)"', launch.read_text(encoding="utf-8"))
+    }
+    of_ros = {name for name in imported if re.fullmatch(r"genpy|ros\w+|tf2?|\w+_msgs", name)}
+    assert (of_ros | launched) - declared == {"drone_mesh"}
