@@ -14,9 +14,11 @@ from drone_mesh.ros.engine_server import EngineServer, PositionReporter
 from drone_mesh.ros.fleet import mesh_settings, tell_hosts
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.mesh_host import MeshHost
+from drone_mesh.ros.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.parameters import factory_configuration, or_stop
 from drone_mesh.ros.virtual_raspberry_pi import MeshSettings
 from drone_mesh.ros.world_runner import WorldRunner
+from drone_mesh.state.observation import view_drone
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory, plan_fleet
 
@@ -73,7 +75,18 @@ def main() -> None:
             runner = WorldRunner(
                 world, configuration.real_time_factor, None if host is None else host.executor
             )
+            state = MeshStatePublisher(
+                lambda: WorldView(
+                    world.now_s,
+                    [view_drone(drone, world.now_s) for drone in factory.drones],
+                    runner.wanted_factor,
+                    runner.paused,
+                ),
+                configuration.max_distance,
+            )
+            state.start()
             runner.run()
+            state.stop()
         finally:
             if host is not None:
                 host.stop()

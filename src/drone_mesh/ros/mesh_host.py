@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import time
 from typing import Callable, Iterable
 
 from drone_mesh.execution import MeshExecutor
+from drone_mesh.ros.host_reports import HostReports
 from drone_mesh.ros.simulator_link import SimulatorLink
 from drone_mesh.ros.virtual_raspberry_pi import (
     MeshSettings,
@@ -29,7 +31,8 @@ class MeshHost:
 
     def __init__(self, settings: MeshSettings, clock: Callable[[], float]) -> None:
         """`clock` gives simulated seconds; whoever moves it calls `executor.time_advanced`."""
-        self._settings = settings
+        self._reports = HostReports()
+        self._settings = dataclasses.replace(settings, observer=self._reports.observe)
         self.executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_host")
         self._link = SimulatorLink(self.executor)
         self.nodes: dict[int, VirtualRaspberryPi] = {}
@@ -38,6 +41,7 @@ class MeshHost:
         """Start to work; there are no nodes yet."""
         self.executor.start()
         self._link.start()
+        self._reports.start()
 
     def wait_for_simulator(self, give_up: Callable[[], bool]) -> None:
         """Return when packets can be sent, when that takes too long, or as soon as `give_up` says.
@@ -65,6 +69,7 @@ class MeshHost:
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. The nodes leave the ROS graph with it."""
+        self._reports.stop()
         self._link.stop()
         self.executor.stop()
 
@@ -75,6 +80,7 @@ class MeshHost:
 
         def start(now_s: float) -> None:
             node = self.nodes[node_id] = kind(node_id, self._settings, self._link, seat)
+            self._reports.add(node.component, node.antenna.on)
             node.start(now_s)
 
         seat.submit(start)

@@ -76,6 +76,16 @@ class WorldRunner:
         self._factor = rospy.Publisher(names.FACTOR_TOPIC, Float32, latch=True, queue_size=1)
         rospy.Service(names.SPEED_SERVICE, SetSpeed, self._set_speed)
 
+    @property
+    def wanted_factor(self) -> float:
+        """Simulated seconds per wall second, as asked for; 0: as fast as it goes. Any thread."""
+        return self._wanted
+
+    @property
+    def paused(self) -> bool:
+        """Whether time stands still. Any thread."""
+        return self._paused
+
     def run(self) -> None:
         """Step until ROS shuts down."""
         pace = Pace(self._wanted)
