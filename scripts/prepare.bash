@@ -19,6 +19,7 @@ else
     ros-core ros-message-generation ros-message-runtime rosbash
     libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev librostest-dev
     libstd-msgs-dev libtf2-msgs-dev libvisualization-msgs-dev
+    ros-{diagnostic,geometry,rosgraph,std,tf2,visualization}-msgs
     python3-{diagnostic,geometry,tf2,visualization}-msgs python3-rospy python3-rostest
   )
   rviz_package=rviz
