@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import abc
 from collections import deque
-from typing import Protocol, Tuple
+from typing import Protocol, Tuple, TypeVar
 
 from drone_mesh.world.flight_path import Vector
 
 Colour = Tuple[float, float, float, float]  # red, green, blue, opacity: 0..1
+
+_AnyWorld = TypeVar("_AnyWorld", bound="World")
 
 TICKS_PER_S = 100  # steps and /clock at 100 Hz of simulated time, reference, section 11
 
@@ -72,7 +74,7 @@ class World(abc.ABC):
     def _advance(self) -> None:
         """One tick of physics, after the movers have moved."""
 
-    def __enter__(self) -> World:
+    def __enter__(self: _AnyWorld) -> _AnyWorld:
         return self
 
     def __exit__(self, *_exc: object) -> None:
