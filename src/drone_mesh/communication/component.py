@@ -353,9 +353,9 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             if sent_on is None:
                 self._drop("a heartbeat with too many hops", payload)
                 return
-            if identity:
-                self._circulation.passed(identity, from_, to, self._now_s)
             if self._send(sent_on, to):
+                if identity:
+                    self._circulation.passed(identity, from_, to, self._now_s)
                 return
 
     def _drop_circulating(self, payload: bytes, forward: int, used: int) -> None:
