@@ -1,0 +1,201 @@
+"""One mesh component on a bench: literal packets in, literal packets out.
+
+Packets are written as hex: creator, from, type, to, forward, body; zeros at the end are left out.
+"""
+
+from __future__ import annotations
+
+import random
+
+from drone_mesh.communication.child_table_tree import ChildTableTree
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.router import MeshnetworkRouter
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import LocationUnknown
+
+FIRST_CHECK_S = 5.0  # half a period: see AlwaysHalf
+PERIOD_S = 10.0
+
+
+def packet(text):
+    """The 32 bytes that are written as `text`."""
+    return bytes.fromhex(text).ljust(32, b"\0")
+
+
+class RecordingAntenna(IWirelessCommunication):
+    """Keeps what is sent. Loses the next `losing` packets; `dead` neighbours never take one.
+
+    `gets_lost(payload)` says so of single packets.
+    """
+
+    def __init__(self):
+        self.taken = []
+        self.tried = []
+        self.broadcasts = []
+        self.calls = []
+        self.dead = set()
+        self.losing = 0
+        self.gets_lost = lambda payload: False
+        self.powered = True
+
+    def start_antenna(self, mesh):
+        self.calls.append(("start_antenna", mesh))
+
+    def stop_antenna(self):
+        self.calls.append(("stop_antenna",))
+
+    def send_message_to(self, payload):
+        assert len(payload) == 32
+        self.tried.append(payload)
+        if self.losing:
+            self.losing -= 1
+            return False
+        if not self.powered or payload[3] in self.dead or self.gets_lost(payload):
+            return False
+        self.taken.append(payload)
+        return True
+
+    def broadcast_message(self, payload):
+        assert len(payload) == 32
+        if self.powered:
+            self.broadcasts.append(payload)
+
+    def debugging_mode(self, info, on):
+        self.calls.append(("debugging_mode", info, on))
+
+    def on(self):
+        return self.powered
+
+
+class BenchEngine(IDroneEngine):
+    """A drone that is where the test puts it. `place` None: it cannot say."""
+
+    def __init__(self):
+        self.place = Location(0.0, 0.0, 0.0)
+        self.goals = []
+
+    def set_goal(self, latitude, longitude, height):
+        self.goals.append(Location(latitude, longitude, height))
+
+    def get_location(self):
+        if self.place is None:
+            raise LocationUnknown("no engine answers")
+        return self.place
+
+
+class BenchInternet(IInternetConnection):
+    """Keeps the calls."""
+
+    def __init__(self):
+        self.calls = []
+
+    def connect(self, commands):
+        self.calls.append(("connect", commands))
+
+    def disconnect(self):
+        self.calls.append(("disconnect",))
+
+
+class AlwaysHalf(random.Random):
+    """Chance that is none: the first check comes after half a period."""
+
+    def random(self):
+        return 0.5
+
+
+class Bench:
+    """A started component, its antenna and its drone, and the time they live in."""
+
+    def __init__(self, node_id=1, gateway=False, timing=None, debug=True):
+        self.now_s = 0.0
+        self.antenna = RecordingAntenna()
+        self.engine = BenchEngine()
+        self.internet = BenchInternet()
+        self.routing = ChildTableTree()
+        self.events = []
+        carried = (self.antenna, self.engine, self.routing)
+        if gateway:
+            self.mesh = MeshnetworkGateway(
+                node_id,
+                *carried,
+                self.internet,
+                AlwaysHalf(),
+                timing,
+                self.events.append,
+                debug,
+            )
+        else:
+            self.mesh = MeshnetworkRouter(
+                node_id, *carried, AlwaysHalf(), timing, self.events.append, debug
+            )
+        self.mesh.start(self.now_s)
+        self.forget()
+
+    def forget(self):
+        """Start a new page: nothing sent so far counts."""
+        self.antenna.taken.clear()
+        self.antenna.tried.clear()
+        self.antenna.broadcasts.clear()
+
+    def hear(self, *texts):
+        """Packets arrive, now."""
+        for text in texts:
+            self.mesh.on_msg(packet(text), self.now_s)
+
+    def wait_until(self, now_s):
+        """Time passes; the component is called whenever it wants to be."""
+        while self.mesh.next_tick_s <= now_s:
+            self.now_s = max(self.now_s, self.mesh.next_tick_s)
+            self.mesh.tick(self.now_s)
+        self.now_s = now_s
+
+    def wait(self, seconds):
+        """Time passes."""
+        self.wait_until(self.now_s + seconds)
+
+    def sent(self, kind=None):
+        """Packets that were taken since the last question, perhaps only those of one type."""
+        found = [p for p in self.antenna.taken if kind in (None, p[2])]
+        self.antenna.taken.clear()
+        return found
+
+    def tried(self, kind=None):
+        """Packets that were handed to the antenna since the last question, taken or not."""
+        found = [p for p in self.antenna.tried if kind in (None, p[2])]
+        self.antenna.tried.clear()
+        return found
+
+    def broadcasts(self):
+        """Packets that were broadcast since the last question."""
+        found = list(self.antenna.broadcasts)
+        self.antenna.broadcasts.clear()
+        return found
+
+    def kinds(self):
+        """The names of what was reported."""
+        return [event.kind.name for event in self.events]
+
+    # Shorthand for what many tests begin with; the packets are those of gateway 0.
+
+    def know_neighbour(self, *nodes):
+        """Be told by each node that it is there and unconnected, and forget what was answered."""
+        for node in nodes:
+            self.mesh.on_msg(
+                bytes((node, node, 0, self.mesh.get_node_id(), 254)).ljust(32, b"\0"), self.now_s
+            )
+        self.forget()
+
+    def connect_to_gateway(self):
+        """Router: gateway 0, a neighbour, answers. All that this makes it send is forgotten."""
+        me = self.mesh.get_node_id()
+        self.mesh.on_msg(bytes((0, 0, 4, me, me, 1, 0, 0)).ljust(32, b"\0"), self.now_s)
+        assert self.mesh.get_connected_to_gateway()
+        self.forget()
+
+    def connect_through(self, neighbour, hops=1):
+        """Router: a heartbeat of gateway 0 arrives through `neighbour`; then as above."""
+        me = self.mesh.get_node_id()
+        self.mesh.on_msg(bytes((0, neighbour, 4, me, me, 1, 0, hops)).ljust(32, b"\0"), self.now_s)
+        assert self.mesh.get_connected_to_gateway()
+        self.forget()
