@@ -10,6 +10,7 @@ if [ -e "$drone_mesh_root/build/devel/setup.bash" ]; then
     *":$drone_mesh_root/.venv/bin:"*) ;;
     *) PATH="$drone_mesh_root/.venv/bin:$PATH" ;;
   esac
+  export PYTHONUNBUFFERED=1  # a node's log lines come at once, into a pipe too
   # ROS tells other nodes the name of this machine; one that cannot be looked up helps nobody.
   if [ -z "$ROS_HOSTNAME$ROS_IP" ] && ! getent hosts "$(uname -n)" >/dev/null; then
     export ROS_HOSTNAME=localhost
