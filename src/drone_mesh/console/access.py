@@ -34,7 +34,7 @@ class Access:
 
     def check_origin(self, origin: str | None, host: str) -> None:
         """`origin` is the Origin header: the page that asks has to be ours."""
-        if origin is None or urlsplit(origin).netloc.lower() != host.lower():
+        if origin is None or _authority(origin) != host.lower():
             raise AccessDenied(f"the page {origin or 'without an origin'} is not of this console")
 
     def check_token(self, token: str | None) -> None:
@@ -64,6 +64,13 @@ def is_loopback(name: str) -> bool:
         return ipaddress.ip_address(name).is_loopback
     except ValueError:
         return False
+
+
+def _authority(origin: str) -> str:
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return ""
 
 
 def _host_name(address: str) -> str:

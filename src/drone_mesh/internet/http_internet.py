@@ -14,11 +14,12 @@ from drone_mesh.console.access import access_for
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk, Submit
+from drone_mesh.internet.request_guard import MOST_HEAD_BYTES
 
+MAX_PORT = 65535
 DEFAULT_PORT = 9080  # reference, section 13
 ANSWER_WITHIN_S = 2.0  # our choice: over ten times what an order to a node that is gone takes
 MOST_CONNECTIONS = 64  # our choice; more are answered 503
-LARGEST_HEAD_BYTES = 8192  # our choice: request line and headers
 LAST_ANSWERS_WITHIN_S = 1  # our choice: for requests that are under way when it disconnects
 
 _log = logging.getLogger(__name__)
@@ -75,7 +76,7 @@ class HttpInternet(IInternetConnection):
                 server_header=False,
                 proxy_headers=False,
                 limit_concurrency=MOST_CONNECTIONS,
-                h11_max_incomplete_event_size=LARGEST_HEAD_BYTES,
+                h11_max_incomplete_event_size=MOST_HEAD_BYTES,
                 timeout_graceful_shutdown=LAST_ANSWERS_WITHIN_S,
             )
         )
@@ -97,6 +98,9 @@ class HttpInternet(IInternetConnection):
 
 
 def _listen(bind_address: str, port: int) -> socket.socket:
+    wanted = f"HTTP address {bind_address} port {port}"
+    if not 0 <= port <= MAX_PORT:
+        raise ConfigurationError(f"{wanted} cannot be had: ports are 0..{MAX_PORT}")
     sock = None
     try:
         # asyncio answers without delay (TCP_NODELAY) only where the protocol was named: on such a
@@ -108,13 +112,11 @@ def _listen(bind_address: str, port: int) -> socket.socket:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.bind(where)
         sock.listen(MOST_CONNECTIONS)
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         if sock is not None:
             sock.close()
-        hint = _HINTS.get(getattr(error, "errno", None) or 0, str(error))
-        raise ConfigurationError(
-            f"HTTP address {bind_address} port {port} cannot be had: {hint}"
-        ) from error
+        hint = _HINTS.get(error.errno or 0, str(error))
+        raise ConfigurationError(f"{wanted} cannot be had: {hint}") from error
     return sock
 
 

@@ -1,0 +1,170 @@
+"""Start and end of a gateway's HTTP side, a gateway that does not answer, and what stays behind."""
+
+from __future__ import annotations
+
+import gc
+import http.client
+import logging
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx
+import pytest
+
+from drone_mesh.communication.interfaces import IGatewayCommands
+from drone_mesh.internet import HttpInternet
+
+PATIENCE_S = 20.0  # for threads; nothing here takes a tenth of it
+
+
+class SlowGateway(IGatewayCommands):
+    """Does not finish an order before it is let go."""
+
+    def __init__(self):
+        self.begun, self.go_on = threading.Event(), threading.Event()
+
+    def send_goal_request_to_drone(self, node_id, latitude, longitude, height, now_s):
+        self.begun.set()
+        assert self.go_on.wait(PATIENCE_S)
+        return True
+
+    def get_node_id(self):
+        return 7
+
+    def get_known_nodes(self):
+        raise RuntimeError("a bug in the routing technique")
+
+
+@pytest.fixture
+def slow():
+    """A slow gateway whose thread is that of a pool, and its HTTP side."""
+    gateway = SlowGateway()
+    pool = ThreadPoolExecutor(max_workers=1)
+    internet = HttpInternet(lambda work: pool.submit(work, 0.0), port=0, answer_within_s=0.2)
+    internet.connect(gateway)
+    yield gateway, internet
+    gateway.go_on.set()
+    internet.disconnect()
+    pool.shutdown()
+
+
+def http_threads():
+    return [thread for thread in threading.enumerate() if thread.name == "http"]
+
+
+def test_an_order_that_the_gateway_has_not_come_to_is_refused_and_never_done(make_mesh):
+    mesh = make_mesh(answer_within_s=0.2)
+    sent, go_on = mesh.sent(), threading.Event()
+    mesh.executor.submit(lambda _now_s: go_on.wait(PATIENCE_S))
+    answer = mesh.client.post("/DroneMovement/1/2/3/4")
+    go_on.set()
+    mesh.executor.stop()  # has worked off what was waiting
+    assert answer.status_code == 503
+    assert "nothing was done" in answer.json()["detail"]
+    assert mesh.sent() == sent
+
+
+def test_an_order_that_the_gateway_does_not_finish_is_answered_504(slow):
+    _gateway, internet = slow
+    answer = httpx.post(f"{internet.url}/DroneMovement/1/2/3/4", timeout=PATIENCE_S)
+    assert answer.status_code == 504
+    assert "has begun" in answer.json()["detail"]
+
+
+def test_after_a_late_answer_the_next_request_is_answered_as_usual(slow):
+    gateway, internet = slow
+    httpx.post(f"{internet.url}/DroneMovement/1/2/3/4", timeout=PATIENCE_S)
+    gateway.go_on.set()
+    deadline = time.monotonic() + PATIENCE_S
+    while httpx.get(f"{internet.url}/ready", timeout=PATIENCE_S).status_code != 200:
+        assert time.monotonic() < deadline, "the gateway did not recover"
+    assert httpx.post(f"{internet.url}/DroneMovement/1/2/3/4").status_code == 200
+
+
+def test_a_bug_behind_one_request_is_logged_and_stops_nothing(slow, caplog):
+    _gateway, internet = slow
+    assert httpx.get(f"{internet.url}/nodes", timeout=PATIENCE_S).status_code == 500
+    wait_until(lambda: "a bug in the routing technique" in caplog.text, "nothing was logged")
+    assert httpx.get(f"{internet.url}/ready", timeout=PATIENCE_S).status_code == 200
+
+
+def test_disconnecting_on_the_gateways_own_thread_refuses_who_waits_and_ends(make_mesh):
+    mesh = make_mesh(answer_within_s=PATIENCE_S)
+    held, go_on = threading.Event(), threading.Event()
+
+    def hold_then_disconnect(_now_s):
+        held.set()
+        assert go_on.wait(PATIENCE_S)
+        mesh.internet.disconnect()
+
+    mesh.executor.submit(hold_then_disconnect)
+    assert held.wait(PATIENCE_S)
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        order = pool.submit(mesh.client.post, "/DroneMovement/1/2/3/4")
+        wait_until(lambda: mesh.executor._queue.qsize() == 1, "the order did not come in")
+        go_on.set()
+        answer = order.result(PATIENCE_S)
+    mesh.executor.stop()
+    assert answer.status_code == 503
+    assert "nothing was done" in answer.json()["detail"]
+    with pytest.raises(httpx.ConnectError):
+        mesh.client.get("/ready")
+
+
+def test_disconnecting_twice_changes_nothing_and_gives_the_port_back(make_mesh):
+    mesh = make_mesh()
+    before = len(http_threads())
+    mesh.internet.disconnect()
+    mesh.internet.disconnect()
+    assert len(http_threads()) == before - 1
+    HttpInternet(mesh.executor.submit, port=mesh.internet.port).disconnect()
+
+
+def test_disconnecting_right_after_connecting_ends(make_mesh):
+    mesh = make_mesh()
+    before = len(http_threads())
+    internet = HttpInternet(mesh.executor.submit, port=0)
+    internet.connect(mesh.gateway)
+    internet.disconnect()
+    assert len(http_threads()) == before
+
+
+def test_a_client_that_says_nothing_does_not_hold_up_the_end(make_mesh):
+    mesh = make_mesh()
+    silent = http.client.HTTPConnection("127.0.0.1", mesh.internet.port, timeout=PATIENCE_S)
+    silent.connect()
+    silent.sock.sendall(b"GET /ready HT")
+    mesh.internet.disconnect()
+    assert silent.sock.recv(1) == b""
+    silent.close()
+
+
+def test_a_thousand_requests_in_a_row_leave_no_thread_and_no_memory_behind(make_mesh, caplog):
+    caplog.set_level(logging.CRITICAL)  # what pytest keeps of the log is not to be counted
+    mesh = make_mesh()
+    connection = http.client.HTTPConnection("127.0.0.1", mesh.internet.port, timeout=PATIENCE_S)
+
+    def ask(requests):
+        targets = ("/ready", "/nodes", "/DroneMovement/254/0/0/0", "/DroneMovement/99/0/0/0")
+        for number in range(requests):
+            target = targets[number % 4]
+            connection.request("POST" if "Drone" in target else "GET", target)
+            connection.getresponse().read()
+        gc.collect()
+
+    ask(100)  # what is made once is made
+    threads, blocks = threading.active_count(), sys.getallocatedblocks()
+    ask(1000)
+    grown_blocks = sys.getallocatedblocks() - blocks
+    connection.close()
+    assert threading.active_count() == threads
+    assert grown_blocks < 500  # half a block a request; a future that is kept costs several
+
+
+def wait_until(condition, otherwise):
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, otherwise
+        time.sleep(0.01)
