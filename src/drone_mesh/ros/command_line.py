@@ -1,4 +1,4 @@
-"""What the command line tools have in common: a node that is there for a moment, and plain errors."""
+"""What the command line tools have in common: a passing node, and plain errors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def join_graph(name: str) -> None:
 
 
 def run_tool(name: str, work: Callable[[], int]) -> None:
-    """Run a tool to its exit code. Errors of ours become one line, Ctrl-C and a closed pipe nothing."""
+    """Run a tool to its exit code. Errors of ours become one line; Ctrl-C is silent."""
     try:
         code = work()
         sys.stdout.flush()

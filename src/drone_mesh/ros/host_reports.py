@@ -59,7 +59,7 @@ class HostReports:
         self._publisher.unregister()
 
     def _run(self) -> None:
-        while not self._stopped.wait(REPORT_PERIOD_S):
+        while not (self._stopped.wait(REPORT_PERIOD_S) or rospy.is_shutdown()):
             # Nobody would get the events now; they wait until somebody does.
             if self._publisher.get_num_connections():
                 self._report()
@@ -83,5 +83,6 @@ class HostReports:
         ]
         try:
             self._publisher.publish(report)
-        except rospy.ROSException:  # the node shuts down
-            self._stopped.set()
+        except rospy.ROSException:  # what publishing raises while the node shuts down
+            if not rospy.is_shutdown():
+                raise

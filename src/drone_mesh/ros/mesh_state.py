@@ -78,7 +78,7 @@ class MeshStatePublisher:
 
     def _run(self) -> None:
         published_s = float("-inf")
-        while not self._stopped.wait(WATCHED_PERIOD_S):
+        while not (self._stopped.wait(WATCHED_PERIOD_S) or rospy.is_shutdown()):
             now_s = time.monotonic()
             try:
                 self._merge()
@@ -86,8 +86,9 @@ class MeshStatePublisher:
                 if watched or now_s - published_s >= UNWATCHED_PERIOD_S:
                     published_s = now_s
                     self._publish(now_s)
-            except rospy.ROSException:  # the node shuts down
-                return
+            except rospy.ROSException:  # what publishing raises while the node shuts down
+                if not rospy.is_shutdown():
+                    raise
 
     def _merge(self) -> None:
         while self._reports:
@@ -154,7 +155,7 @@ def diagnostics_message(mesh: MeshStatus) -> DiagnosticArray:
     array.header.stamp = rospy.Time.from_sec(mesh.stamp_s)
     array.status.append(
         DiagnosticStatus(
-            level=bytes([summary.severity]),
+            level=summary.severity,
             name="drone_mesh: mesh",
             message=summary.text,
             hardware_id=HARDWARE_ID,
@@ -167,7 +168,7 @@ def diagnostics_message(mesh: MeshStatus) -> DiagnosticArray:
 
 def _trouble_status(trouble: Trouble, node: NodeStatus) -> DiagnosticStatus:
     return DiagnosticStatus(
-        level=bytes([trouble.severity]),
+        level=trouble.severity,
         name=f"drone_mesh: node {trouble.node}",
         message=trouble.text,
         hardware_id=f"{HARDWARE_ID}_{trouble.node}",

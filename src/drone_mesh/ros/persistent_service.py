@@ -31,8 +31,12 @@ class PersistentService:
     `connect` and `close` may be called by another thread than `call`, but not during a call.
     """
 
-    def __init__(self, name: str, service_class: type) -> None:
+    def __init__(
+        self, name: str, service_class: type, timeout_s: int = CALL_TIMEOUT_S
+    ) -> None:
+        """`timeout_s`: whole wall seconds to wait for an answer."""
         self.name = name
+        self._timeout_s = timeout_s
         self._proxy = rospy.ServiceProxy(name, service_class, persistent=True)
 
     def is_connected(self) -> bool:
@@ -60,7 +64,7 @@ class PersistentService:
         except rospy.impl.validators.ParameterInvalid as error:
             raise ServiceGone(f"{self.name}: {error}") from error
         # rospy has no timeout for calls; the kernel's makes a read fail, and that closes it.
-        timeval = struct.pack("@ll", CALL_TIMEOUT_S, 0)
+        timeval = struct.pack("@ll", self._timeout_s, 0)
         transport.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
         transport.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
         proxy.transport = transport

@@ -47,7 +47,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-w", "--watch", action="store_true", help="print it again each second")
     parser.add_argument("--bag", type=Path, help="the state in a bag instead of the live one")
     parser.add_argument(
-        "--at", type=float, metavar="S", help="with --bag: at this simulated time (default: the end)"
+        "--at",
+        type=float,
+        metavar="S",
+        help="with --bag: at this simulated time (default: its end)",
     )
     parser.add_argument(
         "--colour",

@@ -9,24 +9,24 @@ from drone_mesh.state.model import NodeStatus, Role
 
 
 def route_to_gateway(start: int, nodes: Mapping[int, NodeStatus]) -> bytes:
-    """Ids from `start` to a gateway, both included; empty when `start` knows no way.
+    """Ids from `start` to a gateway, both included; empty when `start` is off or knows no way.
 
-    A route that goes round, or that leads to a node nobody reports, ends with the last id that
-    could still be followed: it shows where the packets get stuck.
+    A route that goes round, or leads to a node that is off or that nobody reports, ends with the
+    last id that could be followed: it shows where the packets get stuck.
     """
     route = bytearray()
     here = start
     while here in nodes and here not in route:
         route.append(here)
         node = nodes[here]
-        if node.role == Role.GATEWAY:
+        if node.role == Role.GATEWAY and node.on:
             return bytes(route)
-        if node.next_hop == NO_ROUTE:
+        if not node.on or node.next_hop == NO_ROUTE:
             break
         here = node.next_hop
     return bytes(route) if len(route) > 1 else b""
 
 
 def reaches_gateway(route: Sequence[int], nodes: Mapping[int, NodeStatus]) -> bool:
-    """Whether this route ends at a gateway."""
-    return bool(route) and nodes[route[-1]].role == Role.GATEWAY
+    """Whether this route ends at a gateway that is on."""
+    return bool(route) and nodes[route[-1]].role == Role.GATEWAY and nodes[route[-1]].on

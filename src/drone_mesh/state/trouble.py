@@ -53,8 +53,9 @@ def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
             what = "flying" if len(node.path) else "not connected to a gateway"
             troubles.append(Trouble(node.id, Severity.ERROR, what))
         elif node.role == Role.ROUTER and not reaches_gateway(node.route, by_id):
-            way = " > ".join(map(str, node.route)) or "none"
-            troubles.append(Trouble(node.id, Severity.WARN, f"its route has no end: {way}"))
+            way = " > ".join(map(str, node.route))
+            what = f"its route ends nowhere: {way}" if way else "no route to a gateway"
+            troubles.append(Trouble(node.id, Severity.WARN, what))
     return troubles
 
 
