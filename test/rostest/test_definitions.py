@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""The ROS definitions are a wire contract: whoever was built against the 2019 ones is understood."""
+"""The ROS definitions are a wire contract: built against those of 2019 means understood."""
 
 from __future__ import annotations
 
 import unittest
 
 import rostest
+
 from drone_mesh import msg, srv
 
 MESSAGES = {

@@ -285,7 +285,7 @@ def _packed(message: _TypedMessage, *values: float) -> bytes:
         raise PacketError(f"{message} does not fit its packet: {error}") from error
 
 
-def _unpacked(kind: MessageType, body: struct.Struct, payload: bytes) -> tuple:  # type: ignore[type-arg]
+def _unpacked(kind: MessageType, body: struct.Struct, payload: bytes) -> tuple:
     _check_length(payload)
     creator, from_, found, to, forward = payload[:HEADER_BYTES]
     if found != kind:

@@ -28,7 +28,7 @@ class IDroneEngine(abc.ABC):
 
     @abc.abstractmethod
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly to this place (metres, world frame). Returns at once; a new goal replaces the old one."""
+        """Fly to this place (metres, world frame). Returns at once; replaces the old goal."""
 
     @abc.abstractmethod
     def get_location(self) -> Location:
