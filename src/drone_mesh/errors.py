@@ -16,8 +16,8 @@ class LocationUnknown(MeshError):
 
 
 class ConfigurationError(MeshError):
-    """A parameter or a file is wrong. The message names it and says what is allowed: show it, stop."""
+    """A parameter or a file is wrong. The message names it and what is allowed: show it, stop."""
 
 
 class GoalRefused(MeshError):
-    """A goal for a drone is no number or out of bounds (reference 11). Nothing moves; tell who sent it."""
+    """A goal is no number or out of bounds (reference 11). Nothing moves; tell who sent it."""
