@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import secrets
-import sys
 import threading
 import time
 from functools import partial
@@ -105,9 +104,9 @@ def layout_names(layouts: Layouts) -> list[tuple[int, str]]:
 def main() -> None:
     """Run the node.
 
-    Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token (str):
-    who wants to use the console from elsewhere needs it, an address that others can reach gets a random one
-    if none is given; ~casus (str): file of the layouts, by default that of the DroneManager.
+    Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
+    (str): who wants to use the console from elsewhere needs it; an address that others can reach
+    gets a random one if none is given; /DroneManager/casus (str): the file of the layouts.
     """
     run_tool("console", _run)
 
@@ -150,6 +149,4 @@ def _port(value: object) -> int:
 
 def _casus_file() -> str:
     manager = str(rospy.get_param("/DroneManager/casus", ""))
-    return (
-        str(rospy.get_param("~casus", "")) or manager or str(file_parameter("casus", "casus.yaml"))
-    )
+    return manager or str(file_parameter("casus", "casus.yaml"))
