@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from drone_mesh.bench.observation import (
     CONNECTED,
     DISCONNECTED,
+    PROBE,
     REST,
     STARTED,
     WATCH,
@@ -39,6 +40,7 @@ class Probe:
         self._watching: rospy.Subscriber | None = None
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event)
         rospy.Subscriber(names.DIAGNOSTICS_TOPIC, DiagnosticArray, self._diagnostics)
+        self._tell(Figures(PROBE))
 
     def obey(self, order: str) -> None:
         """Watch the state from now on, or rest."""
@@ -82,7 +84,7 @@ class Probe:
 
 def main() -> None:
     """Run until the orders on standard input end."""
-    rospy.init_node("bench_probe", disable_signals=True)
+    rospy.init_node(PROBE, disable_signals=True)
     probe = Probe()
     for line in sys.stdin:
         probe.obey(line.strip())

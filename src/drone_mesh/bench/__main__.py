@@ -1,0 +1,7 @@
+#!/usr/bin/env python3
+"""python3 -m drone_mesh.bench: without ROS with --only inprocess."""
+
+from drone_mesh.bench.command import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""What is measured: how many drones, how far apart, how fast their time runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.world.factory import plan_fleet
+
+
+@dataclass(frozen=True)
+class Case:
+    """One fleet: a gateway and routers on a square grid."""
+
+    drones: int  # the gateway included
+    spacing_m: float
+    real_time_factor: float = 1.0  # 0: as fast as it goes
+
+    def __post_init__(self) -> None:
+        """Raises ConfigurationError for a fleet that the factory would not make."""
+        plan_fleet(1, self.routers, self.gridsize, self.spacing_m)
+        if not (math.isfinite(self.real_time_factor) and self.real_time_factor >= 0):
+            raise ConfigurationError(f"real-time factor: {self.real_time_factor} is below 0")
+
+    @classmethod
+    def parse(cls, text: str) -> Case:
+        """Read DRONES/SPACING or DRONES/SPACING@FACTOR, such as 100/6 or 17/6@0.
+
+        Raises ConfigurationError for anything else.
+        """
+        size, at, factor = text.partition("@")
+        drones, slash, spacing = size.partition("/")
+        try:
+            if not slash:
+                raise ValueError("no spacing")
+            return cls(int(drones), float(spacing), float(factor) if at else 1.0)
+        except ValueError:
+            raise ConfigurationError(
+                f"{text!r} is no size: write DRONES/SPACING, such as 100/6 for 100 drones 6 m "
+                "apart, or DRONES/SPACING@FACTOR, such as 17/6@0 for 17 as fast as it goes"
+            ) from None
+
+    @property
+    def routers(self) -> int:
+        """All but the gateway."""
+        return self.drones - 1
+
+    @property
+    def gridsize(self) -> int:
+        """Routers in a row: as many as there are rows."""
+        return max(1, math.ceil(math.sqrt(self.routers)))
+
+    def launch_args(self) -> list[str]:
+        """The fleet for factory.launch."""
+        return [
+            "gateways:=1",
+            f"routers:={self.routers}",
+            f"gridsize:={self.gridsize}",
+            f"spacing:={self.spacing_m:g}",
+            f"real_time_factor:={self.real_time_factor:g}",
+        ]
+
+    def __str__(self) -> str:
+        speed = f", real-time factor {self.real_time_factor:g}"
+        return f"{self.drones} drones, {self.spacing_m:g} m" + (
+            speed if self.real_time_factor != 1 else ""
+        )
+
+
+FULL = tuple(map(Case.parse, ("17/6", "100/6", "100/1", "254/6", "254/1", "17/6@0")))
+QUICK = tuple(map(Case.parse, ("17/6", "100/6", "17/6@0")))
+SOAK = Case.parse("100/6@0")

@@ -1,0 +1,221 @@
+"""The command `rosrun drone_mesh bench`; without ROS: `python3 -m drone_mesh.bench`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Sequence
+
+from drone_mesh.bench import cases, inprocess, report, soak
+from drone_mesh.bench.cases import Case
+from drone_mesh.bench.measurement import RosResult, measure
+from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.system import BenchmarkError, check_environment, free_port
+from drone_mesh.errors import ConfigurationError
+
+WINDOW_S = 20.0  # two rounds of the default timing
+QUICK_WINDOW_S = 10.0
+RUNS = 5
+QUICK_RUNS = 1
+ROS, INPROCESS = "ros", "inprocess"
+EXIT_FAILED, EXIT_INTERRUPTED = 1, 130
+
+DESCRIPTION = """\
+Starts the system by itself, for one size after the other, measures it and prints tables.
+It brings its own ROS master on a free port and ends all that it started, also on Ctrl-C.
+"""
+EPILOG = """\
+examples:
+  rosrun drone_mesh bench --quick
+  rosrun drone_mesh bench --sizes 100/6 100/1 --launch hosts:=2 --json result.json
+  rosrun drone_mesh bench --hours 1                    an hour of simulated time: does it grow?
+  python3 -m drone_mesh.bench --only inprocess         needs no ROS
+"""
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _size(text: str) -> Case:
+    try:
+        return Case.parse(text)
+    except ConfigurationError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _launch_arg(text: str) -> str:
+    if ":=" not in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is no launch argument: write name:=value")
+    return text
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The options."""
+    parser = argparse.ArgumentParser(
+        prog="bench",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--quick", action="store_true", help="less of everything: under 2 minutes")
+    parser.add_argument(
+        "--sizes",
+        nargs="+",
+        type=_size,
+        metavar="DRONES/SPACING[@FACTOR]",
+        help="what to start; default: " + " ".join(map(_in_short, cases.FULL)),
+    )
+    parser.add_argument("--only", choices=(ROS, INPROCESS), help="leave the other half out")
+    parser.add_argument(
+        "--seconds",
+        type=_positive,
+        help=f"wall seconds that each size is measured; default: {WINDOW_S:g}",
+    )
+    parser.add_argument(
+        "--hours",
+        type=_positive,
+        help="instead of the tables: run one size (default: "
+        f"{_in_short(cases.SOAK)}) for so many hours of simulated time, and see whether memory, "
+        "threads or connections grow",
+    )
+    parser.add_argument(
+        "--launch",
+        nargs="+",
+        type=_launch_arg,
+        default=[],
+        metavar="NAME:=VALUE",
+        help="further arguments for factory.launch",
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there, too")
+    parser.add_argument("--port", type=int, help="of the ROS master; default: a free one")
+    return parser
+
+
+def _in_short(case: Case) -> str:
+    factor = "" if case.real_time_factor == 1 else f"@{case.real_time_factor:g}"
+    return f"{case.drones}/{case.spacing_m:g}{factor}"
+
+
+class Benchmark:
+    """What was asked for, and what was found so far."""
+
+    def __init__(self, options: argparse.Namespace, progress: Progress) -> None:
+        self._options = options
+        self._progress = progress
+        self._machine = report.Machine.here()
+        self._ros: list[RosResult] = []
+        self._failed: list[dict[str, str]] = []
+        self._inprocess: list[inprocess.InProcessResult] = []
+        self._soak: soak.SoakResult | None = None
+
+    def run(self) -> int:
+        """Measure; returns the exit code. What was found is told even if it is interrupted."""
+        options = self._options
+        try:
+            if options.hours is not None:
+                self._run_soak()
+            else:
+                if options.only != INPROCESS:
+                    self._run_ros()
+                if options.only != ROS:
+                    self._run_inprocess()
+        except KeyboardInterrupt:
+            self._progress.clear()
+            print("interrupted", file=sys.stderr)
+            self._tell()
+            return EXIT_INTERRUPTED
+        self._tell()
+        grew = self._soak is not None and (verdict := self._soak.verdict()) and not verdict.steady
+        return EXIT_FAILED if self._failed or grew else 0
+
+    def _run_ros(self) -> None:
+        options = self._options
+        check_environment()
+        sizes = options.sizes or (cases.QUICK if options.quick else cases.FULL)
+        window_s = options.seconds or (QUICK_WINDOW_S if options.quick else WINDOW_S)
+        for number, case in enumerate(sizes, start=1):
+            self._progress.begin(f"[{number}/{len(sizes)}] {case}")
+            try:
+                result = measure(case, options.launch, self._port(), window_s, self._progress)
+            except BenchmarkError as error:
+                self._fail(case, error)
+            else:
+                self._ros.append(result)
+
+    def _run_inprocess(self) -> None:
+        runs = QUICK_RUNS if self._options.quick else RUNS
+        self._progress.begin("in process")
+        for drones in inprocess.SIZES:
+            self._inprocess.append(inprocess.measure(drones, runs, self._progress.say))
+        self._progress.clear()
+
+    def _run_soak(self) -> None:
+        options = self._options
+        check_environment()
+        case = options.sizes[0] if options.sizes else cases.SOAK
+        self._progress.begin(f"{case}: {options.hours:g} h of simulated time")
+        try:
+            self._soak = soak.soak(
+                case,
+                options.hours,
+                options.launch,
+                self._port(),
+                self._progress,
+                lambda sample: print(report.sample_line(sample), flush=True),
+            )
+        except BenchmarkError as error:
+            self._fail(case, error)
+
+    def _port(self) -> int:
+        port: int = self._options.port or free_port()
+        return port
+
+    def _fail(self, case: Case, error: BenchmarkError) -> None:
+        self._progress.clear()
+        self._failed.append({"case": str(case), "reason": str(error)})
+        print(f"bench: {case}: {error}", file=sys.stderr)
+
+    def _tell(self) -> None:
+        sections = [f"Measured on {self._machine}."]
+        if self._ros:
+            sections.append(report.ros_tables(self._ros))
+        if self._inprocess:
+            sections.append(report.inprocess_table(self._inprocess))
+        if self._soak is not None:
+            sections.append(report.verdict_lines(self._soak))
+        sections += [f"Failed: {failed['case']}: {failed['reason']}" for failed in self._failed]
+        if len(sections) > 1:
+            print("\n" + "\n\n".join(sections), flush=True)
+        if self._options.json is not None:
+            text = json.dumps(self._as_json(), indent=2) + "\n"
+            self._options.json.write_text(text, encoding="utf-8")
+
+    def _as_json(self) -> dict[str, Any]:
+        return {
+            "machine": asdict(self._machine),
+            "ros": [asdict(result) for result in self._ros],
+            "inprocess": [asdict(result) for result in self._inprocess],
+            "soak": None if self._soak is None else soak.as_json(self._soak),
+            "failed": self._failed,
+        }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command; exits with 0, or 1 when something failed, 130 when interrupted."""
+    options = make_parser().parse_args(arguments)
+    if options.json is not None and not options.json.absolute().parent.is_dir():
+        sys.exit(f"bench: --json {options.json}: there is no such directory")
+    # So that a TERM ends what was started here, as Ctrl-C does.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        sys.exit(Benchmark(options, Progress()).run())
+    except BenchmarkError as error:
+        sys.exit(f"bench: {error}")

@@ -1,0 +1,81 @@
+"""How fast the in-process network runs."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from dataclasses import dataclass
+from typing import Callable
+
+from drone_mesh.bench.cases import Case
+from drone_mesh.inprocess import Network
+
+SIZES = (25, 100, 254)
+SPACING_M = 6.0
+SIMULATED_S = 60.0  # six rounds of the default timing
+
+
+@dataclass(frozen=True)
+class InProcessResult:
+    """Medians over several runs of one size."""
+
+    drones: int
+    spacing_m: float
+    runs: int
+    simulated_s: float  # of one phase of one run
+    # Simulated seconds per second of processor time of the one core that is used, and of wall time.
+    from_start_per_cpu_s: float
+    from_start_per_wall_s: float
+    running_per_cpu_s: float
+    running_per_wall_s: float
+    packets: int  # that arrived, in both phases of one run
+    all_connected: bool
+
+
+@dataclass(frozen=True)
+class _Pace:
+    per_cpu_s: float
+    per_wall_s: float
+
+
+def _pace(network: Network, simulated_s: float) -> _Pace:
+    wall_s, cpu_s = time.perf_counter(), time.process_time()
+    network.run_for(simulated_s)
+    wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
+    return _Pace(simulated_s / cpu_s, simulated_s / wall_s)
+
+
+def measure(
+    drones: int,
+    runs: int,
+    say: Callable[[str], None],
+    simulated_s: float = SIMULATED_S,
+) -> InProcessResult:
+    """Start a network `runs` times, and let each run first from its start and then on.
+
+    The start costs more: everybody meets everybody.
+    """
+    case = Case(drones, SPACING_M)
+    starting: list[_Pace] = []
+    running: list[_Pace] = []
+    packets, connected = 0, True
+    for run in range(runs):
+        say(f"{drones} drones in process: run {run + 1} of {runs}")
+        network = Network(seed=run)
+        network.add_fleet(1, case.routers, case.gridsize, SPACING_M)
+        starting.append(_pace(network, simulated_s))
+        running.append(_pace(network, simulated_s))
+        packets = network.air.delivered
+        connected = connected and network.all_connected()
+    return InProcessResult(
+        drones=drones,
+        spacing_m=SPACING_M,
+        runs=runs,
+        simulated_s=simulated_s,
+        from_start_per_cpu_s=statistics.median(pace.per_cpu_s for pace in starting),
+        from_start_per_wall_s=statistics.median(pace.per_wall_s for pace in starting),
+        running_per_cpu_s=statistics.median(pace.per_cpu_s for pace in running),
+        running_per_wall_s=statistics.median(pace.per_wall_s for pace in running),
+        packets=packets,
+        all_connected=connected,
+    )

@@ -1,0 +1,166 @@
+"""One fleet, from its launch to the figures of its table row."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from drone_mesh.bench.cases import Case
+from drone_mesh.bench.observation import DELIVERED, LOST, REST, WATCH, WORST_LAG, Look, Watch
+from drone_mesh.bench.processes import Use, cores_between
+from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.system import BenchmarkError, System
+
+ON_WITHIN_S = 180.0  # wall; our choice: six times what 254 drones may take
+CONNECTED_WITHIN_S = 120.0  # wall; as long as the original was given
+SETTLE_S = 5.0  # wall; the rush of the start is not what a second costs
+LOOK_WITHIN_S = 20.0  # wall
+MEGABYTE = 1e6
+
+
+@dataclass(frozen=True)
+class RosResult:
+    """What one fleet did. None: not known, as nobody counts it or as it never happened."""
+
+    drones: int
+    spacing_m: float
+    real_time_factor: float  # as asked for; 0: as fast as it goes
+    on_after_wall_s: float  # from roslaunch to the moment all nodes are on
+    connected_after_sim_s: float | None  # from the start of the last node to all connected
+    connected_after_wall_s: float | None
+    routers_connected: int  # at the end
+    window_wall_s: float  # in which all that follows was measured
+    window_sim_s: float
+    messages_per_wall_s: float  # counted as totalMessages: broadcasts are not
+    messages_per_sim_s: float
+    deliveries_per_wall_s: float | None  # packets that reached a node, broadcasts too
+    lost_share: float | None  # of all packets for nodes in range, since the start
+    cpu_ms_per_message: float | None  # of all processes, the master's included
+    cores: dict[str, float]  # by process
+    pss_mb: float  # of all processes
+    rss_mb: float
+    threads: int
+    open_files: int
+    reached_real_time_factor: float
+    worst_timer_lag_s: float | None  # simulated; since the start
+
+
+@dataclass(frozen=True)
+class _Moment:
+    look: Look
+    use: Use
+    delivered: float | None
+
+
+def measure(
+    case: Case, launch_args: list[str], port: int, window_s: float, progress: Progress
+) -> RosResult:
+    """Start the fleet, wait until all are connected, watch it for `window_s` wall seconds, end it.
+
+    Raises BenchmarkError when it does not start or ends by itself.
+    """
+    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
+        watch = system.watch
+        await_all_on(system, case, progress)
+        assert watch.all_on is not None
+        connected = system.wait_for(
+            lambda: watch.all_connected is not None,
+            CONNECTED_WITHIN_S,
+            lambda: progress.say(f"{_connected(watch)} of {case.routers} routers connected"),
+        )
+        if connected and watch.all_connected is not None:
+            after_s = watch.all_connected.wall_s - watch.all_on.wall_s
+            progress.say(f"all connected after {after_s:.1f} s")
+        _sleep(system, SETTLE_S, progress, "letting the start pass")
+        first = _take_moment(system)
+        system.order(REST)
+        _sleep(system, window_s, progress, "measuring")
+        system.order(WATCH)
+        last = _take_moment(system)
+        result = _result(case, system, first, last)
+        progress.say("ending it")
+    progress.clear()
+    return result
+
+
+def await_all_on(system: System, case: Case, progress: Progress) -> None:
+    """Return when all nodes of the fleet are on. Raises BenchmarkError when that takes too long."""
+    watch = system.watch
+
+    def say() -> None:
+        on = watch.last.on if watch.last else 0
+        progress.say(f"{on} of {case.drones} nodes on, {_since(system.launched_s):.0f} s")
+
+    if not system.wait_for(lambda: watch.all_on is not None, ON_WITHIN_S, say):
+        on = watch.last.on if watch.last else 0
+        raise BenchmarkError(f"only {on} of {case.drones} nodes are on after {ON_WITHIN_S:g} s")
+
+
+def _take_moment(system: System) -> _Moment:
+    """Figures of now. The state that is seen first may be an old one: the next is new."""
+    watch = system.watch
+    seen = len(watch.looks)
+    if not system.wait_for(lambda: len(watch.looks) >= seen + 2, LOOK_WITHIN_S, lambda: None):
+        raise BenchmarkError(f"no /mesh/state for {LOOK_WITHIN_S:g} s")
+    look = watch.looks[-1]
+    return _Moment(look, system.use(), watch.total(DELIVERED))
+
+
+def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosResult:
+    watch = system.watch
+    assert watch.all_on is not None
+    wall_s = last.look.wall_s - first.look.wall_s
+    sim_s = last.look.sim_s - first.look.sim_s
+    messages = last.look.messages - first.look.messages
+    cores = cores_between(first.use, last.use)
+    connected = watch.all_connected
+    return RosResult(
+        drones=case.drones,
+        spacing_m=case.spacing_m,
+        real_time_factor=case.real_time_factor,
+        on_after_wall_s=watch.all_on.wall_s - system.launched_s,
+        connected_after_sim_s=watch.connected_after_s(),
+        connected_after_wall_s=connected.wall_s - watch.all_on.wall_s if connected else None,
+        routers_connected=last.look.connected,
+        window_wall_s=wall_s,
+        window_sim_s=sim_s,
+        messages_per_wall_s=messages / wall_s,
+        messages_per_sim_s=messages / sim_s if sim_s else 0.0,
+        deliveries_per_wall_s=_rate(first.delivered, last.delivered, wall_s),
+        lost_share=_share(watch.total(LOST), watch.total(DELIVERED)),
+        cpu_ms_per_message=1000 * sum(cores.values()) * wall_s / messages if messages else None,
+        cores=cores,
+        pss_mb=last.use.pss_bytes / MEGABYTE,
+        rss_mb=last.use.rss_bytes / MEGABYTE,
+        threads=last.use.threads,
+        open_files=last.use.open_files,
+        reached_real_time_factor=sim_s / wall_s,
+        worst_timer_lag_s=watch.worst.get(WORST_LAG),
+    )
+
+
+def _rate(before: float | None, after: float | None, seconds: float) -> float | None:
+    return None if before is None or after is None else (after - before) / seconds
+
+
+def _share(lost: float | None, delivered: float | None) -> float | None:
+    if lost is None or delivered is None or lost + delivered == 0:
+        return None
+    return lost / (lost + delivered)
+
+
+def _sleep(system: System, seconds: float, progress: Progress, what: str) -> None:
+    until_s = time.monotonic() + seconds
+    system.wait_for(
+        lambda: time.monotonic() >= until_s,
+        seconds + 1.0,
+        lambda: progress.say(f"{what}: {max(0.0, until_s - time.monotonic()):.0f} s"),
+    )
+
+
+def _connected(watch: Watch) -> int:
+    return watch.last.connected if watch.last else 0
+
+
+def _since(then_s: float) -> float:
+    return time.monotonic() - then_s

@@ -1,0 +1,132 @@
+"""What the probe sees of a running system, and what that says about its start."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Iterable, Union
+
+from drone_mesh.communication.observer import MeshEventKind
+
+STARTED = MeshEventKind.STARTED.value
+CONNECTED = MeshEventKind.CONNECTED.value
+DISCONNECTED = MeshEventKind.DISCONNECTED.value
+
+# Names under which parts of the system publish figures about themselves on /diagnostics.
+DELIVERED = "delivered"  # packets handed to a node, each receiver of a broadcast counted
+LOST = "lost in range"  # packets for a node that is on and in range, and that did not get them
+WORST_LAG = "worst timer lag"  # simulated seconds that a timer was late, since the last time told
+
+PROBE = "bench_probe"  # tells that it is there by figures without any
+
+WATCH, REST = "watch", "rest"  # orders to the probe: look at the state of the mesh, or do not
+
+
+@dataclass(frozen=True)
+class Look:
+    """One MeshState, in numbers."""
+
+    wall_s: float  # when it arrived, time.monotonic
+    sim_s: float  # its stamp
+    on: int  # nodes with power
+    connected: int  # routers with power and a gateway
+    messages: int  # sum of total_messages over all nodes
+
+
+@dataclass(frozen=True)
+class Happening:
+    """A node started, was connected or lost its connection."""
+
+    sim_s: float
+    node: int
+    kind: str
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Numbers that a part of the system publishes about itself, by name."""
+
+    of: str
+    values: dict[str, float] = field(default_factory=dict)
+
+
+Sight = Union[Look, Happening, Figures]
+_KINDS = {kind.__name__: kind for kind in (Look, Happening, Figures)}
+
+
+def to_line(sight: Sight) -> str:
+    """As one line of text, for the pipe between probe and benchmark."""
+    return json.dumps({"kind": type(sight).__name__, **asdict(sight)})
+
+
+def from_line(line: str) -> Sight:
+    """The other way round. Raises ValueError for a line that is none."""
+    fields = json.loads(line)
+    sight: Sight = _KINDS[fields.pop("kind")](**fields)
+    return sight
+
+
+class Watch:
+    """Gathers what is seen of one fleet. Belongs to one thread."""
+
+    def __init__(self, drones: int) -> None:
+        self._drones = drones
+        self._happenings: list[Happening] = []
+        self.looks: list[Look] = []
+        self.figures: dict[str, dict[str, float]] = {}
+        self.worst: dict[str, float] = {}  # the largest value of each figure, whoever told it
+        self.all_on: Look | None = None  # the first in which they were
+        self.all_connected: Look | None = None
+
+    def see(self, sight: Sight) -> None:
+        """Take something in."""
+        if isinstance(sight, Happening):
+            self._happenings.append(sight)
+        elif isinstance(sight, Figures):
+            self.figures[sight.of] = sight.values
+            for name, value in sight.values.items():
+                self.worst[name] = max(value, self.worst.get(name, -math.inf))
+        else:
+            self.looks.append(sight)
+            if self.all_on is None and sight.on == self._drones:
+                self.all_on = sight
+            if self.all_on and not self.all_connected and sight.connected == self._drones - 1:
+                self.all_connected = sight
+
+    @property
+    def last(self) -> Look | None:
+        """The latest look, if there was one."""
+        return self.looks[-1] if self.looks else None
+
+    def connected_after_s(self) -> float | None:
+        """Simulated seconds from the start of the last node until all were connected; None: never.
+
+        From the stamps of the events where they tell it all. The first ones may have come before
+        the probe heard them: then from those of the states.
+        """
+        if self.all_on is None or self.all_connected is None:
+            return None
+        started = {h.node: h.sim_s for h in self._happenings if h.kind == STARTED}
+        connected_s = first_time_all_are_connected(self._happenings, self._drones - 1)
+        if len(started) == self._drones and connected_s is not None:
+            return max(0.0, connected_s - max(started.values()))
+        return self.all_connected.sim_s - self.all_on.sim_s
+
+    def total(self, name: str) -> float | None:
+        """The sum of a figure over all who tell it; None: nobody does."""
+        told = [values[name] for values in self.figures.values() if name in values]
+        return sum(told) if told else None
+
+
+def first_time_all_are_connected(happenings: Iterable[Happening], routers: int) -> float | None:
+    """The simulated second at which so many were connected at once; None: never."""
+    connected = set()
+    for happening in sorted(happenings, key=lambda happening: happening.sim_s):
+        if happening.kind == CONNECTED:
+            connected.add(happening.node)
+        elif happening.kind == DISCONNECTED:
+            connected.discard(happening.node)
+        if len(connected) == routers:
+            return happening.sim_s
+    return None

@@ -1,0 +1,200 @@
+"""The figures as tables for people. They are Markdown, so that a document can take them over."""
+
+from __future__ import annotations
+
+import os
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Sequence
+
+from drone_mesh.bench.inprocess import InProcessResult
+from drone_mesh.bench.measurement import RosResult
+from drone_mesh.bench.soak import Sample, SoakResult
+
+UNKNOWN = "-"
+SMALL_CORES = 0.005  # a process that uses less has no column of its own
+SIMULATOR = "WirelessSignalSimulator"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """On what it was measured."""
+
+    cores: int
+    processor: str
+    python: str
+    load_before: float  # of the last minute, before anything was started here
+
+    @classmethod
+    def here(cls) -> Machine:
+        """This one, now."""
+        return cls(
+            cores=len(os.sched_getaffinity(0)),
+            processor=_processor(),
+            python=platform.python_version(),
+            load_before=os.getloadavg()[0],
+        )
+
+    def __str__(self) -> str:
+        return (
+            f"{self.cores} cores of {self.processor}, Python {self.python}, "
+            f"load {self.load_before:.1f} before the start"
+        )
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table with columns of one width each."""
+    widths = [max(len(row[column]) for row in (headings, *rows)) for column in range(len(headings))]
+    lines = [headings, ["-" * width for width in widths], *rows]
+    return "\n".join(
+        "| " + " | ".join(cell.rjust(width) for cell, width in zip(line, widths)) + " |"
+        for line in lines
+    )
+
+
+def ros_tables(results: Sequence[RosResult]) -> str:
+    """Three tables: how it starts, what is carried, what it costs."""
+    return "\n\n".join(
+        (
+            "Start. Seconds; connected: from the last start to all connected.\n\n"
+            + table(
+                ("drones", "spacing", "speed", "all on (wall)", "connected (sim)", "(wall)"),
+                [
+                    [
+                        *_fleet(result),
+                        f"{result.on_after_wall_s:.1f}",
+                        _seconds_or_how_many(result),
+                        _number(result.connected_after_wall_s, 1),
+                    ]
+                    for result in results
+                ],
+            ),
+            "Traffic, per second of wall time, and the pace of simulated time.\n\n"
+            + table(
+                (
+                    "drones",
+                    "spacing",
+                    "speed",
+                    "messages/s",
+                    "deliveries/s",
+                    "lost",
+                    "factor reached",
+                    "worst timer lag",
+                ),
+                [
+                    [
+                        *_fleet(result),
+                        f"{result.messages_per_wall_s:.0f}",
+                        _number(result.deliveries_per_wall_s, 0),
+                        UNKNOWN if result.lost_share is None else f"{result.lost_share:.3%}",
+                        f"{result.reached_real_time_factor:.2f}",
+                        _milliseconds(result.worst_timer_lag_s),
+                    ]
+                    for result in results
+                ],
+            ),
+            "Cost. Cores used, by process; memory of all, in MB.\n\n" + _cost_table(results),
+        )
+    )
+
+
+def _fleet(result: RosResult) -> list[str]:
+    factor = result.real_time_factor
+    speed = "as fast as it goes" if factor == 0 else f"{factor:g}"
+    return [str(result.drones), f"{result.spacing_m:g} m", speed]
+
+
+def _seconds_or_how_many(result: RosResult) -> str:
+    if result.connected_after_sim_s is None:
+        return f"never ({result.routers_connected} of {result.drones - 1})"
+    return f"{result.connected_after_sim_s:.1f}"
+
+
+def _number(value: float | None, digits: int) -> str:
+    return UNKNOWN if value is None else f"{value:.{digits}f}"
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return UNKNOWN if seconds is None else f"{1000 * seconds:.0f} ms"
+
+
+def _cost_table(results: Sequence[RosResult]) -> str:
+    names = sorted(
+        {name for result in results for name, cores in result.cores.items() if cores > SMALL_CORES}
+    )
+    headings = ["drones", "spacing", "speed", *names, "all", "ms CPU/message", "PSS", "RSS"]
+    rows = [
+        [
+            *_fleet(result),
+            *(_number(result.cores.get(name), 2) for name in names),
+            f"{sum(result.cores.values()):.2f}",
+            _number(result.cpu_ms_per_message, 2),
+            f"{result.pss_mb:.0f}",
+            f"{result.rss_mb:.0f}",
+        ]
+        for result in results
+    ]
+    return table([*headings[:-2], "PSS (MB)", "RSS (MB)"], rows)
+
+
+def inprocess_table(results: Sequence[InProcessResult]) -> str:
+    """Simulated seconds per second."""
+    runs = results[0].runs
+    period = f"{results[0].simulated_s:g} simulated seconds"
+    return (
+        f"In process, one core: simulated seconds per second of processor time (of wall time). "
+        f"Medians of {runs} runs, for the first {period} from the start and the {period} after.\n\n"
+        + table(
+            ("nodes", "spacing", "from the start", "after", "all connected"),
+            [
+                [
+                    str(result.drones),
+                    f"{result.spacing_m:g} m",
+                    f"{result.from_start_per_cpu_s:.0f} ({result.from_start_per_wall_s:.0f})",
+                    f"{result.running_per_cpu_s:.0f} ({result.running_per_wall_s:.0f})",
+                    "yes" if result.all_connected else "no",
+                ]
+                for result in results
+            ],
+        )
+    )
+
+
+def sample_line(sample: Sample) -> str:
+    """One line of a long run."""
+    return (
+        f"{sample.sim_s / 60:6.0f} min simulated  {sample.wall_s / 60:5.1f} min wall  "
+        f"PSS {sample.pss_mb:7.1f} MB  RSS {sample.rss_mb:7.1f} MB  {sample.threads:5d} threads  "
+        f"{sample.open_files:5d} files  {sample.routers_connected:3d} connected"
+    )
+
+
+def verdict_lines(result: SoakResult) -> str:
+    """What became more after the first ten minutes."""
+    verdict = result.verdict()
+    if verdict is None:
+        return "too short to tell whether anything grows: it takes 13 minutes at least"
+    return "\n".join(
+        (
+            f"memory: {verdict.memory_before_mb:.1f} MB early after the first ten minutes, "
+            f"{verdict.memory_after_mb:.1f} MB at the end: "
+            + ("it grew" if verdict.memory_grew else "it did not grow"),
+            f"threads: {_span(verdict.threads)}",
+            f"open files and connections: {_span(verdict.open_files)}",
+        )
+    )
+
+
+def _span(span: tuple[int, int]) -> str:
+    least, most = span
+    return f"{most} all the time" if least == most else f"from {least} to {most}"

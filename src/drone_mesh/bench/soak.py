@@ -1,0 +1,146 @@
+"""Hours of simulated time: does anything grow?"""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import asdict, dataclass
+from typing import Callable, Sequence
+
+from drone_mesh.bench.cases import Case
+from drone_mesh.bench.measurement import MEGABYTE, await_all_on
+from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.system import BenchmarkError, System
+
+SAMPLE_PERIOD_S = 60.0  # simulated
+WARM_UP_S = 600.0  # simulated; what grows before that is not held against anybody
+MEMORY_TOLERANCE = 0.02  # our choice: how far the memory of a program in Python breathes
+SAMPLE_WITHIN_S = 600.0  # wall
+
+
+@dataclass(frozen=True)
+class Sample:
+    """All processes at one moment."""
+
+    sim_s: float
+    wall_s: float  # since the launch
+    pss_mb: float
+    rss_mb: float
+    threads: int
+    open_files: int  # connections are files, too
+    routers_connected: int
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became more after the first ten minutes."""
+
+    memory_before_mb: float  # median of the first third of the samples after the warm-up
+    memory_after_mb: float  # median of the last third
+    threads: tuple[int, int]  # least and most
+    open_files: tuple[int, int]
+
+    @property
+    def memory_grew(self) -> bool:
+        """Whether memory grew by more than it breathes."""
+        return self.memory_after_mb > self.memory_before_mb * (1 + MEMORY_TOLERANCE)
+
+    @property
+    def steady(self) -> bool:
+        """Whether nothing grew."""
+        return not self.memory_grew and all(
+            least == most for least, most in (self.threads, self.open_files)
+        )
+
+
+@dataclass(frozen=True)
+class SoakResult:
+    """The samples of one fleet."""
+
+    drones: int
+    spacing_m: float
+    samples: list[Sample]
+
+    def verdict(self) -> Verdict | None:
+        """None while there are fewer than three samples after the warm-up."""
+        return judge(self.samples)
+
+
+def judge(samples: Sequence[Sample]) -> Verdict | None:
+    """What became more; None for fewer than three samples after the warm-up."""
+    late = [sample for sample in samples if sample.sim_s >= WARM_UP_S]
+    third = len(late) // 3
+    if third == 0:
+        return None
+    threads = [sample.threads for sample in late]
+    files = [sample.open_files for sample in late]
+    return Verdict(
+        memory_before_mb=statistics.median(sample.pss_mb for sample in late[:third]),
+        memory_after_mb=statistics.median(sample.pss_mb for sample in late[-third:]),
+        threads=(min(threads), max(threads)),
+        open_files=(min(files), max(files)),
+    )
+
+
+def soak(
+    case: Case,
+    hours: float,
+    launch_args: list[str],
+    port: int,
+    progress: Progress,
+    tell: Callable[[Sample], None],
+) -> SoakResult:
+    """Run a fleet for so many hours of simulated time; `tell` is given each sample at once.
+
+    Raises BenchmarkError when it does not start, ends by itself or stands still.
+    """
+    result = SoakResult(case.drones, case.spacing_m, [])
+    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
+        await_all_on(system, case, progress)
+        watch = system.watch
+        assert watch.all_on is not None
+        next_s = watch.all_on.sim_s
+        end_s = next_s + hours * 3600.0
+        while next_s <= end_s:
+
+            def reached(sim_s: float = next_s) -> bool:
+                return watch.last is not None and watch.last.sim_s >= sim_s
+
+            def say(sim_s: float = next_s) -> None:
+                now_s = watch.last.sim_s if watch.last else 0.0
+                progress.say(f"simulated {now_s:.0f} s of {end_s:.0f} s")
+
+            if not system.wait_for(reached, SAMPLE_WITHIN_S, say):
+                raise BenchmarkError(
+                    f"a minute of simulated time takes more than {SAMPLE_WITHIN_S:g} s"
+                )
+            sample = _take_sample(system)
+            result.samples.append(sample)
+            progress.clear()
+            tell(sample)
+            next_s += SAMPLE_PERIOD_S
+    progress.clear()
+    return result
+
+
+def _take_sample(system: System) -> Sample:
+    look = system.watch.last
+    assert look is not None
+    use = system.use()
+    return Sample(
+        sim_s=look.sim_s,
+        wall_s=look.wall_s - system.launched_s,
+        pss_mb=use.pss_bytes / MEGABYTE,
+        rss_mb=use.rss_bytes / MEGABYTE,
+        threads=use.threads,
+        open_files=use.open_files,
+        routers_connected=look.connected,
+    )
+
+
+def as_json(result: SoakResult) -> dict[str, object]:
+    """The samples, and what they say."""
+    verdict = result.verdict()
+    return {
+        **asdict(result),
+        "verdict": None if verdict is None else {**asdict(verdict), "steady": verdict.steady},
+    }

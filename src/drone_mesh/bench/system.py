@@ -1,0 +1,269 @@
+"""A system of its own to measure: master, probe and drones are started here, and ended here."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Callable, Iterable, Iterator, Sequence
+
+import psutil
+
+from drone_mesh.bench.observation import PROBE, WATCH, Watch, from_line
+from drone_mesh.bench.processes import Use, family, take_use
+from drone_mesh.errors import MeshError
+
+LOOPBACK = "127.0.0.1"
+PART_WITHIN_S = 30.0  # wall; our choice, for master and probe
+END_WITHIN_S = 20.0  # wall; roslaunch itself gives each node 15 s before it kills it
+LOG_LINES_SHOWN = 15
+LOOK_PERIOD_S = 0.05  # wall
+
+
+class BenchmarkError(MeshError):
+    """The system could not be started or measured. The message says why, and what to do."""
+
+
+def check_environment() -> None:
+    """Raises BenchmarkError unless ROS and the built package can be found."""
+    if shutil.which("roslaunch") is None or shutil.which("rospack") is None:
+        raise BenchmarkError(
+            "no ROS here: source the setup.bash of the workspace first (scripts/env.bash does), "
+            "or measure without ROS: --only inprocess"
+        )
+    if _fails("rospack", "find", "drone_mesh"):
+        raise BenchmarkError(
+            "ROS does not know the package drone_mesh: build it, then source devel/setup.bash "
+            "(scripts/bench does both)"
+        )
+    if _fails(sys.executable, "-c", "import drone_mesh.msg"):
+        raise BenchmarkError(
+            "the messages of drone_mesh are not built for this Python: build the package, then "
+            "source devel/setup.bash (scripts/bench does both)"
+        )
+
+
+def _fails(*command: str) -> bool:
+    return subprocess.run(command, capture_output=True).returncode != 0
+
+
+def free_port() -> int:
+    """A TCP port of the loopback interface that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+class System:
+    """One master, one probe, one fleet. Use it in a `with`: whatever happens, all of it ends.
+
+    The probe's lines are taken in by a thread; the watch belongs to it, others read it.
+    """
+
+    def __init__(self, drones: int, launch_args: Sequence[str], port: int) -> None:
+        """`launch_args` as for roslaunch drone_mesh factory.launch."""
+        self.watch = Watch(drones)
+        self.launched_s = 0.0  # time.monotonic
+        self._launch_args = list(launch_args)
+        self._port = port
+        self._logs = Path(tempfile.mkdtemp(prefix="drone_mesh_bench_"))
+        self._environment = {
+            **os.environ,
+            "ROS_MASTER_URI": f"http://{LOOPBACK}:{port}",
+            "ROS_IP": LOOPBACK,
+            "ROS_LOG_DIR": str(self._logs),
+        }
+        self._environment.pop("ROS_HOSTNAME", None)
+        self._master: subprocess.Popen[bytes] | None = None
+        self._probe: subprocess.Popen[bytes] | None = None
+        self._fleet: subprocess.Popen[bytes] | None = None
+        self._reader: threading.Thread | None = None
+        self._seen: dict[int, psutil.Process] = {}
+
+    def __enter__(self) -> System:
+        """Start it; returns as soon as the fleet is being launched."""
+        try:
+            self._master = self._start("roscore", ["roscore", "-p", str(self._port)])
+            self._await("ROS master", self._master_answers)
+            self._probe = self._start(
+                "probe", [sys.executable, "-m", "drone_mesh.ros.bench_probe"], piped=True
+            )
+            self._reader = threading.Thread(target=self._read, args=(self._probe,), daemon=True)
+            self._reader.start()
+            self.order(WATCH)
+            # Before the fleet, which puts everybody who comes after it on simulated time.
+            self._await("probe", lambda: PROBE in self.watch.figures)
+            self.launched_s = time.monotonic()
+            launch = ["roslaunch", "drone_mesh", "factory.launch", *self._launch_args]
+            self._fleet = self._start("factory.launch", launch)
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def order(self, order: str) -> None:
+        """Tell the probe to watch the state of the mesh, or to rest."""
+        assert self._probe is not None
+        assert self._probe.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # check() tells of it
+            self._probe.stdin.write(f"{order}\n".encode())
+            self._probe.stdin.flush()
+
+    def check(self) -> None:
+        """Raises BenchmarkError, with the end of its log, when a part of the system has ended."""
+        parts = (
+            ("roscore", self._master),
+            ("probe", self._probe),
+            ("factory.launch", self._fleet),
+        )
+        for name, process in parts:
+            if process is not None and process.poll() is not None:
+                raise BenchmarkError(
+                    f"{name} ended by itself, with code {process.returncode}:\n{self._log_of(name)}"
+                )
+
+    def wait_for(
+        self, condition: Callable[[], bool], within_s: float, progress: Callable[[], None]
+    ) -> bool:
+        """True as soon as the condition is; False if it is not within so many wall seconds.
+
+        Raises BenchmarkError when a part of the system ends meanwhile.
+        """
+        deadline_s = time.monotonic() + within_s
+        while not condition():
+            if time.monotonic() > deadline_s:
+                return False
+            self.check()
+            progress()
+            time.sleep(LOOK_PERIOD_S)
+        return True
+
+    def use(self) -> Use:
+        """What the fleet and the master cost so far; the probe is not counted."""
+        processes = [
+            process
+            for started in (self._master, self._fleet)
+            if started is not None
+            for process in family(started.pid)
+        ]
+        self._seen.update((process.pid, process) for process in processes)
+        return take_use(processes, time.monotonic())
+
+    def close(self) -> None:
+        """End what was started here, the fleet first. Calling it twice changes nothing.
+
+        Cannot be interrupted: something would stay behind.
+        """
+        with _deaf():
+            self._close()
+
+    def _close(self) -> None:
+        for started in (self._fleet, self._probe, self._master):
+            if started is not None:
+                self._seen.update((process.pid, process) for process in family(started.pid))
+        if self._probe is not None and self._probe.stdin is not None:
+            with contextlib.suppress(BrokenPipeError):
+                self._probe.stdin.close()
+        for started in (self._fleet, self._probe, self._master):
+            if started is not None:
+                _end(started)
+        _end_what_is_left(self._seen.values())
+        if self._reader is not None:
+            self._reader.join()
+            self._reader = None
+        self._fleet = self._probe = self._master = None
+        self._seen.clear()
+        shutil.rmtree(self._logs, ignore_errors=True)
+
+    def _start(
+        self, name: str, command: Sequence[str], piped: bool = False
+    ) -> subprocess.Popen[bytes]:
+        """In a session of its own: a Ctrl-C of the terminal comes to us alone."""
+        with self._log_path(name).open("wb") as log:
+            return subprocess.Popen(
+                command,
+                env=self._environment,
+                stdin=subprocess.PIPE if piped else subprocess.DEVNULL,
+                stdout=subprocess.PIPE if piped else log,
+                stderr=log,
+                start_new_session=True,
+            )
+
+    def _await(self, what: str, there: Callable[[], bool]) -> None:
+        if not self.wait_for(there, PART_WITHIN_S, lambda: None):
+            raise BenchmarkError(f"no {what} after {PART_WITHIN_S:g} s")
+
+    def _master_answers(self) -> bool:
+        with socket.socket() as connection:
+            connection.settimeout(1.0)
+            return connection.connect_ex((LOOPBACK, self._port)) == 0
+
+    def _read(self, probe: subprocess.Popen[bytes]) -> None:
+        assert probe.stdout is not None
+        for line in probe.stdout:
+            with contextlib.suppress(ValueError, KeyError, TypeError):  # cut off at the end
+                self.watch.see(from_line(line.decode()))
+        probe.stdout.close()
+
+    def _log_path(self, name: str) -> Path:
+        return self._logs / f"{name}.out"
+
+    def _log_of(self, name: str) -> str:
+        text = self._log_path(name).read_text(encoding="utf-8", errors="replace")
+        return "\n".join(text.splitlines()[-LOG_LINES_SHOWN:])
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Take no notice of Ctrl-C and TERM. Only the main thread can: elsewhere nothing changes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handlers = {
+        number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+def _end(started: subprocess.Popen[bytes]) -> None:
+    """Ask as Ctrl-C would, then insist."""
+    for insist in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+        if started.poll() is not None:
+            break
+        started.send_signal(insist)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            started.wait(END_WITHIN_S)
+    started.wait()
+
+
+def _end_what_is_left(processes: Iterable[psutil.Process]) -> None:
+    left = [process for process in processes if process.is_running()]
+    for process in left:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            process.terminate()
+    _gone, alive = psutil.wait_procs(left, timeout=2.0)
+    for process in alive:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            process.kill()
