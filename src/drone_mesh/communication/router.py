@@ -174,12 +174,15 @@ class MeshnetworkRouter(MeshnetworkComponent):
             knows
             and hops + 1 < self._hops
             and (self._shortcut is None or hops < self._shortcut.hops)
+            and self._routing.get_direction_to_node(neighbour) == neighbour
         ):
             self._shortcut = Shortcut(neighbour, hops)
 
     def _on_heartbeat(
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
+        if creator == self._node_id:
+            return  # its own heartbeat came back: news of nobody
         if creator == preferred_gateway:
             self._on_gateway_answer(creator, hops + 1)
         elif know_gateway != self._knows_gateway():
