@@ -149,6 +149,7 @@ class Bench:
             self.now_s = max(self.now_s, self.mesh.next_tick_s)
             self.mesh.tick(self.now_s)
         self.now_s = now_s
+        self.mesh.tick(now_s)
 
     def wait(self, seconds):
         """Time passes."""
