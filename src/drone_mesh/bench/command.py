@@ -216,6 +216,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # So that a TERM ends what was started here, as Ctrl-C does.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        sys.exit(Benchmark(options, Progress()).run())
+        sys.exit(Benchmark(options, Progress(sys.stderr)).run())
     except BenchmarkError as error:
         sys.exit(f"bench: {error}")

@@ -57,13 +57,16 @@ _KINDS = {kind.__name__: kind for kind in (Look, Happening, Figures)}
 
 def to_line(sight: Sight) -> str:
     """As one line of text, for the pipe between probe and benchmark."""
-    return json.dumps({"kind": type(sight).__name__, **asdict(sight)})
+    return json.dumps({"sight": type(sight).__name__, **asdict(sight)})
 
 
 def from_line(line: str) -> Sight:
     """The other way round. Raises ValueError for a line that is none."""
-    fields = json.loads(line)
-    sight: Sight = _KINDS[fields.pop("kind")](**fields)
+    try:
+        fields = json.loads(line)
+        sight: Sight = _KINDS[fields.pop("sight")](**fields)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"not a line of the probe: {line[:80]!r}") from error
     return sight
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import TextIO
 
@@ -12,7 +11,7 @@ QUIET_S = 10.0  # without a terminal: one line in this time, unless something ne
 class Progress:
     """One line that changes on a terminal; a line now and then in a file or pipe."""
 
-    def __init__(self, stream: TextIO = sys.stderr) -> None:
+    def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._live = stream.isatty()
         self._said = ""

@@ -219,7 +219,7 @@ class System:
     def _read(self, probe: subprocess.Popen[bytes]) -> None:
         assert probe.stdout is not None
         for line in probe.stdout:
-            with contextlib.suppress(ValueError, KeyError, TypeError):  # cut off at the end
+            with contextlib.suppress(ValueError):  # the last one may be cut off
                 self.watch.see(from_line(line.decode()))
         probe.stdout.close()
 

@@ -1,0 +1,63 @@
+"""The command as it is typed."""
+
+import json
+
+import pytest
+
+from drone_mesh.bench import command
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as exit_:
+        command.main(arguments)
+    captured = capsys.readouterr()
+    return exit_.value.code, captured.out, captured.err
+
+
+def test_in_process_needs_no_ros_and_tells_the_same_as_table_and_json(
+    capsys, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(command.inprocess, "SIZES", (9,))
+    code, out, err = run(
+        capsys, "--only", "inprocess", "--quick", "--json", str(tmp_path / "figures.json")
+    )
+    assert code == 0
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    (result,) = figures["inprocess"]
+    assert result["drones"] == 9
+    assert result["all_connected"] is True
+    assert f"{result['running_per_cpu_s']:.0f} ({result['running_per_wall_s']:.0f})" in out
+    assert "in process" in err
+
+
+def test_without_ros_it_says_what_to_do(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    code, out, _err = run(capsys, "--quick")
+    assert "source the setup.bash" in code
+    assert "--only inprocess" in code
+    assert out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["--sizes", "17"], "such as 100/6"),
+        (["--sizes", "300/6"], "at most 254"),
+        (["--hours", "0"], "not above 0"),
+        (["--launch", "hosts=2"], "name:=value"),
+        (["--only", "everything"], "invalid choice"),
+    ],
+)
+def test_wrong_options_are_refused_with_the_reason(capsys, arguments, why):
+    code, _out, err = run(capsys, *arguments)
+    assert code == 2
+    assert why in err
+
+
+def test_a_place_for_the_figures_that_does_not_exist_is_refused_before_anything_is_measured(
+    capsys, tmp_path
+):
+    code, _out, err = run(capsys, "--only", "inprocess", "--json", str(tmp_path / "no" / "x.json"))
+    assert "no such directory" in code
+    assert err == ""

@@ -1,0 +1,113 @@
+"""What the benchmark concludes from what its probe sees."""
+
+import pytest
+
+from drone_mesh.bench.observation import (
+    CONNECTED,
+    DISCONNECTED,
+    STARTED,
+    Figures,
+    Happening,
+    Look,
+    Watch,
+    first_time_all_are_connected,
+    from_line,
+    to_line,
+)
+
+
+def look(sim_s, on, connected, wall_s=0.0):
+    return Look(wall_s=wall_s, sim_s=sim_s, on=on, connected=connected, messages=0)
+
+
+def watch_of(drones, *sights):
+    watch = Watch(drones)
+    for sight in sights:
+        watch.see(sight)
+    return watch
+
+
+@pytest.mark.parametrize(
+    "sight",
+    [look(1.5, 3, 2), Happening(0.25, 7, CONNECTED), Figures("air", {"delivered": 12.0})],
+)
+def test_what_the_probe_says_arrives_as_it_was_meant(sight):
+    assert from_line(to_line(sight)) == sight
+
+
+@pytest.mark.parametrize("line", ["", "{}", "[ WARN] something", '{"kind": "Look"}', '{"kind": 1}'])
+def test_a_line_that_is_none_is_refused(line):
+    with pytest.raises(ValueError, match="probe"):
+        from_line(line)
+
+
+def test_the_time_to_connect_is_counted_from_the_last_start_by_the_stamps_of_the_events():
+    watch = watch_of(
+        3,
+        Happening(1.0, 0, STARTED),
+        Happening(1.1, 1, STARTED),
+        Happening(1.4, 2, STARTED),
+        Happening(1.2, 1, CONNECTED),
+        Happening(1.9, 2, CONNECTED),
+        look(2.5, on=3, connected=2),
+    )
+    assert watch.connected_after_s() == pytest.approx(0.5)
+
+
+def test_without_the_first_events_the_states_tell_the_time_to_connect():
+    watch = watch_of(
+        3,
+        Happening(1.4, 2, STARTED),
+        Happening(1.9, 2, CONNECTED),
+        look(1.5, on=3, connected=1),
+        look(2.0, on=3, connected=1),
+        look(2.5, on=3, connected=2),
+    )
+    assert watch.connected_after_s() == pytest.approx(1.0)
+
+
+def test_who_was_connected_before_the_last_one_started_took_no_time():
+    watch = watch_of(
+        2,
+        Happening(1.0, 1, STARTED),
+        Happening(1.1, 1, CONNECTED),
+        Happening(1.3, 0, STARTED),
+        look(1.5, on=2, connected=1),
+    )
+    assert watch.connected_after_s() == 0.0
+
+
+def test_a_fleet_that_is_never_wholly_connected_has_no_time_to_connect():
+    watch = watch_of(3, look(1.0, on=3, connected=1), look(90.0, on=3, connected=1))
+    assert watch.connected_after_s() is None
+    assert watch.all_connected is None
+
+
+def test_connected_routers_do_not_count_as_all_while_a_node_is_missing():
+    watch = watch_of(3, look(1.0, on=2, connected=2), look(2.0, on=3, connected=2))
+    assert watch.all_connected == look(2.0, on=3, connected=2)
+
+
+def test_a_router_that_lost_its_connection_again_is_waited_for():
+    happenings = [
+        Happening(1.0, 1, CONNECTED),
+        Happening(2.0, 1, DISCONNECTED),
+        Happening(3.0, 2, CONNECTED),
+        Happening(5.0, 1, CONNECTED),
+        Happening(6.0, 2, DISCONNECTED),
+    ]
+    assert first_time_all_are_connected(happenings, routers=2) == 5.0
+    assert first_time_all_are_connected(happenings[:4][::-1], routers=2) == 5.0
+    assert first_time_all_are_connected(happenings[:3], routers=2) is None
+
+
+def test_figures_add_up_over_those_who_tell_them_and_the_worst_is_remembered():
+    watch = watch_of(
+        2,
+        Figures("host a", {"lag": 0.5, "sent": 1.0}),
+        Figures("host b", {"lag": 0.1, "sent": 10.0}),
+        Figures("host a", {"lag": 0.2, "sent": 3.0}),
+    )
+    assert watch.total("sent") == 13.0
+    assert watch.worst["lag"] == 0.5
+    assert watch.total("unheard of") is None
