@@ -12,6 +12,7 @@ class ChildTableTree(IRoutingTechnique):
         self._children: dict[int, set[int]] = {}
         # The same table the other way round, so that no packet has to search it.
         self._children_with: dict[int, set[int]] = {}
+        self._entries = 0  # grandchildren in all sets together
         self._essentials: IRoutingEssentials | None = None
 
     def get_direction_to_node(self, node: int) -> int:
@@ -42,6 +43,7 @@ class ChildTableTree(IRoutingTechnique):
         """Forget everything."""
         self._children.clear()
         self._children_with.clear()
+        self._entries = 0
 
     def cant_communicate_with_node(self, node: int) -> int:
         """Remove child `node` with all that is behind it."""
@@ -71,9 +73,10 @@ class ChildTableTree(IRoutingTechnique):
     def other_can_communicate_with_node(self, other: int, node: int) -> None:
         """`other` becomes a child and `node` its grandchild."""
         self.can_communicate_with_node(other)
-        if other != node:
+        if other != node and node not in self._children[other]:
             self._children[other].add(node)
             self._children_with.setdefault(node, set()).add(other)
+            self._entries += 1
 
     def proven_path_to_node(self, other: int, node: int) -> None:
         """List `node` under `other` and under no other child."""
@@ -87,7 +90,7 @@ class ChildTableTree(IRoutingTechnique):
 
     def get_table_size(self) -> int:
         """Children and all their grandchildren; a node under two children counts twice."""
-        return len(self._children) + sum(map(len, tuple(self._children.values())))
+        return len(self._children) + self._entries
 
     def get_amount_of_children(self) -> int:
         """Number of nodes in direct reach."""
@@ -102,6 +105,7 @@ class ChildTableTree(IRoutingTechnique):
         return not self._children
 
     def _forget_holder(self, node: int, child: int) -> None:
+        self._entries -= 1
         holders = self._children_with[node]
         holders.remove(child)
         if not holders:
