@@ -1,0 +1,188 @@
+"""What the rostests share: the mesh as its debug topics show it, strangers, and deadlines."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from typing import Callable, Iterable
+from xmlrpc.client import ServerProxy
+
+import rosgraph
+import rospy
+from drone_mesh.msg import NRF24, DroneInfo, NodeDebugInfo
+from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
+from rosgraph_msgs.msg import Log
+
+PAYLOAD_BYTES = 32
+STANDSTILL_S = 20.0  # wall: time that does not move means that the world has died
+LOOK_PERIOD_S = 0.01
+WALL_LIMIT_S = 20.0  # for what does not depend on simulated time
+
+
+def wait_for(what: str, within_s: float, condition: Callable[[], object]) -> None:
+    """Return when `condition` holds; AssertionError after `within_s` of wall time."""
+    deadline_s = time.monotonic() + within_s
+    while not condition():
+        if time.monotonic() > deadline_s:
+            raise AssertionError(f"timed out: {what}, waited {within_s:g} s")
+        time.sleep(LOOK_PERIOD_S)
+
+
+def call(service: str, service_class: type, *arguments: object) -> object:
+    """Call a service once it is there."""
+    rospy.wait_for_service(service, timeout=WALL_LIMIT_S)
+    return rospy.ServiceProxy(service, service_class)(*arguments)
+
+
+def pid_of(node: str) -> int | None:
+    """Process id of a ROS node; None if it does not answer."""
+    try:
+        uri = rosgraph.Master("/rostest").lookupNode(node)
+        return int(ServerProxy(uri).getPid("/rostest")[2])
+    except (OSError, rosgraph.MasterException):
+        return None
+
+
+def kill_and_wait_for_respawn(node: str) -> None:
+    """SIGKILL; returns when roslaunch has started it again."""
+    old_pid = pid_of(node)
+    assert old_pid is not None, f"{node} is not there to be killed"
+    os.kill(old_pid, signal.SIGKILL)
+    wait_for(f"{node} was not respawned", WALL_LIMIT_S, lambda: pid_of(node) not in (None, old_pid))
+
+
+class LogWatch:
+    """Everything that goes to the log from now on."""
+
+    def __init__(self) -> None:
+        self._lines: list[Log] = []
+        self._subscriber = rospy.Subscriber("/rosout", Log, self._lines.append)
+
+    def lines(self, text: str) -> list[str]:
+        """The lines that hold this text."""
+        return [line.msg for line in list(self._lines) if text in line.msg]
+
+    def failures(self) -> list[str]:
+        """Lines that tell of an exception that nobody expected."""
+        return self.lines("Traceback") + self.lines("bad callback") + self.lines("in a mesh node")
+
+
+class MeshWatch:
+    """The nodes 0..count-1, as they tell of themselves. Times are simulated seconds."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self._infos: dict[int, NodeDebugInfo] = {}
+        self._arrived = threading.Event()
+        for node_id in range(count):
+            rospy.Subscriber(f"/Nodes/{node_id}/debug", NodeDebugInfo, self._heard)
+
+    def _heard(self, info: NodeDebugInfo) -> None:
+        self._infos[info.nodeID] = info
+
+    def hops(self) -> dict[int, int | None]:
+        """Hops of each node that was heard of; None while it is not connected."""
+        return {
+            node_id: info.hops if info.ConnectedWithGateway else None
+            for node_id, info in sorted(self._infos.items())
+        }
+
+    def connected(self, node_ids: Iterable[int] | None = None) -> bool:
+        """Whether these nodes (default: all) are connected."""
+        hops = self.hops()
+        wanted = range(self.count) if node_ids is None else node_ids
+        return all(hops.get(node_id) is not None for node_id in wanted)
+
+    def info(self, node_id: int) -> NodeDebugInfo:
+        """What the node said last."""
+        return self._infos[node_id]
+
+    def wait(self, what: str, within_s: float, condition: Callable[[], object]) -> float:
+        """Return the simulated seconds that it took; AssertionError after `within_s` of them."""
+        begun_s = moved_s = rospy.get_time()
+        moved_wall_s = time.monotonic()
+        while not condition():
+            now_s = rospy.get_time()
+            if now_s != moved_s:
+                moved_s, moved_wall_s = now_s, time.monotonic()
+            if now_s - begun_s > within_s and begun_s > 0.0:
+                raise AssertionError(
+                    f"timed out: {what}, waited {within_s:g} simulated s; hops now: {self.hops()}"
+                )
+            if time.monotonic() - moved_wall_s > STANDSTILL_S:
+                raise AssertionError(f"the world died: waited for '{what}', the clock stands still")
+            begun_s = begun_s or now_s
+            time.sleep(LOOK_PERIOD_S)
+        return rospy.get_time() - begun_s
+
+    def pass_time(self, duration_s: float) -> None:
+        """Let simulated time go by."""
+        end_s = rospy.get_time() + duration_s
+        self.wait(f"{duration_s} s go by", 2 * duration_s, lambda: rospy.get_time() >= end_s)
+
+    def place(self, node_id: int) -> tuple[float, float, int]:
+        """Longitude, latitude and height of the drone, as its gps tells."""
+        answer = call(f"/Drones/{node_id}/gps", RequestGPS)
+        return (answer.longitude, answer.latitude, answer.height)
+
+    def stands_at(self, node_id: int, longitude: float, latitude: float) -> bool:
+        """Within 0.05 m, on the ground."""
+        x, y, height = self.place(node_id)
+        return abs(x - longitude) <= 0.05 and abs(y - latitude) <= 0.05 and height == 0
+
+    def switch(self, node_id: int, on: bool) -> None:
+        """Use a node's power switch."""
+        call(f"/Nodes/{node_id}/powerSwitch", PowerSwitch, on)
+
+    def set_to_case(self, case: int) -> None:
+        """Order a layout."""
+        call("/DroneManager/SetToCasus", Casus, case)
+
+
+class Stranger:
+    """A node that is none of ours: speaks the wire contract and keeps what it hears."""
+
+    def __init__(self, node_id: int, topic: str, place: tuple[float, float, float]) -> None:
+        self.node_id = node_id
+        self.heard: list[bytes] = []
+        self._topic, self._place = topic, place
+        self._publisher = rospy.Publisher("/WirelessSignalSimulator", DroneInfo, queue_size=100)
+        self.subscriber = rospy.Subscriber(topic, NRF24, lambda packet: self._hear(packet))
+
+    def _hear(self, packet: NRF24) -> None:
+        self.heard.append(bytes(packet.payload))
+
+    def tell(self, position: tuple[float, float, float], sub: str = "", on: bool = True) -> None:
+        """Publish one DroneInfo about itself."""
+        self._publisher.publish(DroneInfo(self.node_id, position, sub, on))
+
+    def register(self) -> None:
+        """Returns when the simulator knows it and it can be sent to."""
+        wait_for("no simulator", WALL_LIMIT_S, lambda: self._publisher.get_num_connections() > 0)
+        self.tell(self._place, self._topic)
+        hello = bytes((self.node_id, self.node_id, 0, self.node_id, self.node_id))
+
+        def reachable() -> bool:
+            return self.send(hello) and hello.ljust(PAYLOAD_BYTES, b"\0") in self.heard
+
+        wait_for(f"stranger {self.node_id} was not registered", WALL_LIMIT_S, reachable)
+        self.heard.clear()
+
+    def send(self, packet: bytes) -> bool:
+        """Send to the node in byte 3; True: it has it."""
+        message = NRF24(packet.ljust(PAYLOAD_BYTES, b"\0"))
+        answer = call("/SignalSimulator/message", WirelessMessage, packet[1], packet[3], message)
+        return bool(answer.succes)
+
+    def wait_for_packet(self, start: bytes, what: str) -> bytes:
+        """The first packet heard that starts like this."""
+        found: list[bytes] = []
+
+        def look() -> bool:
+            found.extend(packet for packet in list(self.heard) if packet.startswith(start))
+            return bool(found)
+
+        wait_for(f"{what} (packet {start.hex()}..); heard {len(self.heard)}", WALL_LIMIT_S, look)
+        return found[0]

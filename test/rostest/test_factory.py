@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""The DroneFactory: time, speed, and the ROS side of the engines."""
+
+from __future__ import annotations
+
+import math
+import time
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from drone_mesh.msg import DroneInfo, Location
+from drone_mesh.srv import SetSpeed
+from rosgraph_msgs.msg import Clock
+from rostest_support import LogWatch, MeshWatch, call, wait_for
+
+
+class FactoryTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        rospy.init_node("test_factory")
+        cls.log = LogWatch()
+        cls.mesh = MeshWatch(3)
+        cls.mesh.wait("the first debug messages", 30, lambda: len(cls.mesh.hops()) == 3)
+        cls.start_places = [cls.mesh.place(node_id) for node_id in range(3)]
+
+    def fly(self, node_id: int, latitude: float, longitude: float, height: int) -> None:
+        publisher = rospy.Publisher(f"/Drones/{node_id}/goal", Location, queue_size=1)
+        wait_for("nobody takes goals", 10, lambda: publisher.get_num_connections() > 0)
+        publisher.publish(Location(latitude, longitude, height))
+
+    def test_clock_goes_in_hundredths_of_a_second(self) -> None:
+        times: list[int] = []
+        clock = rospy.Subscriber("/clock", Clock, lambda tick: times.append(tick.clock.to_nsec()))
+        wait_for("no 200 ticks", 20, lambda: len(times) >= 200)
+        clock.unregister()
+        self.assertEqual({b - a for a, b in zip(times[:200], times[1:200])}, {10_000_000})
+
+    def test_the_world_can_be_paused_and_goes_on(self) -> None:
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, True, 0.0).success)
+        time.sleep(0.3)  # what is under way arrives
+        stopped_s = rospy.get_time()
+        time.sleep(0.5)
+        self.assertEqual(rospy.get_time(), stopped_s)
+        self.assertFalse(call("/DroneFactory/setSpeed", SetSpeed, False, math.nan).success)
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 0.0).success)
+        wait_for("the clock did not go on", 10, lambda: rospy.get_time() > stopped_s + 1.0)
+
+    def test_drones_start_where_the_reference_says(self) -> None:
+        self.assertEqual(self.start_places, [(-1.0, 0.0, 0), (0.0, 0.0, 0), (1.0, 0.0, 0)])
+
+    def test_a_goal_is_flown_to_and_told_at_most_20_times_a_second(self) -> None:
+        told: list[DroneInfo] = []
+        positions = rospy.Subscriber("/WirelessSignalSimulator", DroneInfo, told.append)
+        self.fly(2, latitude=3.0, longitude=5.0, height=2)
+
+        def of_the_engine() -> list[DroneInfo]:
+            return [info for info in list(told) if info.nodeID == 2 and not info.sub]
+
+        goal = (5.0, 3.0, float(np.float32(2.05)))  # of the box's centre
+        self.mesh.wait(
+            "drone 2 did not arrive",
+            10,
+            lambda: of_the_engine() and tuple(of_the_engine()[-1].position) == goal,
+        )
+        positions.unregister()
+        self.assertEqual(self.mesh.place(2), (5.0, 3.0, 2))
+        self.assertTrue(all(info.on for info in of_the_engine()))
+        flight_s = math.dist((1.0, 0.0, 0.05), (5.0, 3.0, 2.05)) / 2.0
+        self.assertLessEqual(len(of_the_engine()), 20 * flight_s + 3)
+        self.assertGreaterEqual(len(of_the_engine()), 10 * flight_s)
+
+    def test_a_goal_that_is_none_is_refused_with_one_line(self) -> None:
+        for _ in range(20):
+            self.fly(1, latitude=math.nan, longitude=0.0, height=0)
+            self.fly(1, latitude=0.0, longitude=5001.0, height=0)
+        wait_for("no line", 10, lambda: self.log.lines("drone 1 refuses a goal"))
+        self.assertEqual(self.mesh.place(1), (0.0, 0.0, 0))
+        self.assertLessEqual(len(self.log.lines("drone 1 refuses a goal")), 2)
+        self.assertEqual(self.log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "factory", FactoryTest)

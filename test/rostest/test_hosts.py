@@ -1,0 +1,48 @@
+#!/usr/bin/env python3
+"""The nodes are spread over three processes; one of them is killed and comes back."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import unittest
+
+import rospy
+import rostest
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, pid_of, wait_for
+
+
+class HostsTest(unittest.TestCase):
+    def test_only_the_drones_of_a_killed_host_are_lost_and_they_rejoin(self) -> None:
+        rospy.init_node("test_hosts")
+        log = LogWatch()
+        mesh = MeshWatch(15)  # ids 0..4, 5..9 and 10..14 in a host each
+        mesh.wait("all connected", 60, mesh.connected)
+
+        refused = subprocess.run(
+            ["rosrun", "drone_mesh", "mesh_host", "__name:=second", "_first:=3", "_last:=4"],
+            stderr=subprocess.PIPE,
+            timeout=WALL_LIMIT_S,
+            check=False,
+            text=True,
+        )
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("node 3 is already served by another process", refused.stderr)
+        self.assertNotIn("Traceback", refused.stderr)
+
+        old_pid = pid_of("/mesh_host_3")
+        os.kill(old_pid, signal.SIGKILL)
+        sent = mesh.info(14).totalMessages
+        mesh.wait("the others stay connected", 1, lambda: mesh.connected(range(10)))
+        wait_for("respawn", WALL_LIMIT_S, lambda: pid_of("/mesh_host_3") not in (None, old_pid))
+        mesh.wait(
+            "the nodes of host 3 started anew and connected",
+            60,
+            lambda: mesh.info(14).totalMessages < sent and mesh.connected(),
+        )
+        self.assertEqual(log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "hosts", HostsTest)

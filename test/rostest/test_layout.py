@@ -1,0 +1,38 @@
+#!/usr/bin/env python3
+"""Layout 0, the field case: 17 drones fly to their places and the mesh closes again."""
+
+from __future__ import annotations
+
+import unittest
+
+import rospy
+import rostest
+from rostest_support import LogWatch, MeshWatch
+
+PLACES = {  # longitude, latitude: data of the project plan's field case
+    1: (-13, 24), 2: (-11, 20), 3: (-12, 14), 4: (-7, 16), 5: (-12, 7), 6: (-7, 12),
+    7: (-9, 5), 8: (-5, 10), 9: (-5, 5), 10: (4, 9), 11: (5, 5), 12: (7, 13),
+    13: (9, 7), 14: (8, 20), 15: (5, 25), 16: (11, 25), 17: (8, 26.5),
+}  # fmt: skip
+LONGEST_FLIGHT_S = 30.0
+
+
+class LayoutTest(unittest.TestCase):
+    def test_everybody_flies_to_its_place_and_is_connected_again(self) -> None:
+        rospy.init_node("test_layout")
+        log = LogWatch()
+        mesh = MeshWatch(18)
+        mesh.wait("all connected at the start", 30, mesh.connected)
+        mesh.set_to_case(0)
+        for node_id, place in sorted(PLACES.items()):
+            mesh.wait(
+                f"drone {node_id} did not come to {place}, it is at {mesh.place(node_id)}",
+                LONGEST_FLIGHT_S,
+                lambda node_id=node_id, place=place: mesh.stands_at(node_id, *place),
+            )
+        mesh.wait("all connected after the landing", 60, mesh.connected)
+        self.assertEqual(log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "layout", LayoutTest)

@@ -1,0 +1,35 @@
+#!/usr/bin/env python3
+"""The power switch of an antenna."""
+
+from __future__ import annotations
+
+import unittest
+
+import rospy
+import rostest
+from drone_mesh.srv import AreaScan
+from rostest_support import LogWatch, MeshWatch, call
+
+
+class PowerSwitchTest(unittest.TestCase):
+    def test_a_node_that_is_switched_off_is_gone_and_comes_back(self) -> None:
+        rospy.init_node("test_power_switch")
+        log = LogWatch()
+        mesh = MeshWatch(3)
+        mesh.wait("all connected", 30, mesh.connected)
+        mesh.switch(2, False)
+        mesh.wait("2 off and not connected", 3, lambda: mesh.hops()[2] is None)
+        self.assertFalse(mesh.info(2).on)
+        self.assertEqual(list(call("/SignalSimulator/othersinRange", AreaScan, 1).near), [0])
+        sent = mesh.info(2).totalMessages
+        mesh.pass_time(25.0)
+        self.assertEqual(mesh.info(2).totalMessages, sent, "it sent something while off")
+        self.assertTrue(mesh.connected([0, 1]))
+        mesh.switch(2, True)
+        mesh.wait("2 connected again", 5, lambda: mesh.info(2).on and mesh.connected())
+        self.assertEqual(list(call("/SignalSimulator/othersinRange", AreaScan, 1).near), [0, 2])
+        self.assertEqual(log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "power_switch", PowerSwitchTest)

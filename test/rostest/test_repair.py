@@ -1,0 +1,37 @@
+#!/usr/bin/env python3
+"""Layout 201, a line of three: the middle one dies, the last one flies to its place."""
+
+from __future__ import annotations
+
+import unittest
+
+import rospy
+import rostest
+from rostest_support import LogWatch, MeshWatch
+
+FLIGHT_S = 6.0 / 2.0  # from (-1, 16) to (-1, 10) at 2 m/s
+
+
+class RepairTest(unittest.TestCase):
+    def test_the_last_of_a_line_takes_the_place_of_the_one_that_died(self) -> None:
+        rospy.init_node("test_repair")
+        log = LogWatch()
+        mesh = MeshWatch(4)
+        mesh.wait("all connected at the start", 30, mesh.connected)
+        mesh.set_to_case(201)
+        mesh.wait("drone 3 did not arrive", 30, lambda: mesh.stands_at(3, -1, 16))
+        mesh.wait(
+            "3 knows its way, and the place it would fly to",
+            60,
+            lambda: mesh.hops() == {0: 0, 1: 1, 2: 2, 3: 3} and mesh.info(3).prefLoc == 2,
+        )
+        mesh.switch(2, False)
+        mesh.wait("3 did not notice", 30, lambda: mesh.hops()[3] is None)
+        mesh.wait("3 back", 120 + FLIGHT_S, lambda: mesh.hops()[3] == 2)
+        self.assertTrue(mesh.stands_at(3, -1, 10), f"3 is at {mesh.place(3)}")
+        self.assertTrue(mesh.stands_at(1, -1, 4), "1 moved")
+        self.assertEqual(log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "repair", RepairTest)

@@ -1,0 +1,43 @@
+#!/usr/bin/env python3
+"""The WirelessSignalSimulator is killed in mid-run and comes back knowing nothing."""
+
+from __future__ import annotations
+
+import unittest
+
+import rospy
+import rostest
+from drone_mesh.srv import AreaScan
+from rostest_support import LogWatch, MeshWatch, call, kill_and_wait_for_respawn
+
+
+class SimulatorRestartTest(unittest.TestCase):
+    def test_the_mesh_is_connected_again_and_a_node_that_was_off_stays_off(self) -> None:
+        rospy.init_node("test_simulator_restart")
+        log = LogWatch()
+        mesh = MeshWatch(10)
+        others = [node_id for node_id in range(10) if node_id != 9]
+        mesh.wait("all connected", 30, mesh.connected)
+        mesh.switch(9, False)
+        near_before = list(call("/SignalSimulator/othersinRange", AreaScan, 5).near)
+        sent_before = {node_id: mesh.info(node_id).totalMessages for node_id in others}
+        kill_and_wait_for_respawn("/WirelessSignalSimulator")
+
+        def everybody_sent() -> bool:
+            return all(mesh.info(n).totalMessages > sent_before[n] for n in others)
+
+        mesh.wait(
+            "all but 9 connected, with packets that the new simulator carried",
+            20,
+            lambda: mesh.connected(others) and everybody_sent(),
+        )
+        self.assertEqual(
+            list(call("/SignalSimulator/othersinRange", AreaScan, 5).near), near_before
+        )
+        self.assertNotIn(9, list(call("/SignalSimulator/othersinRange", AreaScan, 6).near))
+        self.assertLessEqual(len(log.lines("the simulator is gone")), 1)
+        self.assertEqual(log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "simulator_restart", SimulatorRestartTest)
