@@ -112,7 +112,7 @@ class WorldRunner:
 
     def _step(self) -> None:
         now_s = self._world.step()
-        self._clock.publish(Clock(rospy.Time.from_sec(now_s)))
+        self._clock.publish(Clock(rospy.Time(0, round(now_s * 1e9))))  # from_sec rounds down
         self._hosts.time_advanced()
 
     def _measure(self, before_s: tuple[float, float]) -> tuple[float, float]:
