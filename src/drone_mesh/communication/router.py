@@ -22,9 +22,12 @@ from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.negotiation import NO_BID, Negotiation
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S, MeshTiming
-from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import GoalRefused
 
 ROUNDING_S = 1e-6  # sums of periods are not exact
+MAX_SCORE_M = 1e9  # our choice: beyond every place there is, and it fits a float32
 
 
 class Shortcut(NamedTuple):
@@ -240,10 +243,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _fly_back(self) -> None:
         """One step back towards the gateway; who knows no place has nowhere to fly (14.7)."""
-        place = self._good_location or self._gateway_location
-        if place is None:
+        place, at = self._good_location, self._good_location_id
+        if not _may_be_flown_to(place):
+            place, at = self._gateway_location, self._preferred_gateway
+        if place is None or not _may_be_flown_to(place):
             return
-        at = self._good_location_id if self._good_location else self._preferred_gateway
         self._report(MeshEventKind.FLIGHT_DECIDED, at)
         self._forget_neighbourhood()
         self._fly_to(place)
@@ -273,11 +277,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _score(self) -> float:
         """Distance to the gateway's place in metres (SDD formula 3.1), or NO_BID."""
         own = self._own_location()
-        if own is None or self._gateway_location is None or self._good_location is None:
+        if own is None or self._gateway_location is None:
+            return NO_BID
+        if not _may_be_flown_to(self._good_location):
             return NO_BID
         if self._good_location_id in self._routing.get_set_of_children():
             return NO_BID
-        return own.distance_m(self._gateway_location)
+        return min(own.distance_m(self._gateway_location), MAX_SCORE_M)
 
     def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
         self._negotiation.heard(bid.creator, bid.cost, self._now_s)
@@ -311,3 +317,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _end_negotiation(self) -> None:
         self._negotiation.clear()
         self._deadlines.set(Due.DECIDE, math.inf)
+
+
+def _may_be_flown_to(place: Location | None) -> bool:
+    """Anybody can say anything of where he is: not every place heard of is one for a drone."""
+    if place is None:
+        return False
+    try:
+        check_goal(*place)
+    except GoalRefused:
+        return False
+    return True
