@@ -239,7 +239,7 @@ operation = st.one_of(
 )
 
 
-@settings(derandomize=True, deadline=None, database=None, max_examples=150)
+@settings(derandomize=True, deadline=None, database=None, max_examples=60)
 @given(st.lists(operation, max_size=40))
 def test_does_what_the_words_of_the_reference_say(operations):
     tree, naive = ChildTableTree(), Naive()

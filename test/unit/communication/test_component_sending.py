@@ -1,4 +1,4 @@
-"""What every node does to get a packet through, and whom it tells when it does not (reference 8)."""
+"""What each node does to get a packet through, and whom it tells if it fails (reference 8)."""
 
 from __future__ import annotations
 
