@@ -53,6 +53,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._on_payload = on_payload
         self._mesh: IMeshNetwork | None = None
         self._receiving: Task | None = None
+        self._ending = False  # the receiving thread shall end
         self._info: IMeshDebugInfo | None = None
         self._powered = False
         self._seen: dict[int, tuple[bytes, float]] = {}  # node -> its last payload, and when
@@ -70,6 +71,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._radio.begin()
         self._mesh = mesh
         self._powered = True
+        self._ending = False
         self._receiving = self._runtime.start(self._receive, f"nRF24 {self._radio.node_id}")
 
     def stop_antenna(self) -> None:
@@ -77,6 +79,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         if receiving is None:
             return
         self._powered = False
+        self._ending = True
         receiving.join()
         self._radio.close()
         self._mesh = None
@@ -126,7 +129,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         return replace(self._radio.statistics(), duplicates=self._duplicates)
 
     def _receive(self) -> None:
-        while self._receiving is not None:
+        while not self._ending:
             if not self._powered:
                 self._runtime.sleep(RECEIVE_TIMEOUT_S)
                 continue
