@@ -1,0 +1,11 @@
+"""The program raspberry_gateway."""
+
+from __future__ import annotations
+
+from drone_mesh.raspberry.options import parse_gateway
+from drone_mesh.raspberry.program import run
+
+
+def main() -> int:
+    """Run until Ctrl-C or SIGTERM; the exit status."""
+    return run("raspberry_gateway", parse_gateway)

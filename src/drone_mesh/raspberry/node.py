@@ -1,0 +1,112 @@
+"""One node of the mesh with everything that belongs to it: radio, drone, software, thread."""
+
+from __future__ import annotations
+
+import logging
+import random
+import time
+from typing import Callable
+
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.interfaces import IInternetConnection
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.communication.router import MeshnetworkRouter
+from drone_mesh.communication.routing import create_routing_technique
+from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.execution import MeshExecutor, Work
+from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
+from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.raspberry.options import Options
+
+_log = logging.getLogger(__name__)
+
+MakeInternet = Callable[[Callable[[Work], None]], IInternetConnection]
+"""Makes a gateway's internet side from `submit`."""
+
+
+class RadioNode:
+    """A router, or a gateway if it is given an internet side. Belongs to the thread that made it.
+
+    The node's own thread works in the component, from start to stop.
+    """
+
+    def __init__(
+        self,
+        radio: NRF24LowLevelInterface,
+        location: Location,
+        options: Options,
+        make_internet: MakeInternet | None = None,
+    ) -> None:
+        """Takes the radio over. Raises what `make_internet` raises."""
+        self.radio = radio
+        self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
+        self._seat = self._executor.seat()
+        self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
+        self._internet = make_internet(self._seat.submit) if make_internet is not None else None
+        self.component = self._make_component(location, options)
+        self._started = False
+
+    def start(self) -> None:
+        """Start the radio and the mesh software; RadioError if the chip does not answer."""
+        self.component.start(time.monotonic())  # before the thread, to see what is wrong with it
+        self._started = True
+        self._seat.submit(lambda _now_s: self._seat.take(self.component))
+        self._executor.start()
+
+    def switch_off(self) -> None:
+        """Off the air; what the software still wants to send fails at once."""
+        self._antenna.switch_power(False)
+
+    def stop(self) -> None:
+        """End the software and its thread, and give the radio back, powered down."""
+        if self._started:
+            self._started = False
+            self._seat.submit(lambda _now_s: self.component.stop())
+            self._executor.stop()
+            _log.info("node %d: %s", self.radio.node_id, self._antenna.statistics())
+        else:
+            if self._internet is not None:
+                self._internet.disconnect()
+            self.radio.close()
+
+    def _make_component(self, location: Location, options: Options) -> MeshnetworkComponent:
+        node_id = self.radio.node_id
+        engine = GroundEngine(node_id, location)
+        routing = create_routing_technique(options.routing)
+        rng = random.Random()
+        if self._internet is None:
+            return MeshnetworkRouter(
+                node_id, self._antenna, engine, routing, rng, options.timing, _log_event
+            )
+        return MeshnetworkGateway(
+            node_id,
+            self._antenna,
+            engine,
+            routing,
+            self._internet,
+            rng,
+            options.timing,
+            _log_event,
+        )
+
+
+_WARNINGS = frozenset((MeshEventKind.DISCONNECTED, MeshEventKind.EMERGENCY))
+_ABOUT_GATEWAYS = frozenset(
+    (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)
+)
+_WITHOUT_LINE = frozenset((MeshEventKind.NO_ROUTE, MeshEventKind.FLIGHT_ORDERED))
+
+
+def _log_event(event: MeshEvent) -> None:
+    """One line for what happened; orders have lines of their own already."""
+    if event.kind in _WITHOUT_LINE:
+        return
+    words = [event.kind.value]
+    if event.peer <= 253:
+        words.append(f"gateway {event.peer}" if event.kind in _ABOUT_GATEWAYS else str(event.peer))
+    if event.detail:
+        words.append(f"({event.detail})")
+    level = logging.WARNING if event.kind in _WARNINGS else logging.INFO
+    _log.log(level, "node %d: %s", event.node, " ".join(words))

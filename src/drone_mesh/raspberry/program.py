@@ -1,0 +1,204 @@
+"""What raspberry_router and raspberry_gateway do from start to end."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import signal
+import sys
+import threading
+import time
+from types import FrameType
+from typing import Callable, Iterator, Sequence
+
+from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
+from drone_mesh.errors import MeshError
+from drone_mesh.execution import Work
+from drone_mesh.nrf24.errors import HardwareUnavailable
+from drone_mesh.nrf24.gpio import GpiodCe, GpiodIrq
+from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.nrf24.spi import open_spi
+from drone_mesh.raspberry.emulated_air import EmulatedAir
+from drone_mesh.raspberry.node import MakeInternet, RadioNode
+from drone_mesh.raspberry.options import Hardware, HttpOptions, Options
+
+LOOK_PERIOD_S = 0.5  # our choice: how often the main thread looks at the nodes
+LONELY_AFTER_S = 15.0  # our choice: one check period and half of the next
+LONELY_AGAIN_S = 300.0  # our choice: how often that is said
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+_log = logging.getLogger(__name__)
+
+
+def run(program: str, parse: Callable[[], Options]) -> int:
+    """Run until a signal ends it; the exit status."""
+    with _signals() as ended:
+        try:
+            options = parse()
+            logging.basicConfig(
+                format="%(asctime)s %(levelname)s %(message)s", level=options.log_level.upper()
+            )
+            _run(options, ended)
+        except MeshError as error:
+            print(f"{program}: {error}", file=sys.stderr)
+            return 1
+    return 0
+
+
+@contextlib.contextmanager
+def _signals() -> Iterator[threading.Event]:
+    """An event that is set by Ctrl-C and the like; a second one ends the program at once."""
+    ended = threading.Event()
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        ended.set()
+        signal.signal(number, signal.SIG_DFL)
+
+    before = {number: signal.signal(number, end) for number in END_SIGNALS}
+    try:
+        yield ended
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _run(options: Options, ended: threading.Event) -> None:
+    with contextlib.ExitStack() as stack:
+        nodes = _emulated_nodes(options, stack) if options.emulated else [_real_node(options)]
+        for node in nodes:
+            stack.callback(node.stop)
+        # Called before any stop: so no node spends the end on calling those that are gone.
+        stack.callback(lambda: [node.switch_off() for node in nodes])
+        for node in nodes:
+            node.start()
+        watch = _Watch(nodes, options)
+        while not ended.wait(LOOK_PERIOD_S):
+            watch.look(time.monotonic())
+        _log.info("ending")
+
+
+def _real_node(options: Options) -> RadioNode:
+    radio = _open_radio(options.node_id, options.hardware, _settings(options, options.node_id))
+    try:
+        node = RadioNode(radio, options.location, options, _internet(options))
+    except MeshError:
+        radio.close()
+        raise
+    hardware = options.hardware
+    _log.info(
+        "node %d: nRF24L01+ on SPI %d.%d, CE on GPIO%d, %s; channel %d, %d kbit/s, CRC %d bit",
+        options.node_id,
+        hardware.spi_bus,
+        hardware.spi_device,
+        hardware.ce_gpio,
+        "polled" if hardware.irq_gpio is None else f"IRQ on GPIO{hardware.irq_gpio}",
+        options.radio.channel,
+        options.radio.data_rate.value // 1000,
+        options.radio.crc_bytes * 8,
+    )
+    return node
+
+
+def _open_radio(
+    node_id: int, hardware: Hardware, settings: RadioSettings
+) -> NRF24LowLevelInterface:
+    with contextlib.ExitStack() as opened:
+        spi = open_spi(hardware.spi_bus, hardware.spi_device)
+        opened.callback(spi.close)
+        ce = GpiodCe(hardware.ce_gpio)
+        opened.callback(ce.close)
+        irq = None if hardware.irq_gpio is None else GpiodIrq(hardware.irq_gpio)
+        opened.pop_all()
+    return NRF24LowLevelInterface(spi, ce, irq, node_id=node_id, settings=settings)
+
+
+def _emulated_nodes(options: Options, stack: contextlib.ExitStack) -> list[RadioNode]:
+    air = EmulatedAir(options.radio)
+    stack.callback(air.close)
+    _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
+    return [
+        RadioNode(
+            air.radio(node_id, _settings(options, node_id)),
+            air.place(node_id),
+            options,
+            None if node_id else (_internet(options) or _without_internet),
+        )
+        for node_id in range(options.emulated)
+    ]
+
+
+def _settings(options: Options, node_id: int) -> RadioSettings:
+    return options.radio.skewed(node_id) if options.skewed else options.radio
+
+
+def _internet(options: Options) -> MakeInternet | None:
+    http = options.http
+    return None if http is None else lambda submit: _http_internet(submit, http)
+
+
+def _http_internet(submit: Callable[[Work], None], http: HttpOptions) -> IInternetConnection:
+    try:  # a router does without these libraries, and they take a second to load
+        from drone_mesh.internet import HttpInternet
+    except ImportError as error:
+        raise HardwareUnavailable(
+            f"the Python package {error.name} is missing, which a gateway needs for HTTP: "
+            "pip install 'drone_mesh[raspberry]'"
+        ) from error
+    return HttpInternet(submit, http.address, http.port, http.token)
+
+
+class _NoInternet(IInternetConnection):
+    """The gateway that emulated routers are given takes no orders."""
+
+    def connect(self, commands: IGatewayCommands) -> None:
+        pass
+
+    def disconnect(self) -> None:
+        pass
+
+
+def _without_internet(_submit: Callable[[Work], None]) -> IInternetConnection:
+    return _NoInternet()
+
+
+class _Watch:
+    """Says how far the nodes have come."""
+
+    def __init__(self, nodes: Sequence[RadioNode], options: Options) -> None:
+        self._nodes = nodes
+        self._options = options
+        self._connected = -1
+        self._started_s = time.monotonic()
+        self._lonely_at_s = self._started_s + LONELY_AFTER_S
+
+    def look(self, now_s: float) -> None:
+        """To be called again and again."""
+        if len(self._nodes) > 1:
+            self._count_connected(now_s)
+        elif self._nodes[0].component.get_neighbours():
+            self._lonely_at_s = now_s + LONELY_AFTER_S
+        elif now_s >= self._lonely_at_s:
+            self._lonely_at_s = now_s + LONELY_AGAIN_S
+            _log.warning(
+                "node %d hears nobody: are others switched on and in reach, with the same channel, "
+                "rate and CRC?",
+                self._options.node_id,
+            )
+
+    def _count_connected(self, now_s: float) -> None:
+        components = [node.component for node in self._nodes]
+        connected = sum(component.get_connected_to_gateway() for component in components)
+        if connected == self._connected:
+            return
+        self._connected = connected
+        if connected < len(components):
+            _log.info("%d of %d nodes are connected", connected, len(components))
+            return
+        hops = " ".join(f"{c.get_node_id()}:{c.get_hops_from_gateway_away()}" for c in components)
+        _log.info(
+            "all %d nodes are connected after %.1f s; hops to the gateway: %s",
+            len(components),
+            now_s - self._started_s,
+            hops,
+        )
