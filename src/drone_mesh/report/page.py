@@ -1,0 +1,37 @@
+"""The report's page: one HTML file with everything in it (jinja2)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jinja2
+
+from drone_mesh.report.figures import (
+    maps_figure,
+    messages_figure,
+    outages_figure,
+    timeline_figure,
+)
+from drone_mesh.report.story import RunStory
+from drone_mesh.report.tables import EVENT_KINDS_LEFT_OUT, key_numbers, repair_rows
+from drone_mesh.state.trouble import find_trouble, summarise
+
+_TEMPLATE = Path(__file__).resolve().parent / "page.html"
+
+
+def render_page(story: RunStory, title: str) -> str:
+    """HTML text."""
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
+    return template.render(
+        title=title,
+        numbers=key_numbers(story),
+        summary=summarise(story.after.nodes, find_trouble(story.after.nodes)),
+        repairs=repair_rows(story),
+        blips=story.blips,
+        timeline=timeline_figure(story),
+        outages=outages_figure(story) if story.outages else "",
+        maps=maps_figure(story),
+        messages=messages_figure(story),
+        events=[event for event in story.events if event.kind not in EVENT_KINDS_LEFT_OUT],
+    )

@@ -1,0 +1,105 @@
+"""The numbers of a report, as rows for its page and for CSV files."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Sequence, Union
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.report.story import RunStory
+from drone_mesh.state.model import EventRecord
+from drone_mesh.state.outages import Outage, Sample
+
+EVENT_KINDS_LEFT_OUT = frozenset(
+    kind.value
+    for kind in (
+        MeshEventKind.STARTED,
+        MeshEventKind.NEIGHBOUR_FOUND,
+        MeshEventKind.NEIGHBOUR_LOST,
+        MeshEventKind.NODE_MISSING,
+    )
+)  # too many to be read on a page; the CSV file has them all
+
+
+def key_numbers(story: RunStory) -> list[tuple[str, str]]:
+    """(name, value) of what one wants to know first."""
+    first, last = story.samples[0], story.samples[-1]
+    seconds = max(last.stamp_s - first.stamp_s, 1e-9)
+    lengths = [outage.seconds for outage in story.outages if outage.seconds is not None]
+    open_ones = sum(outage.connected_s is None for outage in story.outages)
+    flights = sum(outage.decided_s is not None for outage in story.outages)
+    longest = f"{max(lengths):.1f} s" if lengths else "none"
+    sent = sum(story.messages_of.values())
+    return [
+        ("Recorded", f"{first.stamp_s:.0f} to {last.stamp_s:.0f} s"),
+        ("Nodes", str(len(story.after.nodes))),
+        ("Outages", f"{len(story.outages)}" + (f", {open_ones} still open" if open_ones else "")),
+        ("Longest", longest),
+        ("Flights decided", str(flights)),
+        ("Messages", f"{sent} ({sent / seconds:.0f} per s)"),
+    ]
+
+
+def repair_rows(story: RunStory) -> list[dict[str, str]]:
+    """One row per outage: when, and how long each phase of its repair took."""
+    return [
+        {
+            "node": str(outage.node),
+            "cause": "–" if outage.cause_node is None else f"{outage.cause_node} off",
+            "lost": f"{outage.lost_s:.1f} s",
+            "noticed": _seconds(outage.cause_s, outage.lost_s),
+            "decided": _seconds(outage.lost_s, outage.decided_s),
+            "flown": _seconds(outage.decided_s, outage.landed_s),
+            "place": "–" if outage.place_of is None else str(outage.place_of),
+            "connected": _seconds(outage.landed_s or outage.lost_s, outage.connected_s),
+            "total": _seconds(_began_s(outage), outage.connected_s),
+            "on_ground": _on_ground(outage),
+        }
+        for outage in story.outages
+    ]
+
+
+def write_csv(story: RunStory, folder: Path) -> list[Path]:
+    """samples.csv, events.csv and outages.csv; returns their paths. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return [
+        _write_rows(folder / "samples.csv", Sample, story.samples),
+        _write_rows(folder / "outages.csv", Outage, story.outages),
+        _write_rows(folder / "events.csv", EventRecord, story.events),
+    ]
+
+
+Row = Union[Sample, Outage, EventRecord]
+
+
+def _write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> Path:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [column.name for column in fields(kind)])
+        writer.writeheader()
+        for row in rows:
+            writer.writerow({name: _cell(value) for name, value in asdict(row).items()})
+    return path
+
+
+def _cell(value: object) -> object:
+    return " ".join(map(str, value)) if isinstance(value, tuple) else value
+
+
+def _began_s(outage: Outage) -> float:
+    return outage.lost_s if outage.cause_s is None else outage.cause_s
+
+
+def _seconds(start_s: float | None, stop_s: float | None) -> str:
+    return "–" if start_s is None or stop_s is None else f"{stop_s - start_s:.1f} s"
+
+
+def _on_ground(outage: Outage) -> str:
+    """From the cause to the connection, the time in flight taken off (reference, section 15)."""
+    if outage.connected_s is None:
+        return "–"
+    flown_s = 0.0
+    if outage.decided_s is not None and outage.landed_s is not None:
+        flown_s = outage.landed_s - outage.decided_s
+    return f"{outage.connected_s - _began_s(outage) - flown_s:.1f} s"
