@@ -267,9 +267,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _negotiate(self) -> None:
         score = self._score()
         self._report(MeshEventKind.NEGOTIATION_STARTED, detail=f"score {score:.2f}")
-        self._negotiation.start(self._node_id, score, self._now_s)
-        self._deadlines.set(Due.DECIDE, self._negotiation.due_s)
         body = messages.MovementNegotiationMessage.BODY.pack(score)
+        # As the others will read it: of equal scores nobody must look higher to everybody else.
+        (score_on_the_air,) = messages.MovementNegotiationMessage.BODY.unpack(body)
+        self._negotiation.start(self._node_id, score_on_the_air, self._now_s)
+        self._deadlines.set(Due.DECIDE, self._negotiation.due_s)
         for neighbour in sorted(self._routing.get_set_of_children()):
             self._send_own(MessageType.MOVEMENT_NEGOTIATION, neighbour, body)
         self._decide_negotiation()

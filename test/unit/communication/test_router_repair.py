@@ -369,6 +369,15 @@ def test_of_equal_scores_the_lowest_id_flies():
     assert bench.events[-1].peer == 3
 
 
+def test_scores_are_compared_as_they_are_on_the_air():
+    """Two drones at one place: rounded to a float32, each bid looks higher than one's own."""
+    bench = group_bench(3)
+    bench.engine.place = Location(4.0, 10.1, 0.0)  # 10.1 is 10.10000038 as a float32
+    bench.wait_until(EMERGENCY_S + 0.1)
+    bench.hear(bid(3, 10.1))
+    assert bench.engine.goals == [NEIGHBOUR_PLACE]
+
+
 def test_nobody_flies_when_nobody_bids():
     bench = Bench()
     bench.know_neighbour(3)
