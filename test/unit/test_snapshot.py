@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from PIL import Image
 
 from drone_mesh.world.camera import Camera, Margins, frame
 from drone_mesh.world.drones import DroneRole
-from drone_mesh.world.factory import DroneFactory
 from drone_mesh.world.picture import (
     LINK_COLOURS,
     PATH_COLOUR,
@@ -21,11 +19,10 @@ from drone_mesh.world.picture import (
     DronePicture,
     LinkPicture,
     LinkUse,
+    Scene,
     drawing_scale,
-    picture_of,
 )
 from drone_mesh.world.snapshot import MARGINS, render
-from drone_mesh.world.still_world import StillWorld
 
 SIZE = (400, 260)  # small is fast
 GATEWAY = DronePicture(0, DroneRole.GATEWAY, (-1.0, 0.0, 0.0))
@@ -45,9 +42,9 @@ def _no_screen(monkeypatch):
 def shoot(tmp_path):
     """Render and read back: (height, width, 3) numbers 0..255."""
 
-    def shoot(drones, **options):
+    def shoot(drones, size=SIZE, **others):
         path = tmp_path / "picture.png"
-        render(drones, path, **{"size": SIZE, **options})
+        render(Scene(drones, **others), path, size)
         with Image.open(path) as image:
             assert image.format == "PNG"
             return np.asarray(image.convert("RGB")).astype(int)
@@ -56,8 +53,7 @@ def shoot(tmp_path):
 
 
 def camera_of(drones, size=SIZE):
-    points = [d.position for d in drones] + [c for d in drones for c in d.path]
-    return frame(Camera(size), points, MARGINS)
+    return frame(Camera(size), Scene(drones).points(), MARGINS)
 
 
 def share_of_colour(pixels, colour, place, radius):
@@ -151,7 +147,7 @@ def test_a_title_is_written_into_the_upper_left_corner(shoot):
 
 def test_a_place_that_cannot_be_written_is_an_os_error(tmp_path):
     with pytest.raises(FileNotFoundError):
-        render([ROUTER], tmp_path / "nowhere" / "picture.png", size=SIZE)
+        render(Scene([ROUTER]), tmp_path / "nowhere" / "picture.png", SIZE)
 
 
 @settings(deadline=None, max_examples=40)
@@ -203,19 +199,7 @@ def test_drones_are_drawn_larger_where_there_is_room_and_never_smaller():
     assert ROUTER.centre(3.0) == pytest.approx((5.0, 4.0, 0.15))
 
 
-def test_a_drone_of_a_world_is_pictured_where_its_underside_is_with_the_rest_of_its_flight():
-    world = StillWorld()
-    gateway, router = DroneFactory(world, 1, 1, gridsize=1, spacing=1.0, debug=True).drones
-    router.engine.set_goal(latitude=0.0, longitude=20.0, height=0.0)  # 10 s
-    corners = {0.5: 3, 5.0: 2, 9.5: 1, 10.5: 0}
-    for now_s, left in corners.items():
-        while world.now_s < now_s:
-            world.step()
-        picture = picture_of(router)
-        x, y, z = router.engine.state.position
-        assert math.dist(picture.position, (x, y, z - 0.05)) < 1e-9
-        assert len(picture.path) == left
-        assert not left or picture.path[-1] == pytest.approx((20.0, 0.0, 0.0), abs=0.051)
-    assert picture_of(gateway, DroneCondition.OFF) == DronePicture(
-        0, DroneRole.GATEWAY, (-1.0, 0.0, 0.0), DroneCondition.OFF
-    )
+def test_a_point_before_the_camera_is_seen_in_its_pixel():
+    camera = Camera((1280, 800), target=(3.0, 4.0, 5.0), yaw_deg=30.0)
+    for pixel in ((0.0, 0.0), (640.0, 400.0), (1200.0, 20.0)):
+        assert camera.project([camera.before(pixel, 2.0)])[0] == pytest.approx(pixel, abs=0.01)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Sequence
 
@@ -14,7 +15,6 @@ NEAR_M = 0.1
 FAR_M = 50_000.0  # the goals that are allowed lie within +-5000 m
 CLOSEST_M = 6.0  # a single drone is shown with a few metres around it
 UP_AXIS_Z = 2  # pybullet's number for "z is up"
-FRAMING_ROUNDS = 40  # each shifts and zooms once; the error shrinks by more than half each time
 
 
 @dataclass(frozen=True)
@@ -55,20 +55,33 @@ class Camera:
 
     def pixels_per_metre(self) -> float:
         """How large a metre at the target is."""
-        half_height_m = self.distance_m * np.tan(np.radians(self.field_of_view_deg / 2))
-        return float(self.size[1] / 2 / half_height_m)
+        return self.size[1] / 2 / (self.distance_m * self.half_height_slope())
+
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Unit vectors (3,) in the world that point right, up and forward in the picture."""
+        view = np.array(self.view_matrix()).reshape(4, 4).T
+        return view[0, :3], view[1, :3], -view[2, :3]
+
+    def half_height_slope(self) -> float:
+        """How far up is seen per metre of depth."""
+        return math.tan(math.radians(self.field_of_view_deg / 2))
 
     def on_ground(self, pixel: tuple[float, float]) -> Vector | None:
         """The point of the ground (z = 0) that is seen in this pixel; None: that is sky."""
-        inverse = np.linalg.inv(self._matrix())
-        x, y = 2 * pixel[0] / self.size[0] - 1, 1 - 2 * pixel[1] / self.size[1]
-        near, far = (inverse @ np.array([x, y, depth, 1.0]) for depth in (-1.0, 1.0))
-        start, end = near[:3] / near[3], far[:3] / far[3]
-        if end[2] >= start[2]:
+        (x, y, z), (far_x, far_y, far_z) = self.before(pixel, 0.0), self.before(pixel, 1.0)
+        if far_z >= z:
             return None
-        share = start[2] / (start[2] - end[2])
-        point = start + share * (end - start)
-        return (float(point[0]), float(point[1]), 0.0) if share <= 1 else None
+        times = z / (z - far_z)
+        return (x + (far_x - x) * times, y + (far_y - y) * times, 0.0)
+
+    def before(self, pixel: tuple[float, float], depth_m: float) -> Vector:
+        """The point that is seen in this pixel, `depth_m` in front of the camera."""
+        right, up, forward = self.axes()
+        half_height_m = depth_m * self.half_height_slope()
+        x, y = (pixel[axis] - self.size[axis] / 2 for axis in (0, 1))
+        aside_m = np.array([x, -y]) / (self.size[1] / 2) * half_height_m
+        eye = np.array(self.target) - forward * self.distance_m
+        return _vector(eye + forward * depth_m + right * aside_m[0] + up * aside_m[1])
 
     def _matrix(self) -> np.ndarray:
         """World to clip space, (4, 4)."""
@@ -97,35 +110,39 @@ class Margins(NamedTuple):
 
 
 def frame(camera: Camera, points: Sequence[Vector], margins: Margins) -> Camera:
-    """`camera`, moved (not turned) until all points are in the picture and fill it.
+    """`camera`, moved (not turned) as near as possible to see all points between the margins.
 
     Margins that would take more than half of the picture shrink. Without points nothing moves.
     """
     if not points:
         return camera
-    size = np.array(camera.size, dtype=float)
-    low_margin = np.array([margins.left, margins.top])
-    high_margin = np.array([margins.right, margins.bottom])
-    shrink = np.minimum(1.0, size / 2 / np.maximum(low_margin + high_margin, 1.0))
-    low_edge, high_edge = low_margin * shrink, size - high_margin * shrink
-
     places = np.array(points, dtype=float)
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
-    span_m = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
-    camera = replace(camera, target=_vector(middle), distance_m=max(CLOSEST_M, 3 * span_m))
-    view = np.array(camera.view_matrix()).reshape(4, 4).T
-    right, up = view[0, :3], view[1, :3]
-    for _ in range(FRAMING_ROUNDS):
-        pixels = camera.project(points)
-        low, high = pixels.min(axis=0), pixels.max(axis=0)
-        zoom = float(((high - low) / (high_edge - low_edge)).max())
-        camera = replace(camera, distance_m=max(CLOSEST_M, camera.distance_m * zoom))
-        pixels = camera.project(points)
-        low, high = pixels.min(axis=0), pixels.max(axis=0)
-        shift_m = ((low + high) - (low_edge + high_edge)) / 2 / camera.pixels_per_metre()
-        target = np.array(camera.target) + right * shift_m[0] - up * shift_m[1]
-        camera = replace(camera, target=_vector(target))
-    return camera
+    right, up, forward = camera.axes()
+    depths_m = (places - middle) @ forward
+    closest_m = CLOSEST_M - depths_m.min()
+
+    # A point that lies r to the right of the middle and f behind it is seen, from an eye that is
+    # e to the right of the middle and d before it, where -low <= (r - e) / (f + d) <= high.
+    size = np.array(camera.size, dtype=float)
+    edges = np.array([[margins.left, margins.right], [margins.bottom, margins.top]], float)
+    edges *= np.minimum(1.0, size / 2 / np.maximum(edges.sum(axis=1), 1.0))[:, None]
+    slopes = (size[:, None] / 2 - edges) / (size[1] / 2) * camera.half_height_slope()
+    aside_m = [(places - middle) @ axis for axis in (right, up)]
+    bounds = [
+        ((aside - high * depths_m).max(), (aside + low * depths_m).min())
+        for aside, (low, high) in zip(aside_m, slopes)
+    ]
+    needed_m = [
+        (above - below) / (low + high) for (above, below), (low, high) in zip(bounds, slopes)
+    ]
+    distance_m = max(closest_m, *needed_m)
+    eye_right, eye_up = (
+        ((above - high * distance_m) + (below + low * distance_m)) / 2
+        for (above, below), (low, high) in zip(bounds, slopes)
+    )
+    target = middle + right * eye_right + up * eye_up
+    return replace(camera, target=_vector(target), distance_m=float(distance_m))
 
 
 def _vector(values: np.ndarray) -> Vector:

@@ -53,13 +53,6 @@ class FlightPath:
         """The corners of the path, to draw it."""
         return (self.start, self.above_start, self.above_goal, self.goal)
 
-    def waypoints_after(self, now_s: float) -> tuple[Vector, ...]:
-        """The corners that are still to come, the goal last."""
-        share = self.share_flown(now_s)
-        if share < CLIMB_ENDS_AT:
-            return self.waypoints[1:]
-        return self.waypoints[2:] if share < DESCENT_STARTS_AT else self.waypoints[3:]
-
     def share_flown(self, now_s: float) -> float:
         """How much of the flight's time is over: 0.0 before the start, 1.0 from the end on."""
         if self.duration_s == 0.0:

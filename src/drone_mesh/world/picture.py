@@ -86,19 +86,19 @@ class LinkPicture:
     use: LinkUse = LinkUse.KNOWN
 
 
-def picture_of(
-    drone: VirtualDrone, condition: DroneCondition = DroneCondition.CONNECTED
-) -> DronePicture:
-    """This drone as it is after the last step. Any thread."""
-    state = drone.engine.state
-    place = drone.engine.get_location()
-    return DronePicture(
-        node_id=drone.node_id,
-        role=drone.ROLE,
-        position=(place.longitude, place.latitude, place.height),
-        condition=condition,
-        path=() if state.path is None else state.path.waypoints_after(state.now_s),
-    )
+@dataclass(frozen=True)
+class Scene:
+    """All that is to be seen at one moment."""
+
+    drones: Sequence[DronePicture] = ()
+    links: Sequence[LinkPicture] = ()
+    title: str = ""
+
+    def points(self) -> list[Vector]:
+        """Every place that has to be in the picture."""
+        return [drone.position for drone in self.drones] + [
+            corner for drone in self.drones for corner in drone.path
+        ]
 
 
 def crowding_m(drones: Sequence[DronePicture]) -> float:

@@ -23,8 +23,8 @@ from drone_mesh.world.picture import (
     PATH_COLOUR,
     DroneCondition,
     DronePicture,
-    LinkPicture,
     LinkUse,
+    Scene,
     crowding_m,
     drawing_scale,
 )
@@ -47,36 +47,27 @@ MARGINS = Margins(left=64, top=56, right=LEGEND_WIDTH + 24, bottom=56)  # pixels
 LIGHT_FROM = (-3.0, -6.0, 12.0)
 
 
-def render(
-    drones: Sequence[DronePicture],
-    path: str | Path,
-    size: tuple[int, int] = DEFAULT_SIZE,
-    links: Sequence[LinkPicture] = (),
-    title: str = "",
-) -> None:
-    """Write a PNG of `size` (width, height) pixels that shows all these drones with their ids.
+def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE) -> None:
+    """Write a PNG of `size` (width, height) pixels that shows all drones with their ids.
 
     Drones are drawn larger than they are where there is room. Raises OSError when `path` cannot be
     written.
     """
     canvas_size = (size[0] * OVERSAMPLING, size[1] * OVERSAMPLING)
-    points = [drone.position for drone in drones]
-    points += [corner for drone in drones for corner in drone.path]
     margins = Margins(*(side * OVERSAMPLING for side in MARGINS))
-    camera = frame(Camera(canvas_size), points, margins)
+    camera = frame(Camera(canvas_size), scene.points(), margins)
     wanted = DRONE_PIXELS * OVERSAMPLING / camera.pixels_per_metre() / DRONE_WIDTH_M
-    scale = drawing_scale(drones, wanted)
+    scale = drawing_scale(scene.drones, wanted)
 
     image = Image.new("RGB", canvas_size, rgb(GROUND))
     sketch = Sketch(image, camera)
-    _draw_ground(sketch, drones, scale)
-    _draw_links(sketch, drones, links, scale)
-    _draw_flights(sketch, drones, scale)
-    _paste_boxes(image, camera, drones, scale)
-    _draw_ids(sketch, drones, scale)
-    _draw_legend(sketch, drones, links)
-    if title:
-        sketch.words((16, 12), title, 20, INK, anchor="la")
+    _draw_ground(sketch, scene.drones, scale)
+    _draw_links(sketch, scene, scale)
+    _draw_flights(sketch, scene.drones, scale)
+    _paste_boxes(image, camera, scene.drones, scale)
+    _draw_ids(sketch, scene.drones, scale)
+    _draw_legend(sketch, scene)
+    sketch.words((16, 12), scene.title, 20, INK, anchor="la")
     image.resize(size, Image.Resampling.LANCZOS).save(path, format="PNG")
 
 
@@ -124,13 +115,11 @@ def _number_grid(sketch: Sketch, step_m: float, ground: tuple[float, float, floa
             sketch.words((8, row), f"{y:g} m", 11, FAINT_INK, "lm")
 
 
-def _draw_links(
-    sketch: Sketch, drones: Sequence[DronePicture], links: Sequence[LinkPicture], scale: float
-) -> None:
-    centres = {drone.node_id: drone.centre(scale) for drone in drones}
+def _draw_links(sketch: Sketch, scene: Scene, scale: float) -> None:
+    centres = {drone.node_id: drone.centre(scale) for drone in scene.drones}
     widths = {LinkUse.KNOWN: 1.0, LinkUse.LOST: 2.0, LinkUse.ROUTE: 3.0}
     for use, width in widths.items():
-        for link in links:
+        for link in scene.links:
             if link.use is use and link.start in centres and link.end in centres:
                 ends = [centres[link.start], centres[link.end]]
                 sketch.line(ends, LINK_COLOURS[use], width, dash=6 if use is LinkUse.LOST else 0)
@@ -162,24 +151,22 @@ class _LegendRow(NamedTuple):
     amount: int | None  # how many there are; None: not counted
 
 
-def _draw_legend(
-    sketch: Sketch, drones: Sequence[DronePicture], links: Sequence[LinkPicture]
-) -> None:
+def _draw_legend(sketch: Sketch, scene: Scene) -> None:
     """What the colours that occur mean, in the upper right corner."""
     rows: list[_LegendRow] = []
     for role in DroneRole:
-        of_role = [drone for drone in drones if drone.role is role]
+        of_role = [drone for drone in scene.drones if drone.role is role]
         connected = [d for d in of_role if d.condition is DroneCondition.CONNECTED]
         if connected:
             rows.append(_LegendRow(role.value, connected[0].colour, 12, len(connected)))
     for condition in DroneCondition:
-        others = [d for d in drones if d.condition is condition]
+        others = [d for d in scene.drones if d.condition is condition]
         if others and condition is not DroneCondition.CONNECTED:
             rows.append(_LegendRow(condition.value, others[0].colour, 12, len(others)))
-    if any(drone.path for drone in drones):
+    if any(drone.path for drone in scene.drones):
         rows.append(_LegendRow("flight", PATH_COLOUR, 2, None))
     for use in (LinkUse.ROUTE, LinkUse.KNOWN, LinkUse.LOST):
-        if any(link.use is use for link in links):
+        if any(link.use is use for link in scene.links):
             rows.append(_LegendRow(use.value, LINK_COLOURS[use], 3, None))
     for i, row in enumerate(rows):
         y = 24.0 + 22 * i
