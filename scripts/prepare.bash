@@ -83,14 +83,15 @@ build_step() {
 
 # build: plain CMake; it finds out by itself what has changed since the last time.
 build() {
-  local cache="$root/build/CMakeCache.txt"
   # shellcheck disable=SC1090
   [ -e "$noetic" ] && . "$noetic"
-  if [ ! -e "$root/build/Makefile" ] ||
-    ! grep -qx "PYTHON_EXECUTABLE:[A-Z]*=$venv/bin/python" "$cache"; then
+  if ! grep -qsx "PYTHON_EXECUTABLE:[A-Z]*=$venv/bin/python" "$root/build/CMakeCache.txt"; then
+    # Nothing there, or of a checkout that has been moved: CMake keeps absolute paths.
+    find "$root/build" -mindepth 1 -maxdepth 1 ! -name .lock -exec rm -rf {} +
+  fi
+  [ -e "$root/build/Makefile" ] ||
     build_step configuring cmake -S "$root" -B "$root/build" \
       -DPYTHON_EXECUTABLE="$venv/bin/python" -DCMAKE_INSTALL_PREFIX="$root/build/install"
-  fi
   build_step building cmake --build "$root/build" -j "$(nproc)"
 }
 
