@@ -7,7 +7,11 @@ import logging
 import time
 from typing import Callable, Iterable
 
+import rospy
+
 from drone_mesh.execution import MeshExecutor
+from drone_mesh.ros import names
+from drone_mesh.ros.figures import Figures
 from drone_mesh.ros.host_reports import HostReports
 from drone_mesh.ros.simulator_link import SimulatorLink
 from drone_mesh.ros.virtual_raspberry_pi import (
@@ -26,6 +30,8 @@ _log = logging.getLogger(__name__)
 class MeshHost:
     """One worker thread, one link to the simulator, and any number of nodes.
 
+    Figures: worst timer lag, lost in range, on /diagnostics
+
     Every thread may use it. `nodes` is filled by the worker, in which each of them lives.
     """
 
@@ -35,6 +41,7 @@ class MeshHost:
         self._settings = dataclasses.replace(settings, observer=self._reports.observe)
         self.executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_host")
         self._link = SimulatorLink(self.executor)
+        self._figures = Figures(f"host {rospy.get_name()}", self._take_figures)
         self.nodes: dict[int, VirtualRaspberryPi] = {}
 
     def start(self) -> None:
@@ -42,6 +49,7 @@ class MeshHost:
         self.executor.start()
         self._link.start()
         self._reports.start()
+        self._figures.start()
 
     def wait_for_simulator(self, give_up: Callable[[], bool]) -> None:
         """Return when packets can be sent, when that takes too long, or as soon as `give_up` says.
@@ -69,9 +77,16 @@ class MeshHost:
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. The nodes leave the ROS graph with it."""
+        self._figures.stop()
         self._reports.stop()
         self._link.stop()
         self.executor.stop()
+
+    def _take_figures(self) -> dict[str, float]:
+        return {
+            names.WORST_LAG: self.executor.take_worst_lag_s(),
+            names.LOST_IN_RANGE: self._link.never_handed_over,
+        }
 
     def _submit_start(self, node_id: int) -> None:
         seat = self.executor.seat()

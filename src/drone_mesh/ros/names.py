@@ -21,7 +21,12 @@ FLEET_PARAM = "/drone_mesh/fleet"  # what hosts in other processes need to know;
 REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
 STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> people
 EVENTS_TOPIC = "/mesh/events"  # MeshEvent: DroneFactory -> people
-DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory -> people
+DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> people
+# Names of figures there.
+DELIVERED = "delivered"  # packets handed to a node, each receiver of a broadcast counted
+LOST_IN_RANGE = "lost in range"  # packets for a node that is on and in range, and did not get them
+WORST_LAG = "worst timer lag"  # s, simulated: how late the latest timer was since last told
+
 MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz
 MAP_FRAME = "map"
 

@@ -58,6 +58,7 @@ class SimulatorLink(rospy.SubscribeListener):
         self._complaints = ThrottledLog(_log)
         self._look = threading.Event()
         self._stopping = False
+        self._never_handed_over = 0  # written by the executor's worker
         self._probing = False  # the worker has been asked to probe, and has not done it yet
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC,
@@ -78,6 +79,11 @@ class SimulatorLink(rospy.SubscribeListener):
         self._look.set()
         if self._thread.is_alive():
             self._thread.join()
+
+    @property
+    def never_handed_over(self) -> int:
+        """Packets, since the start, that no simulator took."""
+        return self._never_handed_over
 
     @property
     def connected(self) -> bool:
@@ -126,6 +132,7 @@ class SimulatorLink(rospy.SubscribeListener):
         services = self._services
         if services is None:
             self._complaints.error("packet not sent", "no simulator")
+            self._never_handed_over += 1
             return False
         request = WirelessMessageRequest(payload[FROM], payload[TO], NRF24(payload))
         try:
@@ -133,6 +140,7 @@ class SimulatorLink(rospy.SubscribeListener):
         except ServiceRefused as error:
             self._complaints.warning("packet refused", str(error))
         except ServiceGone as error:
+            self._never_handed_over += 1
             self._lost(services, error)
         return False
 
@@ -141,6 +149,7 @@ class SimulatorLink(rospy.SubscribeListener):
         services = self._services
         if services is None:
             self._complaints.error("packet not sent", "no simulator")
+            self._never_handed_over += 1
             return
         try:
             services.broadcast.call(BroadcastRequest(payload[FROM], NRF24(payload)))
@@ -148,6 +157,7 @@ class SimulatorLink(rospy.SubscribeListener):
             # The simulator is new, and will hear of this antenna in a moment: no line in the log.
             self._complaints.counts["broadcast refused"] += 1
         except ServiceGone as error:
+            self._never_handed_over += 1
             self._lost(services, error)
 
     def _lost(self, services: _Services, error: ServiceGone) -> None:

@@ -13,6 +13,7 @@ from rospy.impl.transport import Transport
 
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros import names
+from drone_mesh.ros.figures import Figures
 from drone_mesh.ros.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.parameters import factory_configuration, or_stop
 from drone_mesh.signal import SignalError, SignalRegister
@@ -85,9 +86,10 @@ class WirelessSignalSimulator:
     Publishes:  the topic that each antenna asked for, usually /Node/<id> (NRF24)
     Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
                 (AreaScan), /SignalSimulator/broadcast (Broadcast)
+    Figures:    delivered, lost in range, on /diagnostics
 
-    The handlers run in the threads of rospy's connections. `_lock` guards the register, and is
-    never held while something is sent; `_opening` guards the set of topics.
+    The handlers run in the threads of rospy's connections. `_lock` guards the register and the
+    counts, and is never held while something is sent; `_opening` guards the set of topics.
     """
 
     def __init__(self, max_distance_m: float) -> None:
@@ -98,11 +100,13 @@ class WirelessSignalSimulator:
         self._listeners: dict[str, _Listener] = {}
         self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
         self._complaints = ThrottledLog(_log)
+        self._delivered = self._lost = 0
         # The services first: who sees that we subscribe may call at once.
         rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
         rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
         rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
         rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
+        Figures("air", self._figures).start()
 
     def _drone_info(self, info: DroneInfo) -> None:
         try:
@@ -138,7 +142,11 @@ class WirelessSignalSimulator:
     def _message(self, request: WirelessMessage) -> WirelessMessageResponse:
         with self._lock:
             topic = self._register.link(request.from_, request.to)
-        return WirelessMessageResponse(topic is not None and self._send(topic, request.message))
+        if topic is None:
+            return WirelessMessageResponse(False)
+        if request.from_ == request.to:  # an antenna asks whether it is known yet
+            return WirelessMessageResponse(self._send(topic, request.message))
+        return WirelessMessageResponse(self._carry(topic, request.message))
 
     def _broadcast(self, request: Broadcast) -> BroadcastResponse:
         with self._lock:
@@ -150,7 +158,7 @@ class WirelessSignalSimulator:
             [
                 node
                 for node, topic in zip(nodes, topics)
-                if topic is not None and self._send(topic, NRF24(before + bytes((node,)) + after))
+                if topic is not None and self._carry(topic, NRF24(before + bytes((node,)) + after))
             ]
         )
 
@@ -171,6 +179,19 @@ class WirelessSignalSimulator:
     def _is_heard(self, topic: str | None) -> bool:
         listener = None if topic is None else self._listeners.get(topic)
         return listener is not None and listener.has_receiver()
+
+    def _carry(self, topic: str, message: NRF24) -> bool:
+        delivered = self._send(topic, message)
+        with self._lock:
+            if delivered:
+                self._delivered += 1
+            else:
+                self._lost += 1
+        return delivered
+
+    def _figures(self) -> dict[str, float]:
+        with self._lock:
+            return {names.DELIVERED: self._delivered, names.LOST_IN_RANGE: self._lost}
 
     def _send(self, topic: str, message: NRF24) -> bool:
         listener = self._listeners.get(topic)
