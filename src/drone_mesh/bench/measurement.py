@@ -6,10 +6,11 @@ import time
 from dataclasses import dataclass
 
 from drone_mesh.bench.cases import Case
-from drone_mesh.bench.observation import DELIVERED, LOST, REST, WATCH, WORST_LAG, Look, Watch
+from drone_mesh.bench.observation import REST, WATCH, Look, Watch
 from drone_mesh.bench.processes import Use, cores_between
 from drone_mesh.bench.progress import Progress
 from drone_mesh.bench.system import BenchmarkError, System
+from drone_mesh.ros.names import DELIVERED, LOST_IN_RANGE, WORST_LAG
 
 ON_WITHIN_S = 180.0  # wall; our choice: six times what 254 drones may take
 CONNECTED_WITHIN_S = 120.0  # wall; as long as the original was given
@@ -34,7 +35,8 @@ class RosResult:
     messages_per_wall_s: float  # counted as totalMessages: broadcasts are not
     messages_per_sim_s: float
     deliveries_per_wall_s: float | None  # packets that reached a node, broadcasts too
-    lost_share: float | None  # of all packets for nodes in range, since the start
+    lost_share: float | None  # of all packets for nodes in range
+    lost_before: float | None  # packets for nodes in range, most of them not quite there yet
     cpu_ms_per_message: float | None  # of all processes, the master's included
     cores: dict[str, float]  # by process
     pss_mb: float  # of all processes
@@ -50,6 +52,7 @@ class _Moment:
     look: Look
     use: Use
     delivered: float | None
+    lost: float | None
 
 
 def measure(
@@ -103,7 +106,7 @@ def _take_moment(system: System) -> _Moment:
     if not system.wait_for(lambda: len(watch.looks) >= seen + 2, LOOK_WITHIN_S, lambda: None):
         raise BenchmarkError(f"no /mesh/state for {LOOK_WITHIN_S:g} s")
     look = watch.looks[-1]
-    return _Moment(look, system.use(), watch.total(DELIVERED))
+    return _Moment(look, system.use(), watch.total(DELIVERED), watch.total(LOST_IN_RANGE))
 
 
 def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosResult:
@@ -112,6 +115,8 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
     wall_s = last.look.wall_s - first.look.wall_s
     sim_s = last.look.sim_s - first.look.sim_s
     messages = last.look.messages - first.look.messages
+    delivered = _increase(first.delivered, last.delivered)
+    lost = _increase(first.lost, last.lost)
     cores = cores_between(first.use, last.use)
     connected = watch.all_connected
     return RosResult(
@@ -126,8 +131,9 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         window_sim_s=sim_s,
         messages_per_wall_s=messages / wall_s,
         messages_per_sim_s=messages / sim_s if sim_s else 0.0,
-        deliveries_per_wall_s=_rate(first.delivered, last.delivered, wall_s),
-        lost_share=_share(watch.total(LOST), watch.total(DELIVERED)),
+        deliveries_per_wall_s=None if delivered is None else delivered / wall_s,
+        lost_share=_share(lost, delivered),
+        lost_before=first.lost,
         cpu_ms_per_message=1000 * sum(cores.values()) * wall_s / messages if messages else None,
         cores=cores,
         pss_mb=last.use.pss_bytes / MEGABYTE,
@@ -139,8 +145,8 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
     )
 
 
-def _rate(before: float | None, after: float | None, seconds: float) -> float | None:
-    return None if before is None or after is None else (after - before) / seconds
+def _increase(before: float | None, after: float | None) -> float | None:
+    return None if before is None or after is None else after - before
 
 
 def _share(lost: float | None, delivered: float | None) -> float | None:

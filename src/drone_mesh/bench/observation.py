@@ -13,11 +13,6 @@ STARTED = MeshEventKind.STARTED.value
 CONNECTED = MeshEventKind.CONNECTED.value
 DISCONNECTED = MeshEventKind.DISCONNECTED.value
 
-# Names under which parts of the system publish figures about themselves on /diagnostics.
-DELIVERED = "delivered"  # packets handed to a node, each receiver of a broadcast counted
-LOST = "lost in range"  # packets for a node that is on and in range, and that did not get them
-WORST_LAG = "worst timer lag"  # simulated seconds that a timer was late, since the last time told
-
 PROBE = "bench_probe"  # tells that it is there by figures without any
 
 WATCH, REST = "watch", "rest"  # orders to the probe: look at the state of the mesh, or do not

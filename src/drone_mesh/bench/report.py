@@ -79,7 +79,8 @@ def ros_tables(results: Sequence[RosResult]) -> str:
                     for result in results
                 ],
             ),
-            "Traffic, per second of wall time, and the pace of simulated time.\n\n"
+            "Traffic, per second of wall time; lost: of the packets for nodes in range, and how "
+            "many of them before the measurement, when not everybody was there; the pace of simulated time.\n\n"
             + table(
                 (
                     "drones",
@@ -88,6 +89,7 @@ def ros_tables(results: Sequence[RosResult]) -> str:
                     "messages/s",
                     "deliveries/s",
                     "lost",
+                    "lost at the start",
                     "factor reached",
                     "worst timer lag",
                 ),
@@ -97,6 +99,7 @@ def ros_tables(results: Sequence[RosResult]) -> str:
                         f"{result.messages_per_wall_s:.0f}",
                         _number(result.deliveries_per_wall_s, 0),
                         UNKNOWN if result.lost_share is None else f"{result.lost_share:.3%}",
+                        _number(result.lost_before, 0),
                         f"{result.reached_real_time_factor:.2f}",
                         _milliseconds(result.worst_timer_lag_s),
                     ]

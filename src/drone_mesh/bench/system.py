@@ -93,6 +93,8 @@ class System:
     def __enter__(self) -> System:
         """Start it; returns as soon as the fleet is being launched."""
         try:
+            if self._master_answers():
+                raise BenchmarkError(f"port {self._port} is taken: use another one")
             self._master = self._start("roscore", ["roscore", "-p", str(self._port)])
             self._await("ROS master", self._master_answers)
             self._probe = self._start(

@@ -20,6 +20,7 @@ RESULT = RosResult(
     messages_per_sim_s=305.2,
     deliveries_per_wall_s=400.0,
     lost_share=0.0,
+    lost_before=7.0,
     cpu_ms_per_message=0.5,
     cores={"DroneFactory": 0.4, "rosout": 0.001},
     pss_mb=200.0,
@@ -49,7 +50,7 @@ def test_a_table_is_markdown_with_columns_of_one_width():
 def test_each_fleet_has_a_row_in_each_table():
     start, traffic, cost = rows(ros_tables([RESULT]))[1::2]
     assert start == ["100", "6 m", "1", "8.2", "1.5", "1.6"]
-    assert traffic == ["100", "6 m", "1", "305", "400", "0.000%", "1.00", "12 ms"]
+    assert traffic == ["100", "6 m", "1", "305", "400", "0.000%", "7", "1.00", "12 ms"]
     assert cost == ["100", "6 m", "1", "0.40", "0.40", "0.50", "200", "300"]
 
 
@@ -61,12 +62,13 @@ def test_what_is_not_known_is_a_dash_and_a_fleet_that_never_met_says_how_far_it_
         routers_connected=46,
         deliveries_per_wall_s=None,
         lost_share=None,
+        lost_before=None,
         worst_timer_lag_s=None,
         cpu_ms_per_message=None,
     )
     start, traffic, cost = rows(ros_tables([result]))[1::2]
     assert start[4:] == ["never (46 of 99)", "-"]
-    assert traffic[4:] == ["-", "-", "1.00", "-"]
+    assert traffic[4:] == ["-", "-", "-", "1.00", "-"]
     assert cost[5] == "-"
 
 
