@@ -80,7 +80,8 @@ def ros_tables(results: Sequence[RosResult]) -> str:
                 ],
             ),
             "Traffic, per second of wall time; lost: of the packets for nodes in range, and how "
-            "many of them before the measurement, when not everybody was there; the pace of simulated time.\n\n"
+            "many of them before the measurement, when not everybody was there; "
+            "the pace of simulated time.\n\n"
             + table(
                 (
                     "drones",
