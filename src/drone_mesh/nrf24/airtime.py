@@ -32,6 +32,11 @@ def bit_ns(bits_per_s: int) -> int:
     return NS_PER_S // bits_per_s
 
 
+def ard_s(delay: int) -> float:
+    """ARD of SETUP_RETR in seconds: from a frame's end until the chip turns to sending again."""
+    return (delay + 1) * ARD_STEP_NS / NS_PER_S
+
+
 def acknowledged_cycle_ns(data_ns: int, ack_ns: int) -> int:
     """From the rise of CE to TX_DS, when the first attempt is acknowledged."""
     return SETTLING_NS + data_ns + SETTLING_NS + ack_ns

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.nrf24.airtime import ARD_STEP_NS, NS_PER_S, acknowledged_cycle_ns, frame_bits
+from drone_mesh.nrf24.airtime import NS_PER_S, acknowledged_cycle_ns, frame_bits
 from drone_mesh.nrf24.registers import (
     ADDRESS_BYTES,
     ARC,
@@ -180,8 +180,3 @@ class RadioSettings:
         bit_ns = NS_PER_S // self.data_rate.value
         data_ns = frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) * bit_ns
         return acknowledged_cycle_ns(data_ns, ack_bits * bit_ns) / NS_PER_S
-
-    @property
-    def retransmit_delay_s(self) -> float:
-        """ARD: from the end of one frame until the chip turns to sending it again."""
-        return (self.retransmit_delay + 1) * ARD_STEP_NS / NS_PER_S

@@ -25,6 +25,11 @@ from drone_mesh.nrf24.runtime import Runtime, Task
 logger = logging.getLogger(__name__)
 
 
+def _nanoseconds(duration_s: float) -> int:
+    """At least one if there is anything to wait for, or a loop that waits would not end."""
+    return max(round(duration_s * NS_PER_S), 1 if duration_s > 0 else 0)
+
+
 class _Turn:
     """One thread's place in the order of turns."""
 
@@ -82,7 +87,7 @@ class VirtualClock(Runtime, EmulatorClock):
         return self._no_lock
 
     def sleep(self, duration_s: float) -> None:
-        self.elapse(round(duration_s * NS_PER_S))
+        self.elapse(_nanoseconds(duration_s))
 
     def elapse(self, duration_ns: int) -> None:
         until_ns = self._now_ns + duration_ns
@@ -175,7 +180,9 @@ class _VirtualSignal(Signal):
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         clock = self._clock
-        until_ns = math.inf if timeout_s == math.inf else clock.now_ns + round(timeout_s * NS_PER_S)
+        until_ns = math.inf
+        if timeout_s != math.inf:
+            until_ns = clock.now_ns + _nanoseconds(timeout_s)
         while not condition():
             if clock.now_ns >= until_ns:
                 return False

@@ -1,0 +1,186 @@
+"""A whole mesh on emulated radios: the real core on the real driver, under either clock.
+
+Each node has two threads, as on a Raspberry Pi: the antenna's, which receives, and one that works
+in the mesh component. For tests and experiments, the benchmark, and for trying the programs out
+without hardware.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from typing import Callable
+
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.router import MeshnetworkRouter
+from drone_mesh.communication.routing import create_routing_technique
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.inprocess.network import NoInternet
+from drone_mesh.nrf24.emulator.air import Air, Position
+from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.clock import EmulatorClock
+from drone_mesh.nrf24.emulator.links import LinkModel
+from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
+from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.runtime import Task
+from drone_mesh.nrf24.settings import RadioSettings
+
+Work = Callable[[float], None]
+
+_STEP_S = 0.1  # how closely run_until looks
+
+
+class EmulatedNode:
+    """One node. Its queue is filled by the receiving thread and emptied by the working one."""
+
+    def __init__(
+        self,
+        air: Air,
+        node_id: int,
+        place: Position,
+        settings: RadioSettings,
+        rng: random.Random,
+    ) -> None:
+        self.node_id = node_id
+        self.chip = EmulatedChip(air, f"node {node_id}", place)
+        self.radio = NRF24LowLevelInterface(
+            self.chip.spi,
+            self.chip.ce,
+            self.chip.irq,
+            node_id=node_id,
+            settings=settings,
+            runtime=air.clock.runtime,
+            rng=rng,
+        )
+        self.antenna = NRF24HighLevelInterface(self.radio, self.submit, runtime=air.clock.runtime)
+        self.component: MeshnetworkComponent
+        self._runtime = air.clock.runtime
+        self._queue: deque[Work] = deque()
+        self._news = air.clock.signal()
+        self._running = True
+        self._working: Task | None = None
+
+    def submit(self, work: Work) -> None:
+        """Have something done by the working thread."""
+        self._queue.append(work)
+        self._news.notify()
+
+    def start(self) -> None:
+        """Start the mesh software."""
+        self._working = self._runtime.start(self._work, f"mesh {self.node_id}")
+
+    def stop(self) -> None:
+        """Stop it, and wait until its threads have ended."""
+        self._running = False
+        self._news.notify()
+        if self._working is not None:
+            self._working.join()
+
+    def _work(self) -> None:
+        clock, component = self._runtime, self.component
+        component.start(clock.now_s())
+        while self._running:
+            if self._queue:
+                self._queue.popleft()(clock.now_s())
+                continue
+            left_s = component.next_tick_s - clock.now_s()
+            if left_s <= 0:
+                component.tick(clock.now_s())
+            else:
+                self._news.wait_for(lambda: bool(self._queue) or not self._running, left_s)
+        component.stop()
+
+
+class EmulatedMesh:
+    """Nodes on one air. Everything is called from the thread that made it."""
+
+    def __init__(
+        self,
+        clock: EmulatorClock,
+        links: LinkModel,
+        seed: int = 1,
+        *,
+        settings: RadioSettings = RadioSettings(),  # noqa: B008 (frozen)
+        timing: MeshTiming | None = None,
+        skew: bool = False,
+    ) -> None:
+        """`skew`: each node has a retransmit delay of its own, see RadioSettings.skewed."""
+        self.clock = clock
+        self.air = Air(self.clock, links, random.Random(f"{seed} air"))
+        self.nodes: dict[int, EmulatedNode] = {}
+        self._seed = seed
+        self._settings = settings
+        self._skew = skew
+        self._timing = timing or MeshTiming()
+
+    def add_gateway(self, node_id: int, place: Position) -> None:
+        """Add and start a gateway."""
+        self._add(node_id, place, gateway=True)
+
+    def add_router(self, node_id: int, place: Position) -> None:
+        """Add and start a router."""
+        self._add(node_id, place, gateway=False)
+
+    def _add(self, node_id: int, place: Position, *, gateway: bool) -> None:
+        rng = random.Random(f"{self._seed} radio {node_id}")
+        settings = self._settings.skewed(node_id) if self._skew else self._settings
+        node = EmulatedNode(self.air, node_id, place, settings, rng)
+        engine = GroundEngine(node_id, Location(place[1], place[0], place[2]))
+        routing = create_routing_technique("child_table_tree")
+        node_rng = random.Random(f"{self._seed} mesh {node_id}")
+        if gateway:
+            node.component = MeshnetworkGateway(
+                node_id,
+                node.antenna,
+                engine,
+                routing,
+                NoInternet(),
+                rng=node_rng,
+                timing=self._timing,
+            )
+        else:
+            node.component = MeshnetworkRouter(
+                node_id, node.antenna, engine, routing, rng=node_rng, timing=self._timing
+            )
+        self.nodes[node_id] = node
+        node.start()
+
+    def now_s(self) -> float:
+        """The time the nodes live by."""
+        return self.clock.runtime.now_s()
+
+    def run_for(self, seconds: float) -> None:
+        """Let that much time pass."""
+        self.clock.runtime.sleep(seconds)
+
+    def run_until(self, condition: Callable[[], bool], within_s: float) -> bool:
+        """Let time pass until the condition holds; False if it does not hold in time."""
+        until_s = self.now_s() + within_s
+        while not condition():
+            if self.now_s() >= until_s:
+                return False
+            self.run_for(_STEP_S)
+        return True
+
+    def power(self, node_id: int, on: bool) -> None:
+        """Switch a node's antenna, by that node's own thread."""
+        antenna = self.nodes[node_id].antenna
+        self.nodes[node_id].submit(lambda _now_s: antenna.switch_power(on))
+
+    def hops(self, node_id: int) -> int:
+        """Hops to the gateway; 255 while not connected."""
+        component = self.nodes[node_id].component
+        return component.get_hops_from_gateway_away()
+
+    def all_connected(self) -> bool:
+        """Whether there are antennas that are on, and each of their nodes has a gateway."""
+        on = [node for node in self.nodes.values() if node.antenna.on()]
+        return bool(on) and all(node.component.get_connected_to_gateway() for node in on)
+
+    def stop(self) -> None:
+        """Stop all nodes and end their threads."""
+        for node in self.nodes.values():
+            node.stop()
