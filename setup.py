@@ -23,7 +23,7 @@ setup(
     version=ElementTree.parse(str(HERE / "package.xml")).findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
-    package_data={"": ["*.csv", "*.html", "static/*"]},
+    package_data={"": ["*.csv", "*.html", "*.service", "static/*"]},
     extras_require={
         "raspberry": requirements("raspberry.txt"),
         "simulation": requirements("simulation.txt"),
