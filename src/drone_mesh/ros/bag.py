@@ -48,5 +48,5 @@ def _open(path: Path) -> rosbag.Bag:
         raise BagUnusable(
             f"{path}: was not closed in the end; 'rosbag reindex {path}' repairs it"
         ) from error
-    except (rosbag.ROSBagException, OSError) as error:
+    except (rosbag.ROSBagException, OSError, ValueError) as error:  # of any bytes whatever
         raise BagUnusable(f"{path}: is not a bag that can be read ({error})") from error

@@ -22,7 +22,7 @@ from drone_mesh.state.model import NodeStatus, Role, position_is_known
 ALL_FRAMES_PERIOD_S = 1.0  # wall time; a drone that stands still is told of no more often
 MOST_KNOWN_LINKS = 1500  # our choice: 254 drones on 1 m have 18,000, which are one blot
 BOX_M = {Role.ROUTER: (0.5, 0.5, 0.25), Role.GATEWAY: (0.5, 0.5, 0.5)}  # larger than life
-LABEL_M = 0.45
+LABEL_M = 0.5
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # x y z w
 
 CONNECTED = ColorRGBA(0.16, 0.65, 0.27, 1.0)
@@ -135,7 +135,8 @@ class MarkerMaker:
                 marker.scale.z = LABEL_M
                 marker.color = LABEL
                 marker.text = str(node.id)
-                marker.pose.position = _point(node.position, up=BOX_M[Role(node.role)][2] + LABEL_M)
+                box_m = BOX_M[Role(node.role)][2]
+                marker.pose.position = _point(node.position, up=box_m + 1.2 * LABEL_M)
         there = {node.id for node in nodes}
         for name, number in [key for key in self._shown if key[0] == "ids"]:
             if number not in there:

@@ -7,28 +7,21 @@ import os
 import sys
 import threading
 import time
-from pathlib import Path
 
 import rospy
 
-from drone_mesh.errors import MeshError
 from drone_mesh.msg import MeshState
 from drone_mesh.ros import names
-from drone_mesh.ros.bag import BagUnusable, read_states
 from drone_mesh.ros.command_line import join_graph, require_master, run_tool
+from drone_mesh.ros.look import WAIT_S, NoState, add_bag_options, live_state, state_in_bag
 from drone_mesh.ros.mesh_state import mesh_status
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.table import mesh_table
 from drone_mesh.state.trouble import everybody_is_connected, find_trouble
 
-WAIT_S = 5.0  # for the first state; it is latched, so it comes at once or not at all
 WATCH_PERIOD_S = 1.0
 OLD_NEWS_S = 3.0  # wall time without a state after which --watch says so
 CLEAR_SCREEN = "\x1b[H\x1b[2J"
-
-
-class NoState(MeshError):
-    """A master is there, but nobody publishes the state of a mesh."""
 
 
 def main() -> None:
@@ -45,13 +38,7 @@ def _parser() -> argparse.ArgumentParser:
         "2 no answer to that (no master, no mesh, no such bag).",
     )
     parser.add_argument("-w", "--watch", action="store_true", help="print it again each second")
-    parser.add_argument("--bag", type=Path, help="the state in a bag instead of the live one")
-    parser.add_argument(
-        "--at",
-        type=float,
-        metavar="S",
-        help="with --bag: at this simulated time (default: its end)",
-    )
+    add_bag_options(parser)
     parser.add_argument(
         "--colour",
         choices=("auto", "always", "never"),
@@ -66,38 +53,16 @@ def _run(options: argparse.Namespace) -> int:
         options.colour == "auto" and sys.stdout.isatty() and "NO_COLOR" not in os.environ
     )
     if options.bag is not None:
-        return _show(_state_in_bag(options.bag, options.at), colours)
+        return _show(state_in_bag(options.bag, options.at), colours)
     join_graph("mesh_status")
     if options.watch:
         return _watch(colours)
-    try:
-        message = rospy.wait_for_message(names.STATE_TOPIC, MeshState, timeout=WAIT_S)
-    except rospy.ROSException as error:
-        raise NoState(_NOBODY) from error
-    return _show(mesh_status(message), colours)
-
-
-_NOBODY = (
-    f"nobody publishes {names.STATE_TOPIC}: is a simulation running "
-    "(roslaunch drone_mesh factory.launch)?"
-)
+    return _show(live_state(), colours)
 
 
 def _show(mesh: MeshStatus, colours: bool) -> int:
     print(mesh_table(mesh, colours))
     return 0 if everybody_is_connected(find_trouble(mesh.nodes)) else 1
-
-
-def _state_in_bag(path: Path, at_s: float | None) -> MeshStatus:
-    found = None
-    for mesh in read_states(path):
-        if at_s is not None and mesh.stamp_s > at_s:
-            break
-        found = mesh
-    if found is None:
-        when = "" if at_s is None else f" up to {at_s:g} s"
-        raise BagUnusable(f"{path}: has no {names.STATE_TOPIC} in it{when}")
-    return found
 
 
 def _watch(colours: bool) -> int:
@@ -111,7 +76,7 @@ def _watch(colours: bool) -> int:
 
     rospy.Subscriber(names.STATE_TOPIC, MeshState, take, queue_size=1)
     if not came.wait(WAIT_S):
-        raise NoState(_NOBODY)
+        raise NoState
     try:
         while True:
             mesh, came_s = latest[0]

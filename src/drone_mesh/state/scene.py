@@ -1,0 +1,54 @@
+"""The state of a mesh as a picture of its world: for the world's window and for snapshots."""
+
+from __future__ import annotations
+
+from typing import Iterable
+
+from drone_mesh.state.links import Link, known_links, shortest, way_links
+from drone_mesh.state.model import MeshStatus, NodeStatus, Role, position_is_known
+from drone_mesh.state.trouble import SILENT_AFTER_S
+from drone_mesh.world.drones import DroneRole
+from drone_mesh.world.flight_path import Vector
+from drone_mesh.world.picture import DroneCondition, DronePicture, LinkPicture, LinkUse, Scene
+
+MOST_KNOWN_LINKS = 600  # our choice: more are one blot
+
+
+def scene_of(mesh: MeshStatus, lost: Iterable[Link] = ()) -> Scene:
+    """All nodes whose place is known, and the links between them; `lost` are those just lost."""
+    shown = [node for node in mesh.nodes if position_is_known(node)]
+    way = way_links(shown)
+    links = {
+        LinkUse.ROUTE: sorted(way),
+        LinkUse.KNOWN: shortest(known_links(shown) - way, shown, MOST_KNOWN_LINKS),
+        LinkUse.LOST: sorted(lost),
+    }
+    connected = sum(node.on and node.connected for node in mesh.nodes)
+    return Scene(
+        drones=[_drone(node) for node in shown],
+        links=[LinkPicture(*link, use) for use, of_use in links.items() for link in of_use],
+        title=f"{mesh.stamp_s:.1f} s, {connected} of {len(mesh.nodes)} connected",
+    )
+
+
+def _drone(node: NodeStatus) -> DronePicture:
+    return DronePicture(
+        node_id=node.id,
+        role=DroneRole.GATEWAY if node.role == Role.GATEWAY else DroneRole.ROUTER,
+        position=_vector(node.position),
+        condition=_condition(node),
+        path=[_vector(node.path[i : i + 3]) for i in range(0, len(node.path), 3)],
+    )
+
+
+def _condition(node: NodeStatus) -> DroneCondition:
+    if node.report_age >= SILENT_AFTER_S:
+        return DroneCondition.UNKNOWN
+    if not node.on:
+        return DroneCondition.OFF
+    return DroneCondition.CONNECTED if node.connected else DroneCondition.LOST
+
+
+def _vector(values: Iterable[float]) -> Vector:
+    x, y, z = map(float, values)
+    return (x, y, z)
