@@ -30,11 +30,10 @@ def _read_parameters() -> tuple[FactoryConfiguration, MeshSettings, int]:
     configuration = factory_configuration(*keys)
     fleet = (configuration.gateways, configuration.routers)
     plan_fleet(*fleet, configuration.gridsize, configuration.spacing)
-    hosts = rospy.get_param("~hosts", "") or 1
-    try:
-        return configuration, mesh_settings(configuration), int(hosts)
-    except ValueError:
-        raise ConfigurationError(f"argument: hosts is {hosts!r}, want a whole number") from None
+    hosts = str(rospy.get_param("~hosts", "") or 1)
+    if not hosts.isdigit():
+        raise ConfigurationError(f"argument: hosts is {hosts!r}, want a whole number, 0 or more")
+    return configuration, mesh_settings(configuration), int(hosts)
 
 
 def main() -> None:
