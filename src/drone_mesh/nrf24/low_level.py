@@ -25,9 +25,10 @@ RESTART_PERIOD_S = 1.0  # our choice: a chip that is gone is looked for no more 
 # that all depends on chance; found by trial with 17 emulated nodes, which never got connected
 # with pauses of at most 40 ms.
 SHORTEST_PAUSE_S = 5e-3
-BACK_OFF_S = 0.1  # the longest pause after the first try; twice that after each further one
+BACK_OFF_S = 0.2  # the longest pause after the first try; twice that after each further one
 ANSWER_JITTER_S = 0.1  # a broadcast makes all who hear it answer at once (RFC 5148, jitter)
-RETRY_DELAYS = range(2, 10)  # 750 us to 2.5 ms: the same two do not collide fifteen times again
+RETRY_DELAYS = range(2, 10)  # 750 us to 2.5 ms: the same two do not collide again and again
+RETRY_COUNT = 5  # fewer than the first time: a busy channel is not helped by more frames
 
 
 class NRF24LowLevelInterface:
@@ -177,7 +178,8 @@ class NRF24LowLevelInterface:
                 chip.listen()
                 self._pause(self._rng.uniform(SHORTEST_PAUSE_S, longest_s))
                 longest_s *= 2
-                chip.become_transmitter(address, self._rng.choice(RETRY_DELAYS))
+                chip.become_transmitter(address)
+                chip.set_retries(self._rng.choice(RETRY_DELAYS), RETRY_COUNT)
                 done = chip.transmit()
             if not done:
                 chip.drop()

@@ -75,7 +75,7 @@ class Transceiver:
         self._runtime = runtime
         self._statistics = statistics
         self._registers = settings.registers(node_id)
-        self._retransmit_delay = settings.retransmit_delay  # as it is in the chip now
+        self._retries = (settings.retransmit_delay, settings.retransmits)  # as the chip is set now
         self.inbox: deque[Received] = deque()
         self.broadcast_heard_s = -math.inf  # when the last one was taken from the chip
         self._pid = 0  # of the last payload written; counts from where the chip stood, not from 0
@@ -85,7 +85,7 @@ class Transceiver:
         """Write every register that matters, for nothing but power resets the chip; then listen."""
         settings = self._settings
         self._ce.value = False
-        self._retransmit_delay = settings.retransmit_delay
+        self._retries = (settings.retransmit_delay, settings.retransmits)
         self._link.write_byte(Register.CONFIG, settings.config_power_down)
         self._link.write_and_verify(self._registers)
         self._link.command(Command.FLUSH_TX)
@@ -121,16 +121,13 @@ class Transceiver:
     def listen(self) -> None:
         """Receive on the broadcast pipe and the own one; pipe 0 is closed."""
         self._ce.value = False
-        self._set_retransmit_delay(self._settings.retransmit_delay)
+        self.set_retries(self._settings.retransmit_delay, self._settings.retransmits)
         self._link.write_byte(Register.EN_RXADDR, self._settings.listening_pipes)
         self._link.write_byte(Register.CONFIG, self._settings.config_listening)
         self._raise_ce()
 
-    def become_transmitter(self, address: bytes, retransmit_delay: int | None = None) -> None:
-        """Standby, with pipe 0 open for the answer; what had arrived is taken first.
-
-        `retransmit_delay`: another one than that of the settings, until `listen`.
-        """
+    def become_transmitter(self, address: bytes) -> None:
+        """Standby, with pipe 0 open for the answer; what had arrived is taken first."""
         self._ce.value = False
         # An acknowledgement that the chip is sending must not be cut off.
         self._runtime.sleep(TX_DELAY_S[self._settings.data_rate])
@@ -139,8 +136,6 @@ class Transceiver:
         self._link.write(Register.TX_ADDR, address)
         self._link.write(Register.RX_ADDR_P0, address)
         self._link.write_byte(Register.EN_RXADDR, self._settings.listening_pipes | ERX[0].mask)
-        if retransmit_delay is not None:
-            self._set_retransmit_delay(retransmit_delay)
 
     def load(self, address: bytes, payload: bytes, *, no_ack: bool = False) -> None:
         """Write the payload, under another packet number than the same bytes had before.
@@ -221,12 +216,11 @@ class Transceiver:
         """RX_DR, TX_DS and MAX_RT as of the last transfer."""
         return self._link.status & STATUS_FLAGS
 
-    def _set_retransmit_delay(self, delay: int) -> None:
-        if delay != self._retransmit_delay:
-            self._retransmit_delay = delay
-            self._link.write_byte(
-                Register.SETUP_RETR, ARD.put(delay) | ARC.put(self._settings.retransmits)
-            )
+    def set_retries(self, delay: int, count: int) -> None:
+        """Other retransmits of the chip than those of the settings, until `listen`."""
+        if (delay, count) != self._retries:
+            self._retries = (delay, count)
+            self._link.write_byte(Register.SETUP_RETR, ARD.put(delay) | ARC.put(count))
 
     def _raise_ce(self) -> None:
         self._ce.value = True
@@ -247,4 +241,4 @@ class Transceiver:
             if self._runtime.now_s() > deadline_s:
                 raise RadioError("the chip said neither sent nor failed within 95 ms")
             # The next attempt of the chip cannot be over any sooner.
-            self._runtime.sleep(ard_s(self._retransmit_delay))
+            self._runtime.sleep(ard_s(self._retries[0]))
