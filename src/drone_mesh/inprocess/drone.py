@@ -23,9 +23,9 @@ class InProcessDrone(IDroneEngine):
         self._on_flight = on_flight
 
     @property
-    def flying(self) -> bool:
-        """Whether it is on its way."""
-        return self._path is not None
+    def path(self) -> FlightPath | None:
+        """The way it flies; None while it stands."""
+        return self._path
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there. Raises GoalRefused for a place out of bounds."""

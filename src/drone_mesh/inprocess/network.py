@@ -22,6 +22,8 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
+from drone_mesh.inprocess.status import event_records, mesh_status
+from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.world.drones import DroneRole
 from drone_mesh.world.factory import plan_fleet
 
@@ -196,6 +198,14 @@ class Network:
         return True
 
     # Looking ---------------------------------------------------------------------------------
+
+    def status(self) -> MeshStatus:
+        """All nodes now, as /mesh/state would tell: for tables, samples, reports and pictures."""
+        return mesh_status(self.nodes, self.clock.now_s, self.air.max_distance_m)
+
+    def event_records(self) -> list[EventRecord]:
+        """All events so far, as /mesh/events would tell: for the story of the run."""
+        return event_records(self.events)
 
     def connected(self, node_id: int) -> bool:
         """Whether a node is connected to a gateway."""

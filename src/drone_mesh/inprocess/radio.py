@@ -38,7 +38,7 @@ class InProcessAir:
         """
         self._clock = clock
         self._rng = rng
-        self._max_distance_m = max_distance_m
+        self.max_distance_m = max_distance_m
         self.loss = loss
         self._delay_s = delay_s
         self._jitter_s = jitter_s
@@ -89,7 +89,7 @@ class InProcessAir:
         if node not in antennas:
             return {}
         here = antennas[node].drone.get_location()
-        reach_m = self._max_distance_m
+        reach_m = self.max_distance_m
         heard = {
             other: antennas[other]
             for other in others

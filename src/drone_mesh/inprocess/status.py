@@ -1,0 +1,42 @@
+"""The state of an in-process network in the form that tables, reports and pictures read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Iterable, Mapping
+
+from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.state.events import EventBatcher
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.state.observation import describe_component, way_ahead
+from drone_mesh.state.routes import route_to_gateway
+
+if TYPE_CHECKING:
+    from drone_mesh.inprocess.network import Node
+
+
+def mesh_status(nodes: Mapping[int, Node], now_s: float, max_distance_m: float) -> MeshStatus:
+    """What /mesh/state would say of these nodes now. Nobody changes it afterwards."""
+    known = {node_id: _node_status(node_id, nodes[node_id], now_s) for node_id in sorted(nodes)}
+    for status in known.values():
+        status.route = route_to_gateway(status.id, known)
+    return MeshStatus(now_s, list(known.values()), max_distance_m)
+
+
+def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
+    """What /mesh/events would say of these events, oldest first."""
+    batcher = EventBatcher()
+    records: list[EventRecord] = []
+    for event in events:
+        batcher.observe(event)
+        records += batcher.take()
+    return records
+
+
+def _node_status(node_id: int, node: Node, now_s: float) -> NodeStatus:
+    status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
+    describe_component(status, node.component, node.antenna.powered, now_s)
+    place = node.drone.get_location()
+    status.position = (place.longitude, place.latitude, place.height)
+    path = node.drone.path
+    status.path = () if path is None else way_ahead(path, now_s)
+    return status

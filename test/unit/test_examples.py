@@ -1,0 +1,47 @@
+"""The examples do what the documents say they do."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def run_example(tmp_path):
+    def run(name, *arguments):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+        done = subprocess.run(
+            [sys.executable, str(ROOT / "examples" / name), *arguments],
+            env=environment,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
+def test_a_mesh_in_process_heals(run_example):
+    told = run_example("inprocess_network.py")
+    assert "all that still have a way connected: True" in told
+
+
+def test_ten_lines_are_enough_for_a_network_of_ones_own():
+    lines = (ROOT / "examples" / "inprocess_network.py").read_text(encoding="utf-8").splitlines()
+    code = [line for line in lines if line and not line.startswith('"""')]
+    assert len(code) == 10
+
+
+def test_two_routing_techniques_are_compared_and_one_run_is_drawn(run_example, tmp_path):
+    told = run_example("own_routing.py", "--runs", "1", "--gridsize", "4", "--page", "run.html")
+    rows = [line.split() for line in told.splitlines()[1:3]]
+    assert [row[0] for row in rows] == ["child_table_tree", "__main__:SteadyTree"]
+    assert all(row[1] == "100.0%" for row in rows)
+    assert "</html>" in (tmp_path / "run.html").read_text(encoding="utf-8")
