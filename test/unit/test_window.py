@@ -1,0 +1,158 @@
+"""The world's window on a virtual screen: what is on it, and that it harms nobody when it goes."""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+from PIL import ImageGrab
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.world.drones import DroneRole, GatewayDrone, RouterDrone
+from drone_mesh.world.picture import CONDITION_COLOURS, DroneCondition, DronePicture, Scene
+from drone_mesh.world.window_process import WindowProcess, require_screen
+
+LONG_S = 60.0  # a deadline for software rendering on a busy machine
+SCENE = Scene(
+    [
+        DronePicture(0, DroneRole.GATEWAY, (-1.0, 0.0, 0.0)),
+        DronePicture(1, DroneRole.ROUTER, (1.0, 0.0, 0.0)),
+        DronePicture(2, DroneRole.ROUTER, (1.0, 2.0, 0.0), DroneCondition.LOST),
+    ],
+    title="a title",
+)
+
+needs_screen = pytest.mark.skipif(
+    shutil.which("Xvfb") is None, reason="Xvfb, the virtual screen, is not installed"
+)
+
+
+@pytest.fixture(scope="module")
+def display():
+    """A virtual screen of its own, with a number that the server chooses."""
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1300x820x24", "-nolisten", "tcp"],
+        pass_fds=[write],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    with os.fdopen(read) as numbers:
+        number = numbers.readline().strip()
+    yield f":{number}"
+    server.terminate()
+    server.wait()
+
+
+@pytest.fixture
+def screen(display, monkeypatch):
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("LIBGL_ALWAYS_SOFTWARE", "1")
+    return display
+
+
+@pytest.fixture
+def window(screen):
+    window = WindowProcess(lambda: SCENE)
+    window.start()
+    yield window
+    window.stop()
+
+
+def pixels_like(screen, colour):
+    """How many pixels of the screen have this hue, light or dark."""
+    pixels = np.asarray(ImageGrab.grab(xdisplay=screen).convert("RGB")).astype(float)
+    hues, wanted = (
+        values - values.min(axis=-1, keepdims=True)
+        for values in (pixels.reshape(-1, 3), np.array(colour[:3]))
+    )
+    strength = np.linalg.norm(hues, axis=1)
+    likeness = hues @ wanted / (np.maximum(strength, 1) * np.linalg.norm(wanted))
+    return int(np.sum((likeness > 0.98) & (strength > 40)))
+
+
+def wait_until(condition, what):
+    deadline = time.monotonic() + LONG_S
+    while not condition():
+        assert time.monotonic() < deadline, f"after {LONG_S:.0f} s still not: {what}"
+        time.sleep(0.1)
+
+
+def wait_until_shown(screen):
+    wait_until(lambda: pixels_like(screen, GatewayDrone.COLOUR) > 100, "a gateway on the screen")
+
+
+def press(screen, key):
+    """Press a key over the middle of the window, as a keyboard would."""
+    try:
+        x11, xtest = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
+    except OSError:
+        pytest.skip("libXtst, which presses keys, is not installed")
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    connection = ctypes.c_void_p(x11.XOpenDisplay(screen.encode()))
+    code = x11.XKeysymToKeycode(connection, ctypes.c_ulong(ord(key)))
+    xtest.XTestFakeMotionEvent(connection, -1, 600, 400, ctypes.c_ulong(0))
+    xtest.XTestFakeKeyEvent(connection, code, 1, ctypes.c_ulong(0))
+    x11.XSync(connection, 0)
+    time.sleep(0.3)  # for how long a finger stays on a key
+    xtest.XTestFakeKeyEvent(connection, code, 0, ctypes.c_ulong(0))
+    x11.XCloseDisplay(connection)
+
+
+@needs_screen
+def test_the_drones_are_on_the_screen_in_their_colours_until_it_is_stopped(screen, window):
+    wait_until_shown(screen)
+    for colour in (RouterDrone.COLOUR, CONDITION_COLOURS[DroneCondition.LOST]):
+        assert pixels_like(screen, colour) > 100
+    window.stop()
+    assert pixels_like(screen, GatewayDrone.COLOUR) == 0
+
+
+@needs_screen
+def test_q_closes_the_window_and_the_simulation_hears_of_it(screen, window, caplog):
+    caplog.set_level(logging.INFO)
+    wait_until_shown(screen)
+    press(screen, "q")
+    wait_until(lambda: "window is closed; the simulation goes on" in caplog.text, "closed")
+
+
+@needs_screen
+def test_a_window_that_dies_harms_nobody_and_is_told_of(screen, caplog):
+    looks = []
+    window = WindowProcess(lambda: looks.append(1) or SCENE)
+    window.start()
+    wait_until_shown(screen)
+    os.kill(window.pid, signal.SIGKILL)
+    wait_until(lambda: "exit code -9" in caplog.text, "a warning")
+    window.stop()
+
+
+@needs_screen
+def test_it_can_be_stopped_before_it_is_there(screen):
+    window = WindowProcess(lambda: SCENE)
+    window.start()
+    window.stop()
+    with pytest.raises(ProcessLookupError):
+        os.kill(window.pid, 0)
+
+
+@needs_screen
+def test_a_screen_that_answers_is_enough(screen):
+    require_screen()
+
+
+@pytest.mark.parametrize(
+    ("display", "why"),
+    [("", "DISPLAY is not set"), ("no-such-host.invalid:5", "the screen .* does not answer")],
+)
+def test_without_a_screen_it_says_so_in_one_line(monkeypatch, display, why):
+    monkeypatch.setenv("DISPLAY", display)
+    with pytest.raises(ConfigurationError, match=f"^gui: .*{why}.*gui:=false"):
+        WindowProcess(lambda: SCENE)
