@@ -63,6 +63,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._shown_connected = False
         self._lost_since_s: float | None = None
         self._shortcut: Shortcut | None = None
+        self._gateway_of: dict[int, int] = {}  # of neighbours, as their heartbeats say
         self._negotiation = Negotiation(self._timing.check_period_s)
 
     def tick(self, now_s: float) -> None:
@@ -130,9 +131,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
         shortcut, self._shortcut = self._shortcut, None
         me = self._node_id
         if shortcut is not None and shortcut.hops + 1 < self._hops:
+            # Fewer hops may be those to another gateway: then that one is asked as well, and its
+            # answer decides. The neighbour might send this node's own heartbeat straight back.
             to = shortcut.neighbour
-            packet = messages.packet(MessageType.HEARTBEAT, me, me, to, gateway, body)
-            if self._send(packet, to):
+            its_gateway = self._gateway_of.get(to, gateway)
+            packet = messages.packet(MessageType.HEARTBEAT, me, me, to, its_gateway, body)
+            if self._send(packet, to) and its_gateway == gateway:
                 return True
         if self._send_own(MessageType.HEARTBEAT, gateway, body):
             return True
@@ -158,6 +162,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._connected = False
         self._settled = False
         self._hops = NO_ROUTE
+        self._shortcut = None
         self._heartbeat_sent_s = self._answered_s = -math.inf
         self._stop_awaiting()
 
@@ -186,6 +191,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
     ) -> None:
         if creator == self._node_id:
             return  # its own heartbeat came back: news of nobody
+        if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
+            self._gateway_of[creator] = preferred_gateway
         if creator == preferred_gateway:
             self._on_gateway_answer(creator, hops + 1)
         elif know_gateway != self._knows_gateway():

@@ -354,6 +354,34 @@ def test_only_a_neighbour_can_be_a_shortcut():
         assert bench.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
+def test_a_neighbour_that_is_nearer_to_another_gateway_is_a_way_to_that_one_alone():
+    """Its few hops say nothing of the own gateway: that heartbeat goes the usual way."""
+    bench = Bench()
+    bench.connect_through(2, hops=4)
+    bench.hear("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
+    bench.mesh.send_heartbeat(0)
+    assert bench.sent(HEARTBEAT) == [
+        packet("01 01 04 03 09 01 00 00"),
+        packet("01 01 04 02 00 01 00 00"),
+    ]
+    bench.hear("09 03 04 01 01 01 09 02")
+    assert bench.mesh.get_preferred_gateway() == 9
+    assert bench.mesh.get_hops_from_gateway_away() == 3
+    bench.hear("00 02 04 01 01 01 00 04")
+    assert bench.mesh.get_preferred_gateway() == 9
+
+
+def test_a_shortcut_of_before_the_connection_was_lost_is_none():
+    bench = Bench()
+    bench.connect_through(2, hops=4)
+    bench.mesh.send_heartbeat(0)
+    bench.hear("03 03 03 01 fe 02 01")
+    bench.wait_until(5.0)
+    bench.forget()
+    bench.hear("02 02 04 01 01 01 00 00")
+    assert bench.sent(HEARTBEAT) == [packet("01 01 04 02 00 00 00 00")]
+
+
 # Several gateways ----------------------------------------------------------------------------
 
 
