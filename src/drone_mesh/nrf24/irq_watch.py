@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-_PATIENCE = 3  # in a row; once may be a race between the pin and the look
+_PATIENCE = 3  # contradictions; a single one may be a race between the pin and the look
 
 
 class IrqWatch:
@@ -10,12 +10,12 @@ class IrqWatch:
 
     def __init__(self) -> None:
         self.trusted = True
-        self._slept = False
+        self._said: bool | None = None  # the pin was low, was not, or was not asked
         self._contradictions = 0
 
     def woken(self, low: bool) -> None:
         """The wait for the pin is over."""
-        self._slept = not low
+        self._said = low
 
     def looked(self, found: bool, low_for_nothing: bool) -> bool:
         """What the look after it found; True if that ends the trust in the pin.
@@ -23,9 +23,11 @@ class IrqWatch:
         `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all
         flags are clear, and still the pin is low.
         """
-        contradiction = low_for_nothing or (found and self._slept)
-        self._slept = False
-        self._contradictions = self._contradictions + 1 if contradiction else 0
+        said, self._said = self._said, None
+        if low_for_nothing or (found and said is False):
+            self._contradictions += 1
+        elif found and said:
+            self._contradictions = 0
         if self._contradictions < _PATIENCE or not self.trusted:
             return False
         self.trusted = False

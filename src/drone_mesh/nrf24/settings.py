@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.nrf24.airtime import NS_PER_S, acknowledged_cycle_ns, frame_bits
+from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, acknowledged_cycle_ns, frame_bits
 from drone_mesh.nrf24.registers import (
     ADDRESS_BYTES,
     ARC,
@@ -169,9 +169,10 @@ class RadioSettings:
         }
 
     @property
-    def data_s(self) -> float:
-        """How long one of our frames is on the air."""
-        return frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) / self.data_rate.value
+    def broadcast_s(self) -> float:
+        """From the rise of CE until a broadcast is sent."""
+        bits = frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes)
+        return SETTLING_NS / NS_PER_S + bits / self.data_rate.value
 
     @property
     def acknowledged_s(self) -> float:

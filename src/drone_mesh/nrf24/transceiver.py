@@ -173,7 +173,7 @@ class Transceiver:
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes & ~ENAA[0].mask)
         self.load(settings.broadcast_address, payload, no_ack=True)
-        self._pulse(settings.data_s)
+        self._pulse(settings.broadcast_s)
         self._link.write_byte(Register.STATUS, TX_DS.mask)
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes)

@@ -1,8 +1,9 @@
-"""A workbench for the tests: emulated chips, wires to them, and drivers, under the virtual clock."""
+"""A workbench for the tests: chips, wires to them, and drivers, under the virtual clock."""
 
 from __future__ import annotations
 
 import random
+from functools import partial
 
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
@@ -164,7 +165,7 @@ class Lab:
             results[index] = function()
 
         tasks = [
-            self.clock.start(lambda index=index, function=function: run(index, function), f"{index}")
+            self.clock.start(partial(run, index, function), f"test {index}")
             for index, function in enumerate(functions)
         ]
         for task in tasks:

@@ -1,0 +1,106 @@
+"""Checklist E: packets without acknowledgement, dynamic lengths, ack payloads (rows 41 to 46)."""
+
+from __future__ import annotations
+
+import pytest
+from chip_lab import BROADCAST_ADDRESS, PAYLOAD
+
+from drone_mesh.nrf24.registers import Command, Register
+from drone_mesh.nrf24.settings import BroadcastMode
+
+
+def dynamic(wires, feature=0x04):
+    """Dynamic payload lengths on the pipes 0 to 2."""
+    ce, wires.chip.ce.value = wires.chip.ce.value, False
+    wires.write(Register.FEATURE, feature)
+    wires.write(Register.DYNPD, 0x07)
+    wires.chip.ce.value = ce
+    wires.lab.wait_us(200)
+
+
+def test_row_41_a_broadcast_reaches_all_listeners_and_nobody_acknowledges(lab):
+    ptx = lab.wires("ptx").become_ptx(address=BROADCAST_ADDRESS)
+    ptx.write(Register.FEATURE, 0x01)
+    listeners = [lab.wires(f"prx {n}", 10.0 * n).become_prx() for n in range(1, 4)]
+    assert ptx.send(no_ack=True) == 0x20
+    assert [wires.unload_all() for wires in listeners] == [[(1, PAYLOAD)]] * 3
+    assert len(lab.trace.frames) == 1
+
+
+@pytest.mark.parametrize("mode", BroadcastMode)
+def test_row_41_the_drivers_broadcast_reaches_all_and_sends_work_in_between(lab, mode):
+    sender = lab.driver(5, broadcast_mode=mode)
+    others = [lab.driver(n, 10.0 * n, broadcast_mode=mode) for n in (1, 2, 3)]
+    assert sender.broadcast(PAYLOAD)
+    assert sender.send(2, b"\x02" * 32)
+    assert others[0].send(5, b"\x05" * 32)
+    assert [other.receive(0.1) for other in others] == [
+        [(1, PAYLOAD)], [(1, PAYLOAD), (2, b"\x02" * 32)], [(1, PAYLOAD)]
+    ]  # fmt: skip
+    assert sender.receive(0.1) == [(2, b"\x05" * 32)]
+    broadcast = lab.frames_from("node 5")[0].frame
+    assert broadcast.bit_count == (329 if mode is BroadcastMode.NO_ACK else 320)
+    assert lab.warnings == []
+
+
+def test_row_42_without_en_dyn_ack_the_packet_is_acknowledged_like_any_other(lab):
+    ptx, prx = lab.pair()
+    assert ptx.send(no_ack=True) == 0x20
+    assert len(lab.frames_from("prx", answers=True)) == 1
+    assert prx.unload_all() == [(2, PAYLOAD)]
+
+
+@pytest.mark.parametrize("width", [1, 7, 32])
+def test_row_43_dynamic_lengths_arrive_as_they_were_sent(lab, width):
+    ptx, prx = lab.pair(width=0)
+    dynamic(ptx)
+    dynamic(prx)
+    assert ptx.send(PAYLOAD[:width]) == 0x20
+    assert prx.command(Command.R_RX_PL_WID, b"\0") == bytes((width,))
+    assert prx.unload(width) == PAYLOAD[:width]
+
+
+def test_row_44_an_ack_payload_comes_back_with_the_acknowledgement(lab):
+    ptx, prx = lab.pair()
+    dynamic(ptx, 0x06)
+    dynamic(prx, 0x06)
+    prx.command(Command.W_ACK_PAYLOAD | 2, b"answer")
+    ptx.load()
+    ptx.pulse()
+    lab.wait_us(10_000)
+    assert ptx.status == 0x60  # RX_DR and TX_DS, pipe 0
+    assert ptx.unload(6) == b"answer"
+    assert prx.status & 0x20 == 0
+    ptx.write(Register.STATUS, 0x70)
+    ptx.send(b"\x01" * 32)
+    assert prx.status & 0x20
+
+
+@pytest.mark.parametrize(("retries", "flags"), [(0x1F, 0x10), (0x5F, 0x60)])
+def test_row_45_a_long_ack_payload_needs_a_long_retransmit_delay(lab, retries, flags):
+    ptx, prx = lab.pair(retries=retries)
+    dynamic(ptx, 0x06)
+    dynamic(prx, 0x06)
+    prx.command(Command.W_ACK_PAYLOAD | 2, PAYLOAD)
+    ptx.load()
+    ptx.pulse()
+    lab.wait_us(90_000)
+    assert ptx.status & 0x70 == flags
+
+
+def test_row_46_the_driver_flushes_a_frame_that_is_wider_than_a_payload_can_be(lab):
+    sender, receiver = lab.driver(5), lab.driver(10, 100.0)
+    receiver.chip.faults.next_width = 51
+    assert sender.send(10, b"\x01" * 32)
+    assert receiver.receive(0.05) == []
+    assert receiver.statistics().corrupt == 1
+    assert sender.send(10, b"\x02" * 32)
+    assert receiver.receive(0.05) == [(2, b"\x02" * 32)]
+
+
+def test_the_polarity_of_the_no_ack_bit_tells_clones_from_genuine_chips(lab):
+    """A clone follows the datasheet, a genuine chip may not: then acknowledgements go wrong."""
+    ptx = lab.wires("clone", no_ack_bit=0).become_ptx()
+    prx = lab.wires("genuine", 100.0).become_prx()
+    assert ptx.send() == 0x10
+    assert prx.unload_all() == [(2, PAYLOAD)]
