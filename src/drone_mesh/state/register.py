@@ -39,7 +39,7 @@ class MeshRegister:
             del self._heard_at_s[gone]
         for other, ids in self._ids_of_host.items():
             if other != host:
-                ids -= reported.keys()
+                ids.difference_update(reported)
         self._ids_of_host[host] = set(reported)
         self._nodes.update(reported)
         for node in reported:

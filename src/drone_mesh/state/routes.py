@@ -29,4 +29,5 @@ def route_to_gateway(start: int, nodes: Mapping[int, NodeStatus]) -> bytes:
 
 def reaches_gateway(route: Sequence[int], nodes: Mapping[int, NodeStatus]) -> bool:
     """Whether this route ends at a gateway that is on."""
-    return bool(route) and nodes[route[-1]].role == Role.GATEWAY and nodes[route[-1]].on
+    end = nodes.get(route[-1]) if route else None
+    return end is not None and end.role == Role.GATEWAY and end.on

@@ -6,7 +6,8 @@ from typing import Iterable
 
 from drone_mesh.state.links import Link, known_links, shortest, way_links
 from drone_mesh.state.model import MeshStatus, NodeStatus, Role, position_is_known
-from drone_mesh.state.trouble import SILENT_AFTER_S
+from drone_mesh.state.register import DroneView
+from drone_mesh.state.trouble import SILENT_AFTER_S, find_trouble, summarise
 from drone_mesh.world.drones import DroneRole
 from drone_mesh.world.flight_path import Vector
 from drone_mesh.world.picture import DroneCondition, DronePicture, LinkPicture, LinkUse, Scene
@@ -14,8 +15,14 @@ from drone_mesh.world.picture import DroneCondition, DronePicture, LinkPicture, 
 MOST_KNOWN_LINKS = 600  # our choice: more are one blot
 
 
-def scene_of(mesh: MeshStatus, lost: Iterable[Link] = ()) -> Scene:
-    """All nodes whose place is known, and the links between them; `lost` are those just lost."""
+def scene_of(
+    mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneView] = ()
+) -> Scene:
+    """All nodes whose place is known, and the links between them.
+
+    `lost` are those just lost; `views` are newer than `mesh` as to where drones are.
+    """
+    newer = {view.id: view for view in views}
     shown = [node for node in mesh.nodes if position_is_known(node)]
     way = way_links(shown)
     links = {
@@ -23,21 +30,21 @@ def scene_of(mesh: MeshStatus, lost: Iterable[Link] = ()) -> Scene:
         LinkUse.KNOWN: shortest(known_links(shown) - way, shown, MOST_KNOWN_LINKS),
         LinkUse.LOST: sorted(lost),
     }
-    connected = sum(node.on and node.connected for node in mesh.nodes)
+    summary = summarise(mesh.nodes, find_trouble(mesh.nodes))
     return Scene(
-        drones=[_drone(node) for node in shown],
+        drones=[_drone(node, newer.get(node.id, node)) for node in shown],
         links=[LinkPicture(*link, use) for use, of_use in links.items() for link in of_use],
-        title=f"{mesh.stamp_s:.1f} s, {connected} of {len(mesh.nodes)} connected",
+        title=f"{mesh.stamp_s:.1f} s: {summary.text}",
     )
 
 
-def _drone(node: NodeStatus) -> DronePicture:
+def _drone(node: NodeStatus, seen: NodeStatus | DroneView) -> DronePicture:
     return DronePicture(
         node_id=node.id,
         role=DroneRole.GATEWAY if node.role == Role.GATEWAY else DroneRole.ROUTER,
-        position=_vector(node.position),
+        position=_vector(seen.position),
         condition=_condition(node),
-        path=[_vector(node.path[i : i + 3]) for i in range(0, len(node.path), 3)],
+        path=[_vector(seen.path[i : i + 3]) for i in range(0, len(seen.path), 3)],
     )
 
 

@@ -1,0 +1,71 @@
+"""Links by what they are used for."""
+
+from __future__ import annotations
+
+from drone_mesh.state.links import JUST_LOST_S, LostLinks, known_links, shortest, way_links
+from drone_mesh.state.model import NodeStatus, Role
+
+
+def line(*xs: float) -> list[NodeStatus]:
+    """A gateway 0 and routers at these places, each with the next one as its neighbour."""
+    nodes = []
+    for node, x in enumerate(xs):
+        near = [other for other in (node - 1, node + 1) if 0 <= other < len(xs)]
+        role = Role.ROUTER if node else Role.GATEWAY
+        nodes.append(
+            NodeStatus(
+                node,
+                role,
+                connected=True,
+                next_hop=max(0, node - 1),
+                neighbours=bytes(near),
+                position=(x, 0.0, 0.0),
+            )  # fmt: skip
+        )
+    return nodes
+
+
+def test_a_link_that_one_side_knows_is_known():
+    nodes = line(0.0, 5.0)
+    nodes[0].neighbours = b""
+    assert known_links(nodes) == {(0, 1)}
+
+
+def test_there_is_no_link_to_a_node_that_is_off():
+    nodes = line(0.0, 5.0, 10.0)
+    nodes[1].on = False
+    assert known_links(nodes) == set()
+    assert way_links(nodes) == set()
+
+
+def test_ways_are_the_next_hops_of_connected_routers():
+    nodes = line(0.0, 5.0, 10.0)
+    assert way_links(nodes) == {(0, 1), (1, 2)}
+    nodes[2].connected = False
+    assert way_links(nodes) == {(0, 1)}
+
+
+def test_of_too_many_links_the_shortest_stay():
+    nodes = line(0.0, 5.0, 7.0, 20.0)
+    assert shortest(known_links(nodes), nodes, most=2) == [(1, 2), (0, 1)]
+
+
+def test_a_link_to_a_place_nobody_knows_is_not_drawn():
+    nodes = line(0.0, 5.0)
+    nodes[1].position = (float("nan"),) * 3
+    assert shortest(known_links(nodes), nodes, most=9) == []
+
+
+def test_a_lost_link_is_remembered_for_a_while():
+    lost = LostLinks()
+    assert lost.update({(0, 1), (1, 2)}, wall_s=0.0) == []
+    assert lost.update({(0, 1)}, wall_s=1.0) == [(1, 2)]
+    assert lost.update({(0, 1)}, wall_s=0.9 + JUST_LOST_S) == [(1, 2)]
+    assert lost.update({(0, 1)}, wall_s=1.0 + JUST_LOST_S) == []
+
+
+def test_a_link_that_comes_back_is_not_lost():
+    lost = LostLinks()
+    lost.update({(0, 1)}, wall_s=0.0)
+    lost.update(set(), wall_s=1.0)
+    assert lost.update({(0, 1)}, wall_s=2.0) == []

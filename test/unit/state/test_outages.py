@@ -1,0 +1,80 @@
+"""The story of losses and repairs, told from events."""
+
+from __future__ import annotations
+
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.state.outages import find_outages, take_sample
+
+
+def story(*events: tuple[float, int, str] | tuple[float, int, str, int]) -> list[EventRecord]:
+    return [EventRecord(s, node, kind, tuple(peers)) for s, node, kind, *peers in events]
+
+
+REPAIR = story(
+    (1.0, 2, "connected", 0),
+    (1.1, 3, "connected", 0),
+    (100.0, 2, "power off"),
+    (100.0, 2, "disconnected", 0),
+    (103.0, 3, "disconnected", 0),
+    (140.0, 3, "emergency"),
+    (141.0, 3, "negotiation started"),
+    (150.0, 3, "flight decided", 2),
+    (153.0, 3, "landed"),
+    (153.5, 3, "connected", 0),
+)
+
+
+def test_a_repair_has_its_phases():
+    switched_off, repair = find_outages(REPAIR)
+    assert switched_off.node == 2
+    assert switched_off.switched_off
+    assert repair.node == 3
+    assert (repair.cause_s, repair.cause_node) == (100.0, 2)
+    assert (repair.lost_s, repair.emergency_s) == (103.0, 140.0)
+    assert (repair.decided_s, repair.place_of, repair.landed_s) == (150.0, 2, 153.0)
+    assert repair.connected_s == 153.5
+    assert repair.seconds == 50.5
+
+
+def test_a_loss_that_lasts_stays_open():
+    *_, repair = find_outages(REPAIR[:6])
+    assert repair.connected_s is None
+    assert repair.seconds is None
+
+
+def test_who_never_was_connected_was_not_lost():
+    assert find_outages(story((5.0, 1, "disconnected", 0))) == []
+
+
+def test_a_loss_without_a_power_off_has_no_cause():
+    (outage,) = find_outages(story((1.0, 1, "connected", 0), (9.0, 1, "disconnected", 0)))
+    assert outage.cause_s is None
+    assert outage.cause_node is None
+
+
+def test_a_node_that_was_lost_and_then_switched_off_is_not_to_be_repaired():
+    (outage,) = find_outages(
+        story((1.0, 1, "connected", 0), (9.0, 1, "disconnected", 0), (12.0, 1, "power off"))
+    )
+    assert outage.switched_off
+
+
+def test_events_may_come_in_any_order():
+    assert find_outages(reversed(REPAIR)) == find_outages(REPAIR)
+
+
+def test_a_sample_counts_routers_that_are_on():
+    mesh = MeshStatus(
+        7.0,
+        [
+            NodeStatus(0, Role.GATEWAY, connected=True, hops=0, total_messages=10),
+            NodeStatus(1, connected=True, hops=1, total_messages=5),
+            NodeStatus(2, connected=True, hops=4),
+            NodeStatus(3, connected=False),
+            NodeStatus(4, on=False),
+        ],
+    )
+    sample = take_sample(mesh)
+    assert (sample.routers_on, sample.routers_connected, sample.messages) == (3, 2, 15)
+    assert (sample.mean_hops, sample.most_hops) == (2.5, 4)
+    assert sample.connected_share == 2 / 3

@@ -1,0 +1,62 @@
+"""The table of `status`."""
+
+from __future__ import annotations
+
+from drone_mesh.state.model import MeshStatus, NodeStatus, Role
+from drone_mesh.state.table import mesh_table
+
+MESH = MeshStatus(
+    12.34,
+    [
+        NodeStatus(
+            0, Role.GATEWAY, connected=True, gateway=0, hops=0, next_hop=0, route=b"\x00",
+            position=(-1.0, 0.0, 0.0), neighbours=b"\x01", neighbour_ages=b"\x02",
+        ),
+        NodeStatus(1, position=(0.0, 4.0, 0.0), path=(0.0, 4.0, 3.0, 5.0, 6.0, 0.0)),
+        NodeStatus(2, on=False),
+    ],
+    achieved_real_time_factor=2.04,
+)  # fmt: skip
+
+
+def test_the_table_in_a_pipe_is_plain_text():
+    lines = mesh_table(MESH, colours=False).splitlines()
+    assert lines[0] == "t = 12.3 s, speed 2x: 0 of 1 routers connected, 1 switched off"
+    assert lines[1].split() == [
+        "node", "kind", "power", "connected", "gateway", "hops", "neighbours", "known", "sent",
+        "place", "(x,", "y,", "z)", "route", "remark",
+    ]  # fmt: skip
+    assert lines[2].split() == [
+        "0", "gateway", "on", "yes", "0", "0", "1", "0", "0", "-1.0,", "0.0,", "0.0", "0",
+    ]  # fmt: skip
+    assert "0.0, 4.0, 0.0 -> 5.0, 6.0, 0.0" in lines[3]
+    assert lines[3].endswith("flying")
+    assert lines[4].split() == [
+        "2", "router", "off", "no", "-", "-", "0", "0", "0", "-", "-", "switched", "off",
+    ]  # fmt: skip
+    assert "\x1b" not in "".join(lines)
+
+
+def test_on_a_terminal_rows_with_trouble_have_a_colour():
+    lines = mesh_table(MESH, colours=True).splitlines()
+    assert lines[0].startswith("\x1b[31m")
+    assert "\x1b" not in lines[2]
+    assert lines[3].startswith("\x1b[31m")
+    assert lines[3].endswith("\x1b[0m")
+    assert lines[4].startswith("\x1b[33m")
+
+
+def test_columns_are_aligned():
+    plain = mesh_table(MESH, colours=False).splitlines()
+    assert len({line.index(word) for line, word in zip(plain[2:], ("gateway", "router"))}) == 1
+
+
+def test_a_long_route_loses_its_middle():
+    node = NodeStatus(9, connected=True, route=bytes([9, 8, 7, 6, 5, 4, 3, 0]))
+    assert "9 > 8 > 7 > ... > 3 > 0" in mesh_table(MeshStatus(0.0, [node]), colours=False)
+
+
+def test_a_paused_mesh_says_so():
+    assert mesh_table(MeshStatus(1.0, [], paused=True), colours=False).startswith(
+        "t = 1.0 s, paused"
+    )
