@@ -1,0 +1,147 @@
+"""Frames: what a page is told, and what it is spared."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+from drone_mesh.console.frames import EVENTS_PER_FRAME, FrameStore
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+
+
+def mesh(stamp_s: float = 1.0, **router: object) -> MeshStatus:
+    fields = {"connected": True, "hops": 1, "next_hop": 0, "route": b"\x01\x00", **router}
+    return MeshStatus(
+        stamp_s,
+        [
+            NodeStatus(0, Role.GATEWAY, connected=True, hops=0, position=(-1.0, 0.0, 0.0)),
+            NodeStatus(1, position=(2.0, 3.0, 0.0), **fields),  # type: ignore[arg-type]
+        ],
+    )
+
+
+def frame(store: FrameStore, version: int) -> dict:
+    return json.loads(store.frame_since(version))
+
+
+def test_a_new_page_is_told_everything():
+    store = FrameStore()
+    store.update_mesh(mesh(neighbours=b"\x00\x09"), wall_s=0.0)
+    first = frame(store, 0)
+    assert first["full"]
+    assert first["link"] == ""
+    assert first["clock"]["summary"] == "1 of 1 routers connected"
+    assert first["nodes"]["1"]["hops"] == 1
+    assert first["nodes"]["1"]["neighbours"] == "201"  # bits 0 and 9
+    assert first["nodes"]["1"]["at"] == [2.0, 3.0, 0.0]
+
+
+def test_a_page_that_is_up_to_date_is_told_only_what_changed():
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    known = store.version
+    store.update_mesh(mesh(1.2, hops=2), wall_s=0.2)
+    delta = frame(store, known)
+    assert not delta["full"]
+    assert delta["nodes"] == {"1": {"hops": 2}}
+    assert delta["clock"]["t"] == 1.2
+
+
+def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    known = store.version
+    store.update_mesh(mesh(1.2, hops=2), wall_s=0.2)
+    store.update_mesh(mesh(1.4, hops=3, total_messages=7), wall_s=0.4)
+    assert frame(store, known)["nodes"] == {"1": {"hops": 3, "sent": 7}}
+
+
+def test_movements_below_a_centimetre_are_not_told():
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    known = store.version
+    store.update_mesh(mesh(1.2, **{}), wall_s=0.2)
+    moved = mesh(1.4)
+    moved.nodes[1].position = (2.004, 3.0, 0.0)
+    store.update_mesh(moved, wall_s=0.4)
+    assert "nodes" not in frame(store, known)
+
+
+def test_a_node_that_is_gone_is_taken_away_and_may_come_back():
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    known = store.version
+    store.update_mesh(replace(mesh(1.2), nodes=mesh().nodes[:1]), wall_s=0.2)
+    assert frame(store, known)["gone"] == [1]
+    store.update_mesh(mesh(1.4), wall_s=0.4)
+    back = frame(store, known)
+    assert "gone" not in back
+    assert back["nodes"]["1"]["hops"] == 1
+
+
+def test_a_place_that_nobody_knows_is_null():
+    store = FrameStore()
+    store.update_mesh(MeshStatus(1.0, [NodeStatus(3)]), wall_s=0.0)
+    assert frame(store, 0)["nodes"]["3"]["at"] is None
+
+
+def test_each_event_is_told_once():
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    store.add_events([EventRecord(1.0, 1, "connected", (0,), "1 hops")])
+    told = frame(store, 0)["events"]
+    assert told == [{"t": 1.0, "node": 1, "kind": "connected", "peers": [0], "detail": "1 hops"}]
+    known = store.version
+    store.add_events([EventRecord(2.0, 1, "disconnected", (0,))])
+    assert [event["kind"] for event in frame(store, known)["events"]] == ["disconnected"]
+
+
+def test_of_a_burst_of_events_the_newest_are_told():
+    store = FrameStore()
+    store.add_events([EventRecord(float(n), 1, "landed") for n in range(EVENTS_PER_FRAME + 50)])
+    events = frame(store, 0)["events"]
+    assert len(events) == EVENTS_PER_FRAME
+    assert events[-1]["t"] == EVENTS_PER_FRAME + 49
+
+
+def test_samples_are_taken_once_a_second_and_not_while_time_stands_still():
+    store = FrameStore()
+    for tenth in range(31):
+        store.update_mesh(mesh(1.0 + tenth / 10), wall_s=tenth / 10)
+    assert len(frame(store, 0)["samples"]) == 4
+    for tenth in range(31, 60):
+        store.update_mesh(replace(mesh(4.0), paused=True), wall_s=tenth / 10)
+    assert len(frame(store, 0)["samples"]) == 4
+
+
+def test_a_world_that_began_anew_is_told_in_full_and_without_the_past():
+    store = FrameStore()
+    store.update_mesh(mesh(100.0), wall_s=0.0)
+    store.add_events([EventRecord(99.0, 1, "connected")])
+    known = store.version
+    store.update_mesh(mesh(0.5), wall_s=5.0)
+    delta = frame(store, known)
+    assert delta["full"]
+    assert "events" not in delta
+    assert set(delta["nodes"]) == {"0", "1"}
+    assert [sample["stamp_s"] for sample in delta["samples"]] == [0.5]
+
+
+def test_silence_is_told_and_ends_with_the_next_news():
+    store = FrameStore()
+    store.update_mesh(mesh(), wall_s=0.0)
+    known = store.version
+    store.set_link("no ROS master")
+    assert frame(store, known)["link"] == "no ROS master"
+    known = store.version
+    store.set_link("no ROS master")
+    assert store.version == known
+    store.update_mesh(mesh(1.2), wall_s=9.0)
+    assert frame(store, known)["link"] == ""
+
+
+def test_neighbours_of_a_watched_node_come_with_their_ages():
+    store = FrameStore()
+    assert store.neighbours_of(1) == []
+    store.update_mesh(mesh(neighbours=b"\x00\x09", neighbour_ages=b"\x03\xff"), wall_s=0.0)
+    assert store.neighbours_of(1) == [(0, 3), (9, 255)]

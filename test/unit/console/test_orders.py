@@ -1,0 +1,86 @@
+"""What a page may ask for."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from drone_mesh.console.orders import Order, OrderRefused, Watch, parse_request
+
+
+class Notebook:
+    """Controls that write down what they are told."""
+
+    def __init__(self) -> None:
+        self.done: list[tuple[object, ...]] = []
+
+    def power(self, node: int, on: bool) -> str:
+        self.done.append(("power", node, on))
+        return "done"
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:
+        self.done.append(("fly", node, x, y, z))
+        return "done"
+
+    def layout(self, case: int) -> str:
+        self.done.append(("layout", case))
+        return "done"
+
+    def speed(self, paused: bool, factor: float) -> str:
+        self.done.append(("speed", paused, factor))
+        return "done"
+
+
+@pytest.mark.parametrize(
+    ("request_", "done"),
+    [
+        ({"do": "power", "node": 3, "on": False}, ("power", 3, False)),
+        ({"do": "fly", "node": 253, "x": -1.5, "y": 2, "z": 0}, ("fly", 253, -1.5, 2.0, 0.0)),
+        ({"do": "layout", "case": 202}, ("layout", 202)),
+        ({"do": "speed", "paused": True, "factor": 0}, ("speed", True, 0.0)),
+    ],
+)
+def test_an_order_is_carried_out_as_it_was_given(request_, done):
+    order = parse_request(json.dumps({**request_, "number": 7}))
+    assert isinstance(order, Order)
+    assert order.number == 7
+    notebook = Notebook()
+    assert order.carry_out(notebook) == "done"
+    assert notebook.done == [done]
+
+
+def test_a_page_may_watch_a_node_or_none():
+    assert parse_request('{"do":"watch","node":3}') == Watch(3)
+    assert parse_request('{"do":"watch","node":null}') == Watch(None)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "not JSON"),
+        ("{", "not JSON"),
+        ("[]", "an object"),
+        ("7", "an object"),
+        ('{"number":1}', "None is not something"),
+        ('{"number":1,"do":"reboot"}', "'reboot' is not something"),
+        ('{"do":"layout","case":0}', "number"),
+        ('{"number":-1,"do":"layout","case":0}', "number"),
+        ('{"number":1,"do":"power","node":254,"on":true}', "node: a whole number from 0 to 253"),
+        ('{"number":1,"do":"power","node":true,"on":true}', "node"),
+        ('{"number":1,"do":"power","node":"3","on":true}', "node"),
+        ('{"number":1,"do":"power","node":3,"on":1}', "on: true or false"),
+        ('{"number":1,"do":"fly","node":3,"x":NaN,"y":0,"z":0}', "x: a number"),
+        ('{"number":1,"do":"fly","node":3,"x":1e999,"y":0,"z":0}', "x: a number"),
+        ('{"number":1,"do":"fly","node":3,"x":5001,"y":0,"z":0}', "x: a number from -5000"),
+        ('{"number":1,"do":"fly","node":3,"x":0,"y":0,"z":-1}', "z: a number from 0 to 500"),
+        ('{"number":1,"do":"fly","node":3,"x":0,"y":0}', "z"),
+        ('{"number":1,"do":"layout","case":4294967296}', "case"),
+        ('{"number":1,"do":"layout","case":1.5}', "case"),
+        ('{"number":1,"do":"speed","paused":false,"factor":101}', "factor"),
+        ('{"do":"watch","node":300}', "node"),
+    ],
+)
+def test_anything_else_is_refused_with_a_reason(text, why):
+    with pytest.raises(OrderRefused, match=why):
+        parse_request(text)
