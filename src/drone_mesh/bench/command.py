@@ -191,7 +191,10 @@ class Benchmark:
             sections.append(report.inprocess_table(self._inprocess))
         if self._soak is not None:
             sections.append(report.verdict_lines(self._soak))
-        sections += [f"Failed: {failed['case']}: {failed['reason']}" for failed in self._failed]
+        sections += [
+            f"Failed: {failed['case']}: {failed['reason'].splitlines()[0]}"
+            for failed in self._failed
+        ]
         if len(sections) > 1:
             print("\n" + "\n\n".join(sections), flush=True)
         if self._options.json is not None:
@@ -213,8 +216,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = make_parser().parse_args(arguments)
     if options.json is not None and not options.json.absolute().parent.is_dir():
         sys.exit(f"bench: --json {options.json}: there is no such directory")
-    # So that a TERM ends what was started here, as Ctrl-C does.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # So that a TERM ends what was started here, as Ctrl-C does; a shell's background job starts
+    # out deaf to the latter.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     try:
         sys.exit(Benchmark(options, Progress(sys.stderr)).run())
     except BenchmarkError as error:
