@@ -33,4 +33,4 @@ def test_a_scene_shows_whose_place_is_known_with_conditions_links_and_flights():
         (0, 1): LinkUse.ROUTE,
         (1, 2): LinkUse.KNOWN,
     }
-    assert scene.title.startswith("3.0 s: 1 of 2 routers connected")
+    assert scene.title.startswith("3.0 s: 1 of 3 routers connected, 1 switched off, 1 silent")
