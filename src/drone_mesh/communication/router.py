@@ -250,14 +250,23 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _fly_back(self) -> None:
         """One step back towards the gateway; who knows no place has nowhere to fly (14.7)."""
-        place, at = self._good_location, self._good_location_id
-        if not _may_be_flown_to(place):
-            place, at = self._gateway_location, self._preferred_gateway
-        if place is None or not _may_be_flown_to(place):
+        step = self._step_back()
+        if step is None:
             return
+        place, at = step
         self._report(MeshEventKind.FLIGHT_DECIDED, at)
         self._forget_neighbourhood()
         self._fly_to(place)
+
+    def _step_back(self) -> tuple[Location, int] | None:
+        """The place to fly back to, and whose it is: the last good one, else the gateway's."""
+        for place, node in (
+            (self._good_location, self._good_location_id),
+            (self._gateway_location, self._preferred_gateway),
+        ):
+            if place is not None and _may_be_flown_to(place):
+                return place, node
+        return None
 
     def _flight_started(self) -> None:
         self._disconnect()
@@ -285,12 +294,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _score(self) -> float:
         """Distance to the gateway's place in metres (SDD formula 3.1), or NO_BID."""
-        own = self._own_location()
-        if own is None or self._gateway_location is None:
+        own, step = self._own_location(), self._step_back()
+        if own is None or step is None or self._gateway_location is None:
             return NO_BID
-        if not _may_be_flown_to(self._good_location):
-            return NO_BID
-        if self._good_location_id in self._routing.get_set_of_children():
+        if step[1] in self._routing.get_set_of_children():
             return NO_BID
         return min(own.distance_m(self._gateway_location), MAX_SCORE_M)
 
@@ -328,10 +335,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._deadlines.set(Due.DECIDE, math.inf)
 
 
-def _may_be_flown_to(place: Location | None) -> bool:
+def _may_be_flown_to(place: Location) -> bool:
     """Anybody can say anything of where he is: not every place heard of is one for a drone."""
-    if place is None:
-        return False
     try:
         check_goal(*place)
     except GoalRefused:

@@ -404,6 +404,20 @@ def test_who_knows_no_gateway_location_does_not_bid():
     assert bench.sent(BID) == [own_bid(3, -1.0)]
 
 
+def test_who_knows_the_place_of_the_gateway_alone_bids_for_flying_there():
+    """Else a group of such drones would stay for ever (the place to fly to without neighbours)."""
+    bench = Bench()
+    bench.engine.place = Location(12.0, 0.0, 0.0)
+    bench.connect_through(2)
+    bench.hear("00 02 01 01 01 00 00 80 40")
+    bench.antenna.dead = {2}
+    bench.know_neighbour(3)
+    bench.wait_until(EMERGENCY_S + 0.1)
+    assert bench.sent(BID) == [own_bid(3, 8.0)]
+    bench.hear(bid(3, 1.0))
+    assert bench.engine.goals == [GATEWAY_PLACE]
+
+
 def test_who_does_not_know_where_it_is_does_not_bid():
     bench = group_bench(3)
     bench.engine.place = None
