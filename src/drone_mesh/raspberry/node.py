@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import random
 import time
@@ -9,7 +10,7 @@ from typing import Callable
 
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
-from drone_mesh.communication.interfaces import IInternetConnection
+from drone_mesh.communication.interfaces import MAX_NODE_ID, IInternetConnection
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing import create_routing_technique
@@ -65,7 +66,9 @@ class RadioNode:
             self._started = False
             self._seat.submit(lambda _now_s: self.component.stop())
             self._executor.stop()
-            _log.info("node %d: %s", self.radio.node_id, self._antenna.statistics())
+            counters = dataclasses.asdict(self._antenna.statistics())
+            text = ", ".join(f"{name} {count}" for name, count in counters.items())
+            _log.info("node %d: packets: %s", self.radio.node_id, text)
         else:
             if self._internet is not None:
                 self._internet.disconnect()
@@ -92,7 +95,6 @@ class RadioNode:
         )
 
 
-_WARNINGS = frozenset((MeshEventKind.DISCONNECTED, MeshEventKind.EMERGENCY))
 _ABOUT_GATEWAYS = frozenset(
     (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)
 )
@@ -104,9 +106,9 @@ def _log_event(event: MeshEvent) -> None:
     if event.kind in _WITHOUT_LINE:
         return
     words = [event.kind.value]
-    if event.peer <= 253:
+    if event.peer <= MAX_NODE_ID:
         words.append(f"gateway {event.peer}" if event.kind in _ABOUT_GATEWAYS else str(event.peer))
     if event.detail:
         words.append(f"({event.detail})")
-    level = logging.WARNING if event.kind in _WARNINGS else logging.INFO
+    level = logging.WARNING if event.kind is MeshEventKind.EMERGENCY else logging.INFO
     _log.log(level, "node %d: %s", event.node, " ".join(words))

@@ -30,8 +30,7 @@ _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 class Hardware:
     """Where the radio is connected."""
 
-    spi_bus: int
-    spi_device: int
+    spi: tuple[int, int]  # bus, device
     ce_gpio: int
     irq_gpio: int | None  # None: the radio is polled
 
@@ -225,7 +224,7 @@ def _options(
         create_routing_technique(parsed.routing)
         return Options(
             node_id=parsed.id or 0,
-            hardware=Hardware(*parsed.spi, parsed.ce, parsed.irq),
+            hardware=Hardware(parsed.spi, parsed.ce, parsed.irq),
             radio=RadioSettings(
                 channel=parsed.channel,
                 data_rate=_RATES[parsed.rate],

@@ -69,13 +69,18 @@ def _run(options: Options, ended: threading.Event) -> None:
         for node in nodes:
             stack.callback(node.stop)
         # Called before any stop: so no node spends the end on calling those that are gone.
-        stack.callback(lambda: [node.switch_off() for node in nodes])
+        stack.callback(_switch_off, nodes)
         for node in nodes:
             node.start()
         watch = _Watch(nodes, options)
         while not ended.wait(LOOK_PERIOD_S):
             watch.look(time.monotonic())
         _log.info("ending")
+
+
+def _switch_off(nodes: Sequence[RadioNode]) -> None:
+    for node in nodes:
+        node.switch_off()
 
 
 def _real_node(options: Options) -> RadioNode:
@@ -89,8 +94,7 @@ def _real_node(options: Options) -> RadioNode:
     _log.info(
         "node %d: nRF24L01+ on SPI %d.%d, CE on GPIO%d, %s; channel %d, %d kbit/s, CRC %d bit",
         options.node_id,
-        hardware.spi_bus,
-        hardware.spi_device,
+        *hardware.spi,
         hardware.ce_gpio,
         "polled" if hardware.irq_gpio is None else f"IRQ on GPIO{hardware.irq_gpio}",
         options.radio.channel,
@@ -104,7 +108,7 @@ def _open_radio(
     node_id: int, hardware: Hardware, settings: RadioSettings
 ) -> NRF24LowLevelInterface:
     with contextlib.ExitStack() as opened:
-        spi = open_spi(hardware.spi_bus, hardware.spi_device)
+        spi = open_spi(*hardware.spi)
         opened.callback(spi.close)
         ce = GpiodCe(hardware.ce_gpio)
         opened.callback(ce.close)

@@ -1,0 +1,134 @@
+"""The command lines of raspberry_router and raspberry_gateway."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone import Location
+from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
+from drone_mesh.raspberry.options import (
+    Hardware,
+    HttpOptions,
+    Options,
+    parse_gateway,
+    parse_router,
+)
+
+TOKEN = "0123456789abcdef"
+
+
+def test_a_router_needs_but_its_id_and_has_the_settings_of_the_reference():
+    assert parse_router(["--id", "3"], {}) == Options(
+        node_id=3,
+        hardware=Hardware((0, 0), ce_gpio=25, irq_gpio=None),
+        radio=RadioSettings(),
+        skewed=False,
+        timing=MeshTiming(),
+        routing="child_table_tree",
+        location=Location(0.0, 0.0, 0.0),
+        emulated=0,
+        log_level="info",
+        http=None,
+    )
+
+
+def test_each_option_reaches_what_it_is_for():
+    line = (
+        "--id 253 --spi 1.2 --ce 22 --irq 24 --channel 76 --rate 2M --crc 8 --broadcast shockburst "
+        "--skewed --check-period 5 --connection-lost-after 60 --latitude 10 --longitude -20.5 "
+        "--height 3 --log-level debug --routing drone_mesh.communication.child_table_tree:"
+        "ChildTableTree"
+    )
+    assert parse_router(line.split(), {}) == Options(
+        node_id=253,
+        hardware=Hardware((1, 2), ce_gpio=22, irq_gpio=24),
+        radio=RadioSettings(
+            channel=76,
+            data_rate=DataRate.MBPS_2,
+            crc_bytes=1,
+            broadcast_mode=BroadcastMode.SHOCKBURST,
+        ),
+        skewed=True,
+        timing=MeshTiming(check_period_s=5.0, connection_lost_after_s=60.0),
+        routing="drone_mesh.communication.child_table_tree:ChildTableTree",
+        location=Location(latitude=10.0, longitude=-20.5, height=3.0),
+        emulated=0,
+        log_level="debug",
+        http=None,
+    )
+
+
+def test_a_gateway_is_node_0_and_serves_this_machine_alone():
+    options = parse_gateway([], {})
+    assert options.node_id == 0
+    assert options.http == HttpOptions("127.0.0.1", 9080, token="")
+
+
+def test_the_token_comes_from_the_environment_or_from_a_file_which_wins(tmp_path):
+    file = tmp_path / "token"
+    file.write_text(f"{TOKEN}\n")
+    environment = {"DRONE_MESH_TOKEN": "of the environment"}
+    assert parse_gateway([], environment).http.token == "of the environment"
+    assert parse_gateway(["--token-file", str(file)], environment).http.token == TOKEN
+
+
+def test_emulated_nodes_need_no_id():
+    assert parse_router(["--emulated", "5"], {}).emulated == 5
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("", "one of the arguments --id --emulated is required"),
+        ("--id 3 --emulated 5", "not allowed with argument"),
+        ("--id 254", "'254' is not a whole number of 0..253"),
+        ("--id three", "'three' is not a whole number"),
+        ("--id 3 --spi 0", "'0' is not BUS.DEVICE"),
+        ("--id 3 --spi 0.x", "'0.x' is not BUS.DEVICE"),
+        ("--id 3 --ce 28", "'28' is not a whole number of 0..27"),
+        ("--id 3 --irq -1", "expected one argument|'-1' is not a whole number"),
+        ("--id 3 --channel 126", "'126' is not a whole number of 0..125"),
+        ("--id 3 --rate 3M", "invalid choice: '3M'"),
+        ("--id 3 --crc 32", "invalid choice: 32"),
+        ("--id 3 --check-period 0", "check_period 0.0: must be above 0 seconds"),
+        ("--id 3 --check-period nan", "check_period nan: must be above 0 seconds"),
+        ("--id 3 --connection-lost-after x", "invalid float value: 'x'"),
+        ("--id 3 --routing flooding", "'flooding' is not known: use one of child_table_tree"),
+        ("--id 3 --latitude 5001", "latitude 5001 m is outside -5000..5000 m"),
+        ("--id 3 --longitude inf", "longitude inf is not a finite number"),
+        ("--emulated 1", "'1' is not a whole number of 2..32"),
+        ("--id 3 --log-level loud", "invalid choice: 'loud'"),
+        ("--id 3 --port 9080", "unrecognized arguments: --port"),
+    ],
+)
+def test_a_wrong_option_ends_the_program_with_status_2_and_the_reason(capsys, line, reason):
+    with pytest.raises(SystemExit) as ended:
+        parse_router(line.split(), {})
+    said = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert re.search(reason, said)
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("--port 0", "'0' is not a whole number of 1..65535"),
+        ("--token-file /no/such/file", "--token-file /no/such/file: .*No such file"),
+        ("--token-file /dev/null", "--token-file /dev/null: there is no token in it"),
+    ],
+)
+def test_a_wrong_option_of_the_gateway_is_named(capsys, line, reason):
+    with pytest.raises(SystemExit):
+        parse_gateway(line.split(), {})
+    assert re.search(reason, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("parse", [parse_router, parse_gateway])
+def test_help_names_the_defaults_and_ends_with_status_0(capsys, parse):
+    with pytest.raises(SystemExit) as ended:
+        parse(["--help"], {})
+    assert ended.value.code == 0
+    assert "pin 22 of the header" in capsys.readouterr().out.replace("\n" + " " * 24, " ")
