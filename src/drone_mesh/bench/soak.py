@@ -32,7 +32,10 @@ class Sample:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became more after the first ten minutes."""
+    """What became more after the first ten minutes.
+
+    Memory is RSS here: PSS also changes with other programs that share the same libraries.
+    """
 
     memory_before_mb: float  # median of the first third of the samples after the warm-up
     memory_after_mb: float  # median of the last third
@@ -74,8 +77,8 @@ def judge(samples: Sequence[Sample]) -> Verdict | None:
     threads = [sample.threads for sample in late]
     files = [sample.open_files for sample in late]
     return Verdict(
-        memory_before_mb=statistics.median(sample.pss_mb for sample in late[:third]),
-        memory_after_mb=statistics.median(sample.pss_mb for sample in late[-third:]),
+        memory_before_mb=statistics.median(sample.rss_mb for sample in late[:third]),
+        memory_after_mb=statistics.median(sample.rss_mb for sample in late[-third:]),
         threads=(min(threads), max(threads)),
         open_files=(min(files), max(files)),
     )

@@ -5,7 +5,7 @@ from drone_mesh.bench.soak import Sample, judge
 
 def samples(memory_mb, minutes=60, threads=lambda minute: 40, files=lambda minute: 90):
     return [
-        Sample(60.0 * minute, 0.0, memory_mb(minute), 0.0, threads(minute), files(minute), 99)
+        Sample(60.0 * minute, 0.0, 0.0, memory_mb(minute), threads(minute), files(minute), 99)
         for minute in range(minutes + 1)
     ]
 
