@@ -237,6 +237,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
             if self._preferred_gateway != NO_ROUTE:
                 self._drop_routes_to(self._preferred_gateway)
                 self._tell_missing(self._preferred_gateway)
+        elif self._negotiation.running:
+            pass  # the emergency is being dealt with
         elif due_s - self._lost_since_s >= self._timing.connection_lost_after_s - ROUNDING_S:
             self._emergency()
 
@@ -245,7 +247,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if self._routing.empty():
             self._lost_since_s = None
             self._fly_back()
-        elif not self._negotiation.running:
+        else:
             self._negotiate()
 
     def _fly_back(self) -> None:

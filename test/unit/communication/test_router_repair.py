@@ -440,6 +440,7 @@ def test_a_neighbour_that_does_not_bid_is_waited_for_no_longer_than_a_period():
     assert bench.engine.goals == []
     bench.wait_until(EMERGENCY_S + 10.1)
     assert bench.engine.goals == [NEIGHBOUR_PLACE]
+    assert bench.kinds().count("EMERGENCY") == 1
 
 
 def test_a_neighbour_that_dies_in_the_middle_is_not_waited_for():
