@@ -6,6 +6,7 @@ import pytest
 from air_watch import AirWatch
 from scenarios import assert_hops_are_paths, events, fleet, flown, hops_across, layout, line
 
+from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.inprocess import Network
 
@@ -125,6 +126,28 @@ def test_in_a_quiet_network_no_packet_goes_round():
     watch = AirWatch(network)
     network.run_for(60.0)
     assert 0 < watch.most_often_sent_on() <= hops_across(network)
+
+
+class Stranger(ChildTableTree):
+    """Somebody else's technique: chosen as test_network_connects:Stranger."""
+
+    made = 0
+
+    def __init__(self):
+        super().__init__()
+        Stranger.made += 1
+
+
+def test_another_routing_technique_is_used_by_all_when_it_is_named():
+    network = fleet(4, gridsize=2, routing="test_network_connects:Stranger")
+    assert Stranger.made == 5
+    assert network.run_until(network.all_connected, within_s=1.0)
+
+
+def test_an_id_is_given_once():
+    network = line(1)
+    with pytest.raises(ValueError, match="node 1 is there already"):
+        network.add_router(1, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("case", [101, 102, 201, 202])
