@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import sys
 
 import rospy
 
@@ -15,12 +14,15 @@ from drone_mesh.ros.fleet import mesh_settings, tell_hosts
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.mesh_host import MeshHost
 from drone_mesh.ros.mesh_state import MeshStatePublisher, WorldView
+from drone_mesh.ros.orderly_stop import OrderlyStop
 from drone_mesh.ros.parameters import factory_configuration, or_stop
 from drone_mesh.ros.virtual_raspberry_pi import MeshSettings
 from drone_mesh.ros.world_runner import WorldRunner
+from drone_mesh.ros.world_window import window_of
 from drone_mesh.state.observation import view_drone
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory, plan_fleet
+from drone_mesh.world.window_process import require_screen
 
 _log = logging.getLogger(__name__)
 
@@ -30,6 +32,8 @@ def _read_parameters() -> tuple[FactoryConfiguration, MeshSettings, int]:
     configuration = factory_configuration(*keys)
     fleet = (configuration.gateways, configuration.routers)
     plan_fleet(*fleet, configuration.gridsize, configuration.spacing)
+    if configuration.gui:
+        require_screen()
     hosts = str(rospy.get_param("~hosts", "") or 1)
     if not hosts.isdigit():
         raise ConfigurationError(f"argument: hosts is {hosts!r}, want a whole number, 0 or more")
@@ -42,11 +46,11 @@ def main() -> None:
     Parameters (private): all keys of config/factory.yaml, each overruling the file; ~config, that
     file; ~hosts (int, 1): 1 = the nodes run in this process, otherwise they are left to others.
     """
-    rospy.init_node("DroneFactory")
+    rospy.init_node("DroneFactory", disable_signals=True)
     show_library_logs_on_rosout()
     configuration, settings, hosts = or_stop(_read_parameters)
     host = None
-    with BulletWorld() as world:
+    with OrderlyStop() as stop, BulletWorld() as world:
         factory = DroneFactory(
             world,
             configuration.gateways,
@@ -67,7 +71,7 @@ def main() -> None:
         if hosts == 1 and factory.drones:
             host = MeshHost(settings, lambda: world.now_s)
             host.start()
-            host.wait_for_simulator(rospy.is_shutdown)
+            host.wait_for_simulator(stop.requested)
             host.serve(drone.node_id for drone in factory.drones)
         tell_hosts(configuration)
         try:
@@ -84,9 +88,13 @@ def main() -> None:
                 configuration.max_distance,
             )
             state.start()
-            runner.run()
+            window = window_of(world, factory.drones, state) if configuration.gui else None
+            if window is not None:
+                window.start()
+            runner.run(stop.requested)
+            if window is not None:
+                window.stop()
             state.stop()
         finally:
             if host is not None:
                 host.stop()
-    sys.exit(0)

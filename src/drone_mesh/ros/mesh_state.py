@@ -53,6 +53,7 @@ class MeshStatePublisher:
         self._register = MeshRegister()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
         self._last_look: tuple[float, float] | None = None  # wall, simulated
+        self._latest: MeshStatus | None = None
         self._told_trouble_s = float("-inf")
         self._state = rospy.Publisher(names.STATE_TOPIC, MeshState, queue_size=1, latch=True)
         self._events = rospy.Publisher(names.EVENTS_TOPIC, MeshEvent, queue_size=EVENTS_QUEUE)
@@ -60,6 +61,11 @@ class MeshStatePublisher:
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="mesh state", daemon=True)
         self._subscriber = rospy.Subscriber(names.REPORTS_TOPIC, HostReport, self._reported)
+
+    @property
+    def latest(self) -> MeshStatus | None:
+        """What was published last; None before the first time. Its nodes change with the next."""
+        return self._latest
 
     def start(self) -> None:
         """Begin to publish."""
@@ -108,6 +114,7 @@ class MeshStatePublisher:
             self._achieved(now_s, view),
             view.paused,
         )
+        self._latest = mesh
         self._state.publish(state_message(mesh))
         if now_s - self._told_trouble_s >= DIAGNOSTICS_PERIOD_S:
             self._told_trouble_s = now_s

@@ -15,9 +15,7 @@ from drone_mesh.world.picture import DroneCondition, DronePicture, LinkPicture, 
 MOST_KNOWN_LINKS = 600  # our choice: more are one blot
 
 
-def scene_of(
-    mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneView] = ()
-) -> Scene:
+def scene_of(mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneView] = ()) -> Scene:
     """All nodes whose place is known, and the links between them.
 
     `lost` are those just lost; `views` are newer than `mesh` as to where drones are.

@@ -204,7 +204,7 @@ class WorldWindow:
     def _wanted_lines(self) -> set[_Line]:
         """Links and flights."""
         centres = {drone.node_id: drone.centre(self._scale) for drone in self._scene.drones}
-        widths = {LinkUse.KNOWN: 1.0, LinkUse.LOST: 2.0, LinkUse.ROUTE: 3.0}
+        widths = {LinkUse.KNOWN: 1.0, LinkUse.LOST: 1.0, LinkUse.ROUTE: 3.0}
         lines = [
             (centres[link.start], centres[link.end], LINK_COLOURS[link.use], widths[link.use])
             for link in self._scene.links

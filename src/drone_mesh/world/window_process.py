@@ -6,18 +6,18 @@ import ctypes
 import logging
 import multiprocessing
 import os
-import signal
+import subprocess
 import sys
 import threading
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Callable
 
+import drone_mesh
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.picture import Scene
-from drone_mesh.world.window import WorldWindow
 
 LOOK_PERIOD_S = 0.05  # wall; at most 20 scenes a second
-REACT_PERIOD_S = 0.03  # wall; between two looks at keys and mouse
 END_TIMEOUT_S = 3.0  # wall; a window that has not closed by then is ended
 
 _log = logging.getLogger(__name__)
@@ -54,74 +54,71 @@ class WindowProcess:
         require_screen()
         self._look = look
         self._stopped = threading.Event()
-        context = multiprocessing.get_context("spawn")  # a fork would copy locks that are held
-        self._ours, self._theirs = context.Pipe()
-        self._process = context.Process(
-            target=_show_scenes, args=(self._theirs,), name="world window", daemon=True
-        )
-        self._thread = threading.Thread(target=self._run, name="world window", daemon=True)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._thread: threading.Thread | None = None
 
     @property
     def pid(self) -> int | None:
         """Of the window's process; None before the start."""
-        return self._process.pid
+        return None if self._process is None else self._process.pid
 
     def start(self) -> None:
         """Open the window; returns before it is there."""
-        self._process.start()
-        self._theirs.close()  # so that our end notices when the window is gone
+        ours, theirs = multiprocessing.Pipe()
+        # Where Python finds this package only because we were told so, the window has to be told.
+        paths = [os.environ.get("PYTHONPATH", ""), str(Path(drone_mesh.__file__).parents[1])]
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "drone_mesh.world.show_window", str(theirs.fileno())],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)},
+            pass_fds=[theirs.fileno()],
+            stdout=subprocess.DEVNULL,  # pybullet's many words
+            start_new_session=True,  # Ctrl-C is for us; its sign to end is the end of the pipe
+        )
+        theirs.close()  # so that our end notices when the window is gone
+        self._thread = threading.Thread(
+            target=self._run, args=(ours, self._process), name="world window", daemon=True
+        )
         self._thread.start()
 
     def stop(self) -> None:
         """Close the window; returns when its process and the thread have ended."""
         self._stopped.set()
+        if self._thread is None or self._process is None:
+            return
         self._thread.join(END_TIMEOUT_S)
         if self._thread.is_alive():  # the window takes no more scenes
-            self._process.terminate()
+            self._process.kill()
             self._thread.join()
 
-    def _run(self) -> None:
-        shown: Scene | None = None
+    def _run(self, scenes: Connection, process: subprocess.Popen[bytes]) -> None:
         try:
-            while not self._stopped.wait(LOOK_PERIOD_S):
-                scene = self._look()
-                if scene != shown:
-                    self._ours.send(scene)
-                    shown = scene
-                elif self._ours.poll():  # it never says a word: this is its end
-                    break
+            self._send(scenes)
         except (BrokenPipeError, ConnectionResetError):
             pass
-        self._ours.close()
-        self._process.join(END_TIMEOUT_S)
-        if self._process.is_alive():
-            self._process.terminate()
-            self._process.join()
+        finally:
+            scenes.close()
+        try:
+            process.wait(END_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
         if self._stopped.is_set():
             return
-        if self._process.exitcode == 0:
+        if process.returncode == 0:
             _log.info("the world's window is closed; the simulation goes on")
         else:
             _log.warning(
                 "the world's window ended by itself (exit code %s); the simulation goes on",
-                self._process.exitcode,
+                process.returncode,
             )
 
-
-def _show_scenes(scenes: Connection) -> None:
-    """What the window's process does: show what comes, until nothing does or it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches us, too; our end is the pipe's
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # pybullet's many words
-    window = WorldWindow()
-    try:
-        while window.is_open():
-            if scenes.poll(REACT_PERIOD_S):
-                scene = scenes.recv()
-                while scenes.poll():
-                    scene = scenes.recv()
-                window.show(scene)
-            window.react()
-    except EOFError:
-        pass
-    finally:
-        window.close()
+    def _send(self, scenes: Connection) -> None:
+        """Send what changes, until the window is to go or has gone."""
+        shown: Scene | None = None
+        while not self._stopped.wait(LOOK_PERIOD_S):
+            scene = self._look()
+            if scene != shown:
+                scenes.send(scene)
+                shown = scene
+            elif scenes.poll():  # it never says a word: this is its end
+                return
