@@ -27,7 +27,7 @@ from drone_mesh.nrf24.registers import (
     Register,
 )
 
-_WRITABLE = {
+_WRITABLE: dict[int, int] = {
     Register.CONFIG: 0x7F,
     Register.EN_AA: 0x7F,  # bit 6 has no meaning, but is stored by silicon
     Register.EN_RXADDR: 0x3F,
@@ -39,9 +39,8 @@ _WRITABLE = {
     Register.FEATURE: 0x07,
     **{Register(Register.RX_PW_P0 + pipe): 0x3F for pipe in range(PIPES)},
 }
-_PIPE_SET = frozenset(
-    (Register.EN_RXADDR, *(Register(Register.RX_ADDR_P0 + pipe) for pipe in range(PIPES)))
-)
+_ADDRESSES = 0x20
+_WRITABLE_BITS = [_WRITABLE.get(address, 0xFF) for address in range(_ADDRESSES)]
 _TX_POWERS_DBM = (-18, -12, -6, 0)  # RF_PWR [DS Table 17]
 
 
@@ -56,21 +55,22 @@ class RegisterBank:
 
     def reset(self) -> None:
         """The values after power-on."""
-        self._values: dict[int, bytearray] = {
-            register: bytearray(value) for register, value in RESET_VALUES.items()
-        }
+        # By address; those that do not exist read as 0.
+        self._values = [bytearray(1) for _ in range(_ADDRESSES)]
+        for register, value in RESET_VALUES.items():
+            self._values[register] = bytearray(value)
         self._derive()
 
     def read(self, register: int) -> bytes:
-        """Its bytes, LSByte first; addresses that do not exist read as 0."""
-        return bytes(self._values.get(register, b"\0"))
+        """Its bytes, LSByte first."""
+        return bytes(self._values[register])
 
     def write(self, register: Register, data: bytes) -> None:
         """Write the low bytes; bytes that are not given stay as they are."""
         value = self._values[register]
         data = data[: len(value)]
-        if len(value) == 1 and register in _WRITABLE:
-            data = bytes((data[0] & _WRITABLE[register],))
+        if len(value) == 1:
+            data = bytes((data[0] & _WRITABLE_BITS[register],))
         if value[: len(data)] == data:
             return
         value[: len(data)] = data
@@ -81,7 +81,9 @@ class RegisterBank:
                 self._derive_formats()
         elif register is Register.TX_ADDR:
             self._derive_tx_address()
-        elif register in _PIPE_SET:
+        elif register is Register.EN_RXADDR:
+            self._derive_open_pipes()
+        elif register is Register.RX_ADDR_P0:
             self._derive_pipes()
         else:
             self._derive()
@@ -151,6 +153,9 @@ class RegisterBank:
             if pipe > 1:
                 value = value + base[1:]
             self.pipe_addresses.append(bytes(value[width - 1 :: -1]))
+        self._derive_open_pipes()
+
+    def _derive_open_pipes(self) -> None:
         enabled = self._byte(Register.EN_RXADDR)
         self.pipe_of_address: dict[int, int] = {}  # of enabled pipes; the lowest pipe wins
         for pipe in reversed(range(PIPES)):
