@@ -195,6 +195,7 @@ def verdict_lines(result: SoakResult) -> str:
             + ("it grew" if verdict.memory_grew else "it did not grow"),
             f"threads: {_span(verdict.threads)}",
             f"open files and connections: {_span(verdict.open_files)}",
+            *([f"not always as many: {', '.join(verdict.changed)}"] if verdict.changed else []),
         )
     )
 

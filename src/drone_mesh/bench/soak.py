@@ -28,6 +28,8 @@ class Sample:
     threads: int
     open_files: int  # connections are files, too
     routers_connected: int
+    threads_of: dict[str, int]  # by process
+    open_files_of: dict[str, int]
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Verdict:
     memory_after_mb: float  # median of the last third
     threads: tuple[int, int]  # least and most
     open_files: tuple[int, int]
+    changed: tuple[str, ...]  # the processes whose threads or files were not always as many
 
     @property
     def memory_grew(self) -> bool:
@@ -77,6 +80,12 @@ def judge(samples: Sequence[Sample]) -> Verdict | None:
     threads = [sample.threads for sample in late]
     files = [sample.open_files for sample in late]
     return Verdict(
+        changed=tuple(
+            name
+            for name in sorted({name for sample in late for name in sample.threads_of})
+            if len({sample.threads_of.get(name) for sample in late}) > 1
+            or len({sample.open_files_of.get(name) for sample in late}) > 1
+        ),
         memory_before_mb=statistics.median(sample.rss_mb for sample in late[:third]),
         memory_after_mb=statistics.median(sample.rss_mb for sample in late[-third:]),
         threads=(min(threads), max(threads)),
@@ -137,6 +146,8 @@ def _take_sample(system: System) -> Sample:
         threads=use.threads,
         open_files=use.open_files,
         routers_connected=look.connected,
+        threads_of={process.name: process.threads for process in use.processes.values()},
+        open_files_of={process.name: process.open_files for process in use.processes.values()},
     )
 
 

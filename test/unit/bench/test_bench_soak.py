@@ -5,7 +5,17 @@ from drone_mesh.bench.soak import Sample, judge
 
 def samples(memory_mb, minutes=60, threads=lambda minute: 40, files=lambda minute: 90):
     return [
-        Sample(60.0 * minute, 0.0, 0.0, memory_mb(minute), threads(minute), files(minute), 99)
+        Sample(
+            sim_s=60.0 * minute,
+            wall_s=6.0 * minute,
+            pss_mb=0.0,
+            rss_mb=memory_mb(minute),
+            threads=threads(minute) + 3,
+            open_files=files(minute) + 5,
+            routers_connected=99,
+            threads_of={"world": threads(minute), "master": 3},
+            open_files_of={"world": files(minute), "master": 5},
+        )
         for minute in range(minutes + 1)
     ]
 
@@ -16,7 +26,8 @@ def test_what_grows_in_the_first_ten_minutes_only_does_not_count():
     )
     assert verdict.steady
     assert verdict.memory_before_mb == verdict.memory_after_mb == 145.0
-    assert verdict.threads == (40, 40)
+    assert verdict.threads == (43, 43)
+    assert verdict.changed == ()
 
 
 def test_memory_that_keeps_growing_is_noticed():
@@ -31,7 +42,8 @@ def test_memory_may_breathe():
 
 def test_one_connection_more_is_noticed():
     verdict = judge(samples(lambda minute: 100.0, files=lambda minute: 90 + (minute > 55)))
-    assert verdict.open_files == (90, 91)
+    assert verdict.open_files == (95, 96)
+    assert verdict.changed == ("world",)
     assert not verdict.steady
 
 
