@@ -130,9 +130,6 @@ class NRF24HighLevelInterface(IWirelessCommunication):
 
     def _receive(self) -> None:
         while not self._ending:
-            if not self._powered:
-                self._runtime.sleep(RECEIVE_TIMEOUT_S)
-                continue
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):
                 self._hand_on(received)
 

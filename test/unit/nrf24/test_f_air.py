@@ -114,9 +114,7 @@ def test_row_49_two_drivers_that_call_a_third_both_get_through(lab, skewed):
     else:
         one.begin()
         other.begin()
-    done = lab.at_once(
-        lambda: one.send(10, b"\x05" * 32), lambda: other.send(10, b"\x07" * 32)
-    )
+    done = lab.at_once(lambda: one.send(10, b"\x05" * 32), lambda: other.send(10, b"\x07" * 32))
     assert done == [True, True]
     got = sorted(received.payload[0] for received in third.receive(0.01))
     assert got == [5, 7]

@@ -71,9 +71,11 @@ def test_row_52_after_every_send_it_listens_again_with_only_its_own_pipes(lab, s
 
     driver.chip.registers.write = watch
     assert driver.send(10, PAYLOAD) == somebody_there
-    assert registers_of(
-        lab, driver, Register.CONFIG, Register.EN_RXADDR, Register.SETUP_RETR
-    ) == [0x0F, 0x06, 0x5F]
+    assert registers_of(lab, driver, Register.CONFIG, Register.EN_RXADDR, Register.SETUP_RETR) == [
+        0x0F,
+        0x06,
+        0x5F,
+    ]
     assert opened == {0x06, 0x07}
     lab.wait_us(200)
     assert driver.chip.listening_since_ns is not None

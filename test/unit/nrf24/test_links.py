@@ -16,7 +16,6 @@ from drone_mesh.nrf24.emulator.links import (
     free_space_dbm,
 )
 from drone_mesh.nrf24.emulator.measured import measured_curve, measured_losses
-from drone_mesh.nrf24.settings import RadioSettings
 
 # share of 1000 packets that were lost, mean of 9 runs, worked out from the file with awk
 MEASURED = {

@@ -1,0 +1,147 @@
+"""NRF24HighLevelInterface: the antenna of the mesh on our driver."""
+
+from __future__ import annotations
+
+import pytest
+from chip_lab import Lab
+
+from drone_mesh.communication.interfaces import IMeshNetwork
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.nrf24.errors import RadioError
+from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
+
+
+class Mesh(IMeshNetwork):
+    """Keeps what the antenna tells it."""
+
+    def __init__(self, node_id):
+        self.node_id = node_id
+        self.heard, self.power = [], []
+
+    def get_node_id(self):
+        return self.node_id
+
+    def on_msg(self, payload, now_s):
+        self.heard.append(payload)
+
+    def on_antenna_power(self, on, now_s):
+        self.power.append(on)
+
+    def on_antenna_registered(self, now_s):
+        raise AssertionError("a radio is not registered anywhere")
+
+
+class Node:
+    """An antenna and its mesh; what is submitted runs at once."""
+
+    def __init__(self, lab, node_id, x_m):
+        self.mesh = Mesh(node_id)
+        self.driver = lab.driver(node_id, x_m, begin=False)
+        self.shown = []
+        self.antenna = NRF24HighLevelInterface(
+            self.driver,
+            lambda work: work(lab.clock.now_s()),
+            runtime=lab.clock,
+            on_payload=self.shown.append,
+        )
+
+
+@pytest.fixture
+def nodes(lab):
+    nodes = [Node(lab, node_id, 10.0 * node_id) for node_id in range(3)]
+    for node in nodes:
+        node.antenna.start_antenna(node.mesh)
+    yield nodes
+    for node in nodes:
+        node.antenna.stop_antenna()
+
+
+def packet(to, *, sender=0, filling=0x55):
+    return bytes((sender, sender, 3, to, to)) + bytes((filling,)) * 27
+
+
+def test_a_packet_reaches_the_node_in_byte_3_and_nobody_else(lab, nodes):
+    assert nodes[0].antenna.send_message_to(packet(2))
+    lab.clock.sleep(0.01)
+    assert [node.mesh.heard for node in nodes] == [[], [], [packet(2)]]
+    assert nodes[2].shown == [packet(2)]
+
+
+def test_a_broadcast_is_one_frame_and_everybody_finds_its_own_id_in_byte_3(lab, nodes):
+    frames = len(lab.trace.frames)
+    nodes[0].antenna.broadcast_message(packet(254))
+    lab.clock.sleep(0.01)
+    assert len(lab.trace.frames) == frames + 1
+    expected = [bytes((0, 0, 3, node, 254)) + b"\x55" * 27 for node in (1, 2)]
+    assert [node.mesh.heard for node in nodes] == [[], [expected[0]], [expected[1]]]
+
+
+def test_a_node_that_is_not_there_does_not_have_the_packet(nodes):
+    assert not nodes[0].antenna.send_message_to(packet(9))
+
+
+@pytest.mark.parametrize("bad", [packet(254), packet(255), packet(0), bytes(31), bytes(33)])
+def test_what_cannot_be_sent_is_not_sent(lab, nodes, bad):
+    frames = len(lab.trace.frames)
+    assert not nodes[0].antenna.send_message_to(bad)
+    assert len(lab.trace.frames) == frames
+
+
+def test_an_antenna_that_is_off_neither_sends_nor_hears_and_says_so_to_the_mesh(lab, nodes):
+    off = nodes[1].antenna
+    off.switch_power(False)
+    assert not off.on()
+    assert not off.send_message_to(packet(2, sender=1))
+    assert not nodes[0].antenna.send_message_to(packet(1))
+    lab.clock.sleep(0.01)
+    assert nodes[1].mesh.heard == []
+    off.switch_power(True)
+    assert off.on()
+    assert nodes[0].antenna.send_message_to(packet(1))
+    lab.clock.sleep(0.01)
+    assert nodes[1].mesh.heard == [packet(1)]
+    assert nodes[1].mesh.power == [False, True]
+
+
+def test_what_arrives_after_the_antenna_was_stopped_is_not_handed_on(lab, nodes):
+    nodes[1].antenna.stop_antenna()
+    nodes[1].antenna.stop_antenna()
+    assert not nodes[1].antenna.on()
+    assert not nodes[0].antenna.send_message_to(packet(1))
+    assert nodes[1].mesh.heard == []
+
+
+def test_statistics_count_what_was_sent_lost_and_seen_twice(lab, nodes):
+    nodes[0].antenna.send_message_to(packet(1))
+    nodes[0].antenna.send_message_to(packet(1))
+    nodes[0].antenna.send_message_to(packet(9))
+    nodes[0].antenna.broadcast_message(packet(254))
+    lab.clock.sleep(0.01)
+    sent = nodes[0].antenna.statistics()
+    assert (sent.sent, sent.acknowledged, sent.lost, sent.broadcasts) == (3, 2, 1, 1)
+    assert sent.tries == 3
+    heard = nodes[1].antenna.statistics()
+    assert (heard.received, heard.duplicates) == (3, 1)
+
+
+def test_debugging_mode_keeps_what_is_to_be_shown(nodes):
+    antenna = nodes[0].antenna
+    antenna.debugging_mode("info", True)
+    assert antenna.debug_info == "info"
+    antenna.debugging_mode("info", False)
+    assert antenna.debug_info is None
+
+
+def test_a_radio_that_is_missing_stops_the_start_with_a_reason():
+    lab = Lab()
+    node = Node(lab, 1, 0.0)
+    node.driver.chip.faults.miso_stuck_at = 0xFF
+    with pytest.raises(RadioError, match="no nRF24L01"):
+        node.antenna.start_antenna(node.mesh)
+    assert not node.antenna.on()
+
+
+def test_a_radio_for_another_node_is_refused():
+    node = Node(Lab(), 1, 0.0)
+    with pytest.raises(ConfigurationError, match="node 1, but the mesh is node 2"):
+        node.antenna.start_antenna(Mesh(2))
