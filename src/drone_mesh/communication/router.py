@@ -58,8 +58,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._was_connected = False
         self._heartbeat_sent_s = -math.inf
         self._answered_s = -math.inf
-        # False from the moment a check finds the connection gone: the next answer is a new start.
-        self._settled = False
         self._shown_connected = False
         self._lost_since_s: float | None = None
         self._shortcut: Shortcut | None = None
@@ -160,7 +158,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _disconnect(self) -> None:
         """Not connected, and hop counts of the past must not look good (reference 14.8)."""
         self._connected = False
-        self._settled = False
         self._hops = NO_ROUTE
         self._shortcut = None
         self._heartbeat_sent_s = self._answered_s = -math.inf
@@ -216,13 +213,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
             if (self._knows_gateway() or recent) and hops >= self._hops:
                 return
             self._prefer(gateway)
+        is_new = not self._knows_gateway()
         self._connected = True
         self._hops = min(hops, NO_ROUTE)
         self._answered_s = self._now_s
         self._lost_since_s = None
         self._stop_awaiting()
-        if not self._settled:
-            self._settled = True
+        if is_new:
             self._end_negotiation()
             self.search_other_nodes_in_range()
             self._ask_for_locations()

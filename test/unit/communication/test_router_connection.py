@@ -150,6 +150,18 @@ def test_an_answer_after_more_than_half_a_second_connects_again():
     assert bench.mesh.get_hops_from_gateway_away() == 1
 
 
+def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
+    """Introduced, and the places asked for: the first question may have been lost with it."""
+    bench = Bench()
+    bench.connect_through(2)
+    bench.mesh.send_heartbeat(0)
+    bench.wait(0.7)
+    bench.forget()
+    bench.hear("00 02 04 01 01 01 00 01")
+    assert bench.broadcasts() == [packet("01 01 03 fe fe 02 01")]
+    assert bench.sent(REQUEST) == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
+
+
 def test_a_heartbeat_that_nobody_takes_ends_the_connection_at_once():
     bench = connected_bench()
     bench.antenna.dead = {0}

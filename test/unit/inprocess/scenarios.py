@@ -40,7 +40,7 @@ def events(network, *kinds, since_s=0.0):
     return [
         (event.now_s, event.node, event.peer)
         for event in network.events
-        if event.kind.name in kinds and event.now_s >= since_s
+        if event.now_s >= since_s and event.kind.name in kinds
     ]
 
 
