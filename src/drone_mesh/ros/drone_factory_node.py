@@ -67,6 +67,8 @@ def main() -> None:
         )
         reporter = PositionReporter(factory.drones)
         for drone in factory.drones:
+            if stop.requested():
+                return
             EngineServer(drone, reporter)
         if hosts == 1 and factory.drones:
             host = MeshHost(settings, lambda: world.now_s)

@@ -43,6 +43,7 @@ class MeshHost:
         self._link = SimulatorLink(self.executor)
         self._figures = Figures(f"host {rospy.get_name()}", self._take_figures)
         self.nodes: dict[int, VirtualRaspberryPi] = {}
+        self._stopping = False
 
     def start(self) -> None:
         """Start to work; there are no nodes yet."""
@@ -71,12 +72,14 @@ class MeshHost:
             self._submit_start(node_id)
 
         def tell(_now_s: float) -> None:
-            _log.info("%d nodes are on, after %.1f s", len(ids), time.monotonic() - begun_s)
+            if not self._stopping:
+                _log.info("%d nodes are on, after %.1f s", len(ids), time.monotonic() - begun_s)
 
         self.executor.submit(tell)
 
     def stop(self) -> None:
-        """Stop all threads; returns when they have ended. The nodes leave the ROS graph with it."""
+        """Stop all threads; returns when they have ended. Nodes that wait to be started are not."""
+        self._stopping = True
         self._figures.stop()
         self._reports.stop()
         self._link.stop()
@@ -94,6 +97,8 @@ class MeshHost:
         kind = VirtualRaspberryPiGateway if is_gateway else VirtualRaspberryPiRouter
 
         def start(now_s: float) -> None:
+            if self._stopping:
+                return
             node = self.nodes[node_id] = kind(node_id, self._settings, self._link, seat)
             self._reports.add(node.component, node.antenna.on)
             node.start(now_s)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-import sys
 import time
+from functools import partial
 from typing import Callable
 
 import rospy
@@ -18,6 +18,7 @@ from drone_mesh.ros import names
 from drone_mesh.ros.fleet import fleet_from_parameter, mesh_settings
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.mesh_host import MeshHost
+from drone_mesh.ros.orderly_stop import OrderlyStop
 from drone_mesh.ros.parameters import or_stop
 from drone_mesh.ros.persistent_service import PersistentService, ServiceGone
 from drone_mesh.srv import PowerSwitch
@@ -52,9 +53,9 @@ class FollowedClock:
             self._executor.submit(lambda _now_s: self._progress.publish(progress))
 
 
-def _wait_for(what: str, is_there: Callable[[], bool]) -> None:
+def _wait_for(what: str, is_there: Callable[[], bool], give_up: Callable[[], bool]) -> None:
     told_s = time.monotonic()
-    while not is_there() and not rospy.is_shutdown():
+    while not is_there() and not give_up():
         if time.monotonic() - told_s >= TELL_PERIOD_S:
             told_s = time.monotonic()
             _log.info("waiting for %s", what)
@@ -106,21 +107,23 @@ def main() -> None:
     Parameters (private): ~first and ~last (int): the ids to serve; or ~index and ~hosts (int):
     share number ~index (from 1) of ~hosts equal shares of all drones.
     """
-    rospy.init_node("mesh_host")
+    rospy.init_node("mesh_host", disable_signals=True)
     show_library_logs_on_rosout()
-    clock = FollowedClock()
-    _wait_for("/DroneFactory to make the drones", lambda: rospy.has_param(names.FLEET_PARAM))
-    _wait_for("/clock", lambda: clock.now_s > 0.0)
-    if rospy.is_shutdown():
-        return
-    fleet = fleet_from_parameter()
-    ids = or_stop(lambda: ids_to_serve(fleet))
-    _log.info("serving %d drones: %s", len(ids), f"{ids.start}..{ids.stop - 1}" if ids else "none")
-    host = MeshHost(or_stop(lambda: mesh_settings(fleet)), lambda: clock.now_s)
-    clock.drive(host.executor)
-    host.start()
-    host.wait_for_simulator(rospy.is_shutdown)
-    host.serve(ids)
-    rospy.spin()
-    host.stop()
-    sys.exit(0)
+    with OrderlyStop() as stop:
+        clock = FollowedClock()
+        fleet_is_there = partial(rospy.has_param, names.FLEET_PARAM)
+        _wait_for("/DroneFactory to make the drones", fleet_is_there, stop.requested)
+        _wait_for("/clock", lambda: clock.now_s > 0.0, stop.requested)
+        if stop.requested():
+            return
+        fleet = fleet_from_parameter()
+        ids = or_stop(lambda: ids_to_serve(fleet))
+        which = f"{ids.start}..{ids.stop - 1}" if ids else "none"
+        _log.info("serving %d drones: %s", len(ids), which)
+        host = MeshHost(or_stop(lambda: mesh_settings(fleet)), lambda: clock.now_s)
+        clock.drive(host.executor)
+        host.start()
+        host.wait_for_simulator(stop.requested)
+        host.serve(ids)
+        stop.wait()
+        host.stop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import select
 import socket
 import struct
@@ -9,12 +10,20 @@ import struct
 import rosgraph
 import rospy
 from genpy import Message
-from rospy.exceptions import TransportException, TransportInitError
+from rospy.exceptions import TransportInitError
 from rospy.impl.tcpros_base import TCPROSTransport
+from rospy.impl.tcpros_service import TCPROSServiceClient
+from rospy.impl.validators import ParameterInvalid
 
 from drone_mesh.errors import MeshError
 
 CALL_TIMEOUT_S = 2  # our choice: who does not answer in this time (wall seconds) is gone
+_READ_BYTES = 4096  # more than any answer here
+# TCPROS (wiki.ros.org/ROS/TCPROS): a request is its length and its fields; an answer the same,
+# after a byte that is 0 when a text that says what went wrong follows instead.
+_REQUEST_HEAD = struct.Struct("<I")
+_ANSWER_HEAD = struct.Struct("<BI")
+_ROSPYS_WORDS = "service cannot process request: "  # before what a service of rospy says itself
 
 
 class ServiceGone(MeshError):
@@ -26,22 +35,25 @@ class ServiceRefused(MeshError):
 
 
 class PersistentService:
-    """One connection to one service. A rospy call costs ten times as much without one.
+    """One connection to one service.
+
+    rospy's ServiceProxy makes the connection, but has no timeout for calls, says only in words
+    whether the other end is gone, and its calls cost three times as much: they are made here.
 
     `connect` and `close` may be called by another thread than `call`, but not during a call.
     """
 
-    def __init__(
-        self, name: str, service_class: type, timeout_s: int = CALL_TIMEOUT_S
-    ) -> None:
+    def __init__(self, name: str, service_class: type, timeout_s: int = CALL_TIMEOUT_S) -> None:
         """`timeout_s`: whole wall seconds to wait for an answer."""
         self.name = name
-        self._timeout_s = timeout_s
-        self._proxy = rospy.ServiceProxy(name, service_class, persistent=True)
+        self._timeval = struct.pack("@ll", timeout_s, 0)
+        self._response_class = service_class._response_class
+        self._protocol = TCPROSServiceClient(name, service_class, headers={"persistent": "1"})
+        self._transport: TCPROSTransport | None = None
 
     def is_connected(self) -> bool:
         """Whether there is a connection, and the other end has not closed it. Any thread."""
-        transport = self._proxy.transport
+        transport = self._transport
         connection = None if transport is None else transport.socket
         if connection is None or connection.fileno() < 0:
             return False
@@ -52,40 +64,56 @@ class PersistentService:
     def connect(self) -> None:
         """Look the service up and connect. Raises ServiceGone."""
         self.close()
-        proxy = self._proxy
         try:
-            uri = rosgraph.Master(rospy.get_name()).lookupService(proxy.resolved_name)
+            uri = rosgraph.Master(rospy.get_name()).lookupService(self.name)
             host, port = rospy.core.parse_rosrpc_uri(uri)
-            transport = TCPROSTransport(proxy.protocol, proxy.resolved_name)
-            transport.buff_size = proxy.buff_size
+            transport = TCPROSTransport(self._protocol, self.name)
             transport.connect(host, port, uri)
-        except (rosgraph.MasterException, TransportInitError, OSError, ValueError) as error:
+            for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+                transport.socket.setsockopt(socket.SOL_SOCKET, option, self._timeval)
+        except (rosgraph.MasterException, TransportInitError, ParameterInvalid, OSError) as error:
             raise ServiceGone(f"{self.name}: {error}") from error
-        except rospy.impl.validators.ParameterInvalid as error:
-            raise ServiceGone(f"{self.name}: {error}") from error
-        # rospy has no timeout for calls; the kernel's makes a read fail, and that closes it.
-        timeval = struct.pack("@ll", self._timeout_s, 0)
-        transport.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
-        transport.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
-        proxy.transport = transport
+        self._transport = transport
 
     def call(self, request: Message) -> Message:
         """The answer. Raises ServiceGone without a connection and ServiceRefused for an error."""
-        if self._proxy.transport is None:
+        fields = io.BytesIO()
+        request.serialize(fields)
+        return self._response_class().deserialize(self.call_bytes(fields.getvalue()))
+
+    def call_bytes(self, fields: bytes) -> bytes:
+        """The answer's fields to a request of these fields, both as ROS serialises them."""
+        transport = self._transport
+        if transport is None:
             raise ServiceGone(f"{self.name}: not connected")
         try:
-            return self._proxy.call(request)
-        except rospy.ServiceException as error:
-            if " responded with an error: " in str(error):
-                raise ServiceRefused(str(error)) from None
+            transport.socket.sendall(_REQUEST_HEAD.pack(len(fields)) + fields)
+            ok, answer = self._read_answer(transport.socket)
+        # AttributeError: rospy closed the connection under the call, because it shuts down.
+        except (OSError, EOFError, AttributeError) as error:
             self.close()
             raise ServiceGone(f"{self.name}: {error}") from error
-        except (TransportException, rospy.ROSException, OSError, AttributeError) as error:
-            # AttributeError: rospy closed the connection under the call, because it shuts down.
-            self.close()
-            raise ServiceGone(f"{self.name}: {error}") from error
+        if not ok:
+            said = answer.decode("utf-8", "replace")
+            raise ServiceRefused(said.replace(_ROSPYS_WORDS, "", 1))
+        return answer
 
     def close(self) -> None:
         """Close the connection, if there is one."""
-        self._proxy.close()
-        self._proxy.transport = None
+        transport, self._transport = self._transport, None
+        if transport is not None:
+            transport.close()
+
+    @staticmethod
+    def _read_answer(connection: socket.socket) -> tuple[bool, bytes]:
+        data = b""
+        end = _ANSWER_HEAD.size
+        while len(data) < end:
+            part = connection.recv(_READ_BYTES)
+            if not part:
+                raise EOFError("it closed the connection")
+            data += part
+            if len(data) >= _ANSWER_HEAD.size:
+                ok, length = _ANSWER_HEAD.unpack_from(data)
+                end = _ANSWER_HEAD.size + length
+        return bool(ok), data[_ANSWER_HEAD.size : end]

@@ -8,13 +8,14 @@ from typing import Callable, NamedTuple, Protocol
 
 import rospy
 
+from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.messages import FROM, TO
 from drone_mesh.execution import MeshExecutor
-from drone_mesh.msg import NRF24, DroneInfo
+from drone_mesh.msg import DroneInfo
 from drone_mesh.ros import names
 from drone_mesh.ros.logs import ThrottledLog
 from drone_mesh.ros.persistent_service import PersistentService, ServiceGone, ServiceRefused
-from drone_mesh.srv import Broadcast, BroadcastRequest, WirelessMessage, WirelessMessageRequest
+from drone_mesh.srv import Broadcast, WirelessMessage
 
 LOOK_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
 ANNOUNCE_AGAIN_AFTER = 20  # looks; our choice: an antenna not yet registered speaks up again
@@ -37,6 +38,12 @@ class _Services(NamedTuple):
 
     message: PersistentService
     broadcast: PersistentService
+
+
+def _hand_over(services: _Services, payload: bytes) -> bool:
+    """Call `message`: the fields of its request and response, which are bytes all of them."""
+    fields = payload[FROM : FROM + 1] + payload[TO : TO + 1] + payload
+    return services.message.call_bytes(fields) != b"\0"
 
 
 class SimulatorLink(rospy.SubscribeListener):
@@ -134,9 +141,8 @@ class SimulatorLink(rospy.SubscribeListener):
             self._complaints.error("packet not sent", "no simulator")
             self._never_handed_over += 1
             return False
-        request = WirelessMessageRequest(payload[FROM], payload[TO], NRF24(payload))
         try:
-            return bool(services.message.call(request).succes)
+            return _hand_over(services, payload)
         except ServiceRefused as error:
             self._complaints.warning("packet refused", str(error))
         except ServiceGone as error:
@@ -152,7 +158,8 @@ class SimulatorLink(rospy.SubscribeListener):
             self._never_handed_over += 1
             return
         try:
-            services.broadcast.call(BroadcastRequest(payload[FROM], NRF24(payload)))
+            # The fields of a BroadcastRequest.
+            services.broadcast.call_bytes(payload[FROM : FROM + 1] + payload)
         except ServiceRefused:
             # The simulator is new, and will hear of this antenna in a moment: no line in the log.
             self._complaints.counts["broadcast refused"] += 1
@@ -163,6 +170,8 @@ class SimulatorLink(rospy.SubscribeListener):
     def _lost(self, services: _Services, error: ServiceGone) -> None:
         if self._services is services and not rospy.is_shutdown():
             self._services = None
+            for service in services:
+                service.close()
             _log.error("the simulator is gone: %s", error)
             self._look.set()
 
@@ -179,8 +188,7 @@ class SimulatorLink(rospy.SubscribeListener):
                 node_id = antenna.node_id
                 header = bytes((node_id, node_id, 0, node_id, node_id))
                 try:
-                    packet = NRF24(header.ljust(32, b"\0"))
-                    services.message.call(WirelessMessageRequest(node_id, node_id, packet))
+                    _hand_over(services, header.ljust(PAYLOAD_BYTES, b"\0"))
                 except (ServiceGone, ServiceRefused) as error:
                     _log.debug("probe of node %d: %s", node_id, error)
                     return

@@ -55,26 +55,27 @@ class _Listener(rospy.SubscribeListener):
         """Publish; False if nobody is there to take it."""
         if not self.has_receiver():
             return False
-        self._publisher.publish(message)
-        return self._has_connections()
+        try:
+            self._publisher.publish(message)
+        except rospy.ROSException:  # the topic was closed meanwhile
+            return False
+        return bool(self._connections())
 
     def has_receiver(self) -> bool:
         """Whether somebody subscribes to the topic, and is still there."""
-        if not self._has_connections():
+        implementation = self._publisher.impl  # None once it is closed
+        if implementation is None or not implementation.has_connections():
             return False
         # A killed process leaves its connection behind; rospy notices at the second write only.
-        self._publisher.impl.check()
-        return self._has_connections()
+        implementation.check()
+        return bool(implementation.has_connections())
 
     def close(self) -> None:
         self._publisher.unregister()
 
     def _connections(self) -> list[Transport]:
-        implementation = self._publisher.impl  # None once it is closed
+        implementation = self._publisher.impl
         return [] if implementation is None else implementation.connections
-
-    def _has_connections(self) -> bool:
-        return bool(self._connections())
 
 
 class WirelessSignalSimulator:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
+from typing import Callable
 
 import rospy
 from rosgraph_msgs.msg import Clock
@@ -21,7 +22,7 @@ HOST_TIMEOUT_S = 2.0  # wall seconds; a host that is silent for longer is not wa
 _MEASURE_PERIOD_S = 1.0  # wall
 _TELL_PERIOD_S = 10.0  # wall
 _TOO_SLOW = 0.95  # of the factor that was asked for
-_NAP_S = 0.0005  # wall; while the mesh works off what is due
+_NAP_S = 0.001  # wall; while the mesh works off what is due
 _PAUSE_NAP_S = 0.02
 
 _log = logging.getLogger(__name__)
@@ -86,12 +87,12 @@ class WorldRunner:
         """Whether time stands still. Any thread."""
         return self._paused
 
-    def run(self) -> None:
-        """Step until ROS shuts down."""
+    def run(self, is_over: Callable[[], bool]) -> None:
+        """Step until `is_over` says so."""
         pace = Pace(self._wanted)
         measured_s = self._world.now_s, time.monotonic()
         told_s = measured_s
-        while not rospy.is_shutdown():
+        while not is_over():
             now_s = self._world.now_s
             if self._paused or self._wanted != pace.factor:
                 pace.restart(self._wanted)

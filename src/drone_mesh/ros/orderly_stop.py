@@ -1,0 +1,50 @@
+"""OrderlyStop: first our threads end, then ROS."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType
+
+import rospy
+
+FINISH_TIMEOUT_S = 3.0  # our choice: `rosnode kill` waits so long (wall) for our threads
+
+
+class OrderlyStop:
+    """Around everything that a node does, after init_node(..., disable_signals=True).
+
+    rospy would close all topics as soon as Ctrl-C is pressed, under the hands of threads that still
+    publish. Here SIGINT, SIGTERM and `rosnode kill` only ask the main thread to leave the `with`
+    block, in which it ends what it started; then ROS is shut down. Make it in the main thread.
+    """
+
+    def __init__(self) -> None:
+        self._requested = threading.Event()
+        self._finished = threading.Event()
+
+    def __enter__(self) -> OrderlyStop:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+        rospy.on_shutdown(self._on_shutdown)
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self._finished.set()
+        rospy.signal_shutdown("finished")
+
+    def requested(self) -> bool:
+        """Whether it is time to leave. Any thread."""
+        return self._requested.is_set()
+
+    def wait(self) -> None:
+        """Return when it is time to leave."""
+        self._requested.wait()
+
+    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        self._requested.set()
+
+    def _on_shutdown(self) -> None:
+        """In the thread of rospy that was told to end, before ROS is torn down."""
+        self._requested.set()
+        self._finished.wait(FINISH_TIMEOUT_S)

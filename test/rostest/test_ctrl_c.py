@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+"""Ctrl-C in the terminal of roslaunch: everything ends within 5 s, without a traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+import rostest
+from rostest_support import wait_for
+
+LIMIT_S = 5.0
+NODES = ("wireless_signal_simulator", "drone_manager", "drone_factory")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def processes_of(port: int) -> list[str]:
+    """Command lines of our nodes that talk to the master on this port."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+            environment = (process / "environ").read_bytes().decode("utf-8", "replace")
+        except OSError:
+            continue  # it has ended meanwhile, or is not ours
+        if f":{port}" in environment and any(node in command for node in NODES):
+            found.append(command)
+    return found
+
+
+class CtrlCTest(unittest.TestCase):
+    def run_and_interrupt(self, ready: str) -> None:
+        port = free_port()
+        environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
+        with tempfile.TemporaryFile("w+") as output:
+
+            def said() -> str:
+                output.seek(0)
+                return output.read()
+
+            launch = subprocess.Popen(
+                ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", "routers:=30"],
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+            )
+            try:
+                wait_for(f"'{ready}' in the output", 60, lambda: ready in said())
+                begun_s = time.monotonic()
+                os.killpg(launch.pid, signal.SIGINT)  # as a terminal does: to all of them
+                launch.wait(timeout=30)
+                took_s = time.monotonic() - begun_s
+            finally:
+                if launch.poll() is None:
+                    os.killpg(launch.pid, signal.SIGKILL)
+            self.assertNotIn("Traceback", said())
+            self.assertNotIn("escalating", said())
+            self.assertLess(took_s, LIMIT_S)
+            self.assertEqual(processes_of(port), [])
+
+    def test_while_the_mesh_runs(self) -> None:
+        self.run_and_interrupt("31 nodes are on")
+
+    def test_while_the_nodes_are_being_started(self) -> None:
+        self.run_and_interrupt("1 gateways and 30 routers")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "ctrl_c", CtrlCTest)
