@@ -16,14 +16,16 @@ from drone_mesh.ros import names
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.observation import describe_component
 
-REPORT_PERIOD_S = 0.5  # wall time; our choice: an event is seen soon, and 254 nodes stay cheap
+REPORT_PERIOD_S = 0.5  # wall time; our choice: an event is seen soon
+REPORT_PERIOD_PER_NODE_S = 0.004  # our choice: 254 nodes with 200 neighbours each, once a second
 NEVER_MIND_QUEUE = 4  # reports that may wait for a slow reader; each one is complete in itself
 
 
 class HostReports:
     """Reports on all nodes of this process, in one thread of its own.
 
-    Publishes: /mesh/reports (HostReport), twice a second of wall time, also while time stands still
+    Publishes: /mesh/reports (HostReport), once or twice a second of wall time, also while time
+               stands still
 
     `add` and `observe` may be called by any thread. Each node's NodeState belongs to the thread.
     """
@@ -59,10 +61,13 @@ class HostReports:
         self._publisher.unregister()
 
     def _run(self) -> None:
-        while not (self._stopped.wait(REPORT_PERIOD_S) or rospy.is_shutdown()):
+        while not (self._stopped.wait(self._period_s()) or rospy.is_shutdown()):
             # Nobody would get the events now; they wait until somebody does.
             if self._publisher.get_num_connections():
                 self._report()
+
+    def _period_s(self) -> float:
+        return max(REPORT_PERIOD_S, REPORT_PERIOD_PER_NODE_S * len(self._hosted))
 
     def _report(self) -> None:
         now_s = rospy.get_time()
