@@ -1,0 +1,150 @@
+"""A real browser on a real console over a real mesh; only ROS and the world are left out."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Callable, Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+START_LIMIT_S = 60.0  # a fleet of 254 has some seconds of its life simulated first
+CHROMIUM_FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+class ConsoleProcess:
+    """A console in a process of its own, which can be stopped and started again on its port."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._arguments = arguments
+        self.port = 0
+        self._process: subprocess.Popen[str] | None = None
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}/"
+
+    def start(self) -> None:
+        command = [sys.executable, str(HERE / "console_process.py"), "--port", str(self.port)]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+        self._process = subprocess.Popen(
+            [*command, *self._arguments], env=environment, stdout=subprocess.PIPE, text=True
+        )
+        assert self._process.stdout is not None
+        said = self._process.stdout.readline()
+        match = re.fullmatch(r"serving on port (\d+)\n", said)
+        assert match, f"the console did not start, it said {said!r}"
+        self.port = int(match[1])
+
+    def stop(self) -> int:
+        """Ask it to end; returns its exit code."""
+        if self._process is None:
+            return 0
+        process, self._process = self._process, None
+        process.send_signal(signal.SIGINT)
+        try:
+            return process.wait(timeout=10.0)
+        finally:
+            process.kill()
+
+    def cpu_seconds(self) -> float:
+        """Processor time that it has used so far."""
+        assert self._process is not None
+        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.fixture
+def start_console() -> Iterator[Callable[..., ConsoleProcess]]:
+    """Starts consoles with these arguments of console_process.py, and stops them in the end."""
+    started: list[ConsoleProcess] = []
+
+    def start(*arguments: str) -> ConsoleProcess:
+        console = ConsoleProcess(*arguments)
+        started.append(console)
+        console.start()
+        return console
+
+    yield start
+    for console in started:
+        console.stop()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    path = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    assert path, "no chromium: apt-get install chromium, or set CHROMIUM to where one is"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """One page, and everything that went wrong on it."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", self._on_console)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.on("requestfailed", lambda request: self.complaints.append(f"failed {request.url}"))
+
+    def _on_console(self, message: object) -> None:
+        if message.type in ("error", "warning"):  # type: ignore[attr-defined]
+            self.complaints.append(message.text)  # type: ignore[attr-defined]
+
+    def drawn(self, what: str) -> int:
+        """A count of what the map has drawn: drones, links, ways or lost."""
+        return int(self.page.get_attribute("#map-note", f"data-{what}") or -1)
+
+    def row(self, node: int, column: int) -> str:
+        """A cell of the table."""
+        return self.page.inner_text(f"#nodes tr[data-id='{node}'] td:nth-child({column})")
+
+    def wait_for(self, what: str, condition: Callable[[], bool], within_s: float = 10.0) -> None:
+        deadline_s = time.monotonic() + within_s
+        while not condition():
+            assert time.monotonic() < deadline_s, f"timed out: {what}, waited {within_s:g} s"
+            self.page.wait_for_timeout(50)
+
+    def wait_for_drones(self, count: int) -> None:
+        self.wait_for(f"{count} drones on the map", lambda: self.drawn("drones") == count)
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
+    """Opens pages: visit(url, **options of the browser's context)."""
+    contexts = []
+
+    def open_page(url: str, **options: object) -> Visit:
+        options.setdefault("viewport", {"width": 1440, "height": 900})
+        context = browser.new_context(**options)  # type: ignore[arg-type]
+        contexts.append(context)
+        visit = Visit(context.new_page())
+        visit.page.goto(url)
+        return visit
+
+    yield open_page
+    for context in contexts:
+        context.close()

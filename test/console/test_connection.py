@@ -1,0 +1,202 @@
+"""Restarts, slow pages, strangers, and a large fleet."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+
+import httpx
+import pytest
+import websockets.exceptions
+import websockets.sync.client
+from test_page import PLACES, on_screen
+
+TOKEN = "a-token-for-this-test"
+FLUENT_MS = 50.0  # 20 pictures per second, drawn by a processor alone
+TOO_BIG = 1009  # RFC 6455, 7.4.1
+
+
+def test_a_page_reconnects_by_itself_after_the_server_was_restarted(start_console, visit):
+    console = start_console("--skip", "25")
+    page = visit(console.url)
+    page.wait_for_drones(len(PLACES))
+    assert page.complaints == []
+    assert console.stop() == 0
+    page.wait_for("it says so", lambda: page.page.locator("#link").is_visible())
+    assert "no connection" in page.page.inner_text("#link")
+    console.start()
+    page.wait_for("connected again", lambda: not page.page.locator("#link").is_visible(), 15.0)
+    page.wait_for_drones(len(PLACES))
+    page.page.click("#nodes tr[data-id='3']")
+    page.page.click("#power")
+    page.wait_for("orders work again", lambda: page.row(3, 2) == "off")
+
+
+def test_an_order_without_a_connection_is_answered_in_words(start_console, visit):
+    console = start_console("--skip", "25")
+    page = visit(console.url)
+    page.wait_for_drones(len(PLACES))
+    console.stop()
+    page.wait_for("it noticed", lambda: page.page.locator("#link").is_visible())
+    page.page.click("#pause")
+    page.page.wait_for_selector(".toast.bad")
+    assert "there is no connection to the console" in page.page.inner_text(".toast.bad")
+
+
+def test_254_drones_stay_fluent(start_console, visit):
+    console = start_console(
+        "--routers", "253", "--gridsize", "16", "--spacing", "6", "--skip", "25"
+    )
+    page = visit(console.url)
+    page.wait_for_drones(254)
+    page.page.wait_for_timeout(3000)
+    frame_ms = page.page.evaluate(
+        """async () => {
+            const map = document.getElementById("map");
+            const times = [];
+            for (let i = 0; i < 30; i++) {
+                const start = performance.now();
+                map.dispatchEvent(new WheelEvent("wheel", {deltaY: i % 2 ? 40 : -40}));
+                await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+                times.push(performance.now() - start);
+            }
+            return times.sort((a, b) => a - b)[15];
+        }"""
+    )
+    print(f"median time to draw and show one picture of 254 drones: {frame_ms:.1f} ms")
+    assert frame_ms < FLUENT_MS
+    node = 100
+    page.page.click(f"#nodes tr[data-id='{node}']")
+    page.page.click("#power")
+    page.wait_for("the order is carried out", lambda: page.row(node, 2) == "off")
+
+
+def connect(console, **headers):
+    return websockets.sync.client.connect(
+        f"ws://127.0.0.1:{console.port}/ws",
+        additional_headers={k.capitalize(): v for k, v in headers.items() if k != "origin"},
+        origin=headers.get("origin", console.url.rstrip("/")),
+        compression=None,
+        max_size=None,
+        proxy=None,
+    )
+
+
+def status_of(console, **headers) -> int:
+    """The HTTP status that opening a socket is answered with; 101: it is open."""
+    try:
+        with connect(console, **headers):
+            return 101
+    except websockets.exceptions.InvalidStatus as error:
+        return error.response.status_code
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", None])
+def test_a_socket_of_another_page_is_refused(start_console, origin):
+    console = start_console()
+    assert status_of(console, origin=origin) == 403
+    assert status_of(console) == 101
+
+
+def test_a_name_that_points_here_from_elsewhere_is_refused(start_console):
+    console = start_console()
+    answer = httpx.get(console.url, headers={"Host": "evil.example"})
+    assert answer.status_code == 403
+    assert "is not a name of this machine" in answer.text
+
+
+def test_without_the_token_there_is_neither_page_nor_socket(start_console, visit):
+    console = start_console("--token", TOKEN)
+    for path in ("", "static/app.js", "?token=wrong-token-wrong"):
+        assert httpx.get(console.url + path).status_code == 403
+    assert status_of(console) == 403
+    assert status_of(console, cookie="drone_mesh_token=wrong") == 403
+    assert status_of(console, cookie=f"drone_mesh_token={TOKEN}") == 101
+
+
+def test_the_address_with_the_token_opens_the_page_and_the_token_leaves_the_address(
+    start_console, visit
+):
+    console = start_console("--token", TOKEN, "--skip", "25")
+    page = visit(f"{console.url}?token={TOKEN}")
+    page.wait_for_drones(len(PLACES))
+    assert page.page.url == console.url
+    assert "token" not in page.page.evaluate("document.cookie"), "scripts can read the token"
+
+
+def test_nonsense_from_a_page_is_answered_and_harms_nobody(start_console):
+    answers = []
+    with connect(start_console()) as page:
+        for text in ("{", "[]", '{"do":"power","number":5,"node":999,"on":true}', '"x"'):
+            page.send(text)
+        while len(answers) < 4:
+            message = json.loads(page.recv(timeout=5.0))
+            if message["type"] == "answer":
+                answers.append(message)
+    assert all(not answer["done"] and answer["text"] for answer in answers)
+    assert answers[2]["number"] == 5
+
+
+def test_a_message_that_is_too_large_ends_that_connection_alone(start_console, visit):
+    console = start_console("--skip", "25")
+    page = visit(console.url)
+    page.wait_for_drones(len(PLACES))
+    with connect(console) as loud:
+        loud.send("x" * 100_000)
+        with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
+            listen_until_closed(loud)
+    assert closed.value.rcvd.code == TOO_BIG
+    assert not page.page.locator("#link").is_visible()
+
+
+def listen_until_closed(page) -> None:
+    while True:
+        page.recv(timeout=5.0)
+
+
+def open_and_take_nothing(console) -> socket.socket:
+    """A page that opens the WebSocket and never reads what it is sent."""
+    page = socket.create_connection(("127.0.0.1", console.port))
+    page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    page.sendall(
+        f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{console.port}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        f"Sec-WebSocket-Version: 13\r\nOrigin: http://127.0.0.1:{console.port}\r\n\r\n".encode()
+    )
+    return page
+
+
+def test_a_page_that_takes_nothing_holds_up_nobody(start_console, visit):
+    console = start_console("--routers", "253", "--gridsize", "16", "--skip", "12")
+    stuck = [open_and_take_nothing(console) for _ in range(4)]
+    page = visit(console.url)
+    page.wait_for_drones(254)
+    moments = set()
+    started = time.monotonic()
+    while time.monotonic() - started < 4.0:
+        moments.add(page.page.inner_text("#clock"))
+        page.page.wait_for_timeout(60)
+    assert len(moments) >= 10, f"only {len(moments)} frames in 4 s"
+    for raw in stuck:
+        raw.close()
+
+
+def test_pages_that_vanish_in_the_middle_are_forgotten(start_console, visit):
+    console = start_console("--skip", "25")
+    for _ in range(40):  # more than may be open at once
+        raw = open_and_take_nothing(console)
+        raw.recv(12)
+        raw.close()
+    page = visit(console.url)
+    page.wait_for_drones(len(PLACES))
+    assert on_screen(page, 0.0, 0.0)
+
+
+def test_it_ends_at_once_although_pages_are_open(start_console, visit):
+    console = start_console("--skip", "25")
+    page = visit(console.url)
+    page.wait_for_drones(len(PLACES))
+    started = time.monotonic()
+    assert console.stop() == 0
+    assert time.monotonic() - started < 5.0

@@ -1,0 +1,253 @@
+"""The page shows the mesh and acts on it."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from conftest import Visit
+
+# The fleet: gateway 0 at (-1, 0); 17 routers in rows of 6, 6 m apart, in range below 9 m.
+PLACES = [(-1.0, 0.0)] + [(6.0 * (k % 6), 6.0 * (k // 6)) for k in range(17)]
+LINKS = sum(
+    (ax - bx) ** 2 + (ay - by) ** 2 < 81.0
+    for i, (ax, ay) in enumerate(PLACES)
+    for bx, by in PLACES[:i]
+)
+STATE, HOPS, NEXT, NEIGHBOURS = 2, 4, 5, 6  # columns of the table
+FAST = ("--skip", "25")
+
+
+@pytest.fixture
+def page(start_console, visit) -> Visit:
+    opened = visit(start_console(*FAST).url)
+    opened.wait_for_drones(len(PLACES))
+    return opened
+
+
+def on_screen(page: Visit, x: float, y: float) -> tuple[float, float]:
+    """Where a place of the world is on the screen."""
+    box = page.page.locator("#map").bounding_box()
+    assert box is not None
+    view = {
+        key: float(page.page.get_attribute("#map-note", f"data-{key}"))
+        for key in ("x", "y", "scale")
+    }
+    return (
+        box["x"] + box["width"] / 2 + (x - view["x"]) * view["scale"],
+        box["y"] + box["height"] / 2 - (y - view["y"]) * view["scale"],
+    )
+
+
+def test_the_page_loads_without_complaint_and_asks_nobody_else(start_console, visit):
+    console = start_console(*FAST)
+    page = visit(console.url)
+    page.wait_for_drones(len(PLACES))
+    page.page.wait_for_timeout(1500)
+    assert page.complaints == []
+    assert {url.split("/")[2] for url in page.requests} == {f"127.0.0.1:{console.port}"}
+
+
+def test_the_map_shows_the_true_number_of_drones_links_and_ways(page):
+    page.wait_for("all links", lambda: page.drawn("links") == LINKS)
+    assert page.drawn("links-drawn") == LINKS
+    page.wait_for("all ways", lambda: page.drawn("ways") == 17)
+    assert page.page.inner_text("#summary") == "17 of 17 routers connected"
+
+
+def test_switching_a_node_off_by_click_turns_it_grey_and_the_routes_change(page):
+    page.wait_for("all ways", lambda: page.drawn("ways") == 17)
+    before = {node: page.row(node, NEXT) for node in range(1, 18)}
+    behind = [node for node, next_hop in before.items() if next_hop == "2"]
+    assert behind
+    page.page.mouse.click(*on_screen(page, *PLACES[2]))
+    assert page.page.inner_text("#node-name") == "Router 2"
+    page.page.click("#power")
+    page.wait_for("2 is off", lambda: page.row(2, STATE) == "off")
+    assert page.page.inner_text("#power") == "Switch on"
+    assert page.page.get_attribute("#nodes tr[data-id='2']", "data-state") == "off"
+    page.wait_for("links to 2 are gone", lambda: page.drawn("links") < LINKS)
+    page.page.select_option("#speed", "10")
+    page.wait_for(
+        "those behind 2 found other ways",
+        lambda: all(page.row(node, NEXT) not in ("2", "–") for node in behind),
+        within_s=20.0,
+    )
+    page.wait_for("16 ways again", lambda: page.drawn("ways") == 16)
+    page.page.click("#power")
+    page.wait_for("2 is back", lambda: page.row(2, STATE) == "connected", within_s=20.0)
+
+
+def test_a_drag_sends_the_drone_there(page):
+    start, goal = on_screen(page, *PLACES[17]), on_screen(page, 27.0, 9.0)
+    page.page.mouse.move(*start)
+    page.page.mouse.down()
+    page.page.mouse.move((start[0] + goal[0]) / 2, start[1], steps=4)
+    page.page.mouse.move(*goal, steps=4)
+    page.page.mouse.up()
+    page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
+    page.page.select_option("#speed", "5")
+    page.wait_for(
+        "17 arrived",
+        lambda: page.row(17, STATE) != "flying" and abs(float(page.row(17, 10)) - 27.0) < 0.2,
+        within_s=15.0,
+    )
+    assert abs(float(page.row(17, 11)) - 9.0) < 0.2
+
+
+def test_a_drag_that_is_let_go_with_escape_sends_nobody(page):
+    start = on_screen(page, *PLACES[17])
+    page.page.mouse.move(*start)
+    page.page.mouse.down()
+    page.page.mouse.move(start[0] + 80, start[1] - 40, steps=4)
+    page.page.keyboard.press("Escape")
+    page.page.mouse.up()
+    page.page.wait_for_timeout(800)
+    assert page.row(17, STATE) == "connected"
+    assert page.page.locator(".toast").count() == 0
+
+
+def test_numbers_send_a_drone_and_a_gateway_without_a_route_is_quoted(page):
+    page.page.click("#nodes tr[data-id='13']")
+    page.page.fill("#fly-x", "-3,5")
+    page.page.fill("#fly-y", "14")
+    page.page.click("#fly-form button")
+    page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
+    page.page.fill("#fly-x", "far away")
+    page.page.click("#fly-form button")
+    page.page.wait_for_selector(".toast.bad")
+    assert "x: a number from -5000 to 5000 is wanted" in page.page.inner_text(".toast.bad")
+
+
+def test_a_layout_starts(page):
+    page.page.select_option("#layout", "0")
+    page.page.click("#layout-form button")
+    page.wait_for(
+        "many fly", lambda: page.page.locator("#nodes tr[data-state=flying]").count() >= 10
+    )
+    assert "layout 0 is ordered" in page.page.inner_text("#toasts")
+
+
+def test_an_unknown_layout_is_refused_in_words(page):
+    page.page.select_option("#layout", "999")
+    page.page.click("#layout-form button")
+    page.page.wait_for_selector(".toast.bad")
+    assert "no case 999; known are 0..17, 100" in page.page.inner_text(".toast.bad")
+
+
+def test_pause_stops_the_time_and_speed_changes_it(page):
+    def clock() -> float:
+        match = re.match(r"([\d.]+) s", page.page.inner_text("#clock"))
+        assert match
+        return float(match[1])
+
+    page.page.click("#pause")
+    page.wait_for("paused", lambda: "paused" in page.page.inner_text("#clock"))
+    stood = clock()
+    page.page.wait_for_timeout(1000)
+    assert clock() == stood
+    page.page.click("#pause")
+    page.wait_for("time goes on", lambda: clock() > stood)
+    page.page.select_option("#speed", "10")
+    page.wait_for("ten times as fast", lambda: "10.0×" in page.page.inner_text("#clock"))
+
+
+def test_the_keyboard_is_enough_to_switch_a_node_off(page):
+    for _ in range(4):
+        page.page.keyboard.press("n")
+    assert page.page.inner_text("#node-name") == "Router 3"
+    page.page.keyboard.press("p")
+    page.wait_for("3 is off", lambda: page.row(3, STATE) == "off")
+    page.page.keyboard.press("g")
+    page.page.keyboard.type("1")
+    assert page.page.input_value("#fly-x") == "1"
+    page.page.keyboard.press("Escape")
+    page.page.keyboard.press("Escape")
+    assert page.page.locator("#node-none").is_visible()
+    page.page.keyboard.press("?")
+    assert page.page.locator("#help").is_visible()
+
+
+def test_the_map_moves_and_zooms_by_keyboard(page):
+    before = on_screen(page, 0.0, 0.0)
+    page.page.focus("#map")
+    page.page.keyboard.press("ArrowRight")
+    page.wait_for("moved", lambda: on_screen(page, 0.0, 0.0)[0] < before[0] - 30)
+    scale = float(page.page.get_attribute("#map-note", "data-scale"))
+    page.page.keyboard.press("+")
+    page.wait_for(
+        "zoomed", lambda: float(page.page.get_attribute("#map-note", "data-scale")) > scale
+    )
+    page.page.keyboard.press("f")
+    page.wait_for("fits again", lambda: on_screen(page, 0.0, 0.0) == pytest.approx(before, abs=1.0))
+
+
+def test_the_table_sorts_by_the_column_that_is_clicked(page):
+    ids = "#nodes tbody tr td:first-child"
+    page.page.click("#nodes th:nth-child(4) button")
+    page.page.click("#nodes th:nth-child(4) button")
+    hops = [int(h) for h in page.page.locator("#nodes tbody tr td:nth-child(4)").all_inner_texts()]
+    assert hops == sorted(hops, reverse=True)
+    page.page.click("#nodes th:nth-child(1) button")
+    assert page.page.locator(ids).all_inner_texts() == [str(n) for n in range(18)]
+
+
+def test_the_log_tells_events_with_simulated_time_and_neighbours_on_request(page):
+    page.page.click("#nodes tr[data-id='2']")
+    page.page.click("#power")
+    page.page.wait_for_selector("#events li:has-text('2 power off')")
+    row = page.page.locator("#events li:has-text('2 power off')").first.inner_text()
+    assert re.match(r"[\d.]+ s\s+2 power off", row)
+    assert page.page.locator("#events li:has-text('neighbour')").count() == 0
+    page.page.check("#show-neighbours")
+    assert page.page.locator("#events li:has-text('neighbour found')").count() > 0
+
+
+def test_the_charts_have_something_to_show(page):
+    page.wait_for("a share", lambda: page.page.inner_text("#share-now") == "100 %")
+    page.wait_for("a rate", lambda: int(page.page.inner_text("#rate-now")) > 0)
+    assert re.fullmatch(r"\d\.\d / \d", page.page.inner_text("#hops-now"))
+    page.page.hover("#chart-share")
+    assert re.fullmatch(r"100 % at \d+ s", page.page.inner_text("#share-now"))
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_follows_the_scheme_of_the_system(start_console, visit, scheme):
+    page = visit(start_console(*FAST).url, color_scheme=scheme)
+    page.wait_for_drones(len(PLACES))
+    assert page.page.get_attribute("html", "data-theme") == scheme
+    page.page.click("#theme")
+    assert page.page.get_attribute("html", "data-theme") != scheme
+
+
+def test_at_phone_width_nothing_sticks_out_and_each_view_is_one_tap_away(start_console, visit):
+    page = visit(start_console(*FAST).url, viewport={"width": 390, "height": 780}, has_touch=True)
+    page.wait_for_drones(len(PLACES))
+    for tab, card in (
+        ("nodes", "nodes"),
+        ("events", "events"),
+        ("charts", "charts"),
+        ("map", "map"),
+    ):
+        page.page.tap(f"nav button[data-tab={tab}]")
+        assert page.page.locator(f"#{card}-card").is_visible()
+        assert page.page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_a_finger_that_moves_the_map_sends_nobody_away(start_console, visit):
+    page = visit(start_console(*FAST).url, viewport={"width": 390, "height": 780}, has_touch=True)
+    page.wait_for_drones(len(PLACES))
+    start = on_screen(page, *PLACES[9])
+    client = page.page.context.new_cdp_session(page.page)
+
+    def touch(kind: str, x: float, y: float) -> None:
+        points = [] if kind == "touchEnd" else [{"x": x, "y": y}]
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", *start)
+    for step in range(1, 6):
+        touch("touchMove", start[0] + 12 * step, start[1])
+    touch("touchEnd", *start)
+    page.wait_for("the map moved", lambda: on_screen(page, *PLACES[9])[0] > start[0] + 30)
+    page.page.wait_for_timeout(500)
+    assert page.page.locator("#nodes tr[data-state=flying]").count() == 0

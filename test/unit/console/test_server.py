@@ -1,0 +1,211 @@
+"""The server with pages that misbehave, driven as ASGI without a network."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any, Awaitable, Callable
+
+import pytest
+
+from drone_mesh.console import server as server_module
+from drone_mesh.console.access import Access
+from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.orders import OrderRefused
+from drone_mesh.console.server import MOST_PAGES, ConsoleServer
+from drone_mesh.state.model import MeshStatus, NodeStatus
+
+LIMIT_S = 5.0
+
+
+class PromptControls:
+    """Everything is done at once; layout 9 is refused."""
+
+    def power(self, node: int, on: bool) -> str:
+        return f"{node} {on}"
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:
+        return "flies"
+
+    def layout(self, case: int) -> str:
+        if case == 9:
+            raise OrderRefused("no case 9")
+        return "ordered"
+
+    def speed(self, paused: bool, factor: float) -> str:
+        return "done"
+
+
+class FakePage:
+    """The other end of a WebSocket; one that is stuck takes nothing after the handshake."""
+
+    def __init__(self, server: ConsoleServer, stuck: bool = False, **headers: str) -> None:
+        self._server = server
+        self._stuck = stuck
+        self._headers = {"host": "127.0.0.1:1", "origin": "http://127.0.0.1:1", **headers}
+        self._to_server: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        self.received: list[dict[str, Any]] = []
+        self.closed_with: int | None = None
+        self.task: asyncio.Task[None] | None = None
+
+    def open(self) -> FakePage:
+        self._to_server.put_nowait({"type": "websocket.connect"})
+        scope = {
+            "type": "websocket",
+            "path": "/ws",
+            "query_string": b"",
+            "headers": [(k.encode(), v.encode()) for k, v in self._headers.items()],
+            "client": ("127.0.0.1", 5),
+            "subprotocols": [],
+        }
+        app = self._server.app
+        self.task = asyncio.ensure_future(app(scope, self._to_server.get, self._send))
+        return self
+
+    def say(self, **request: object) -> None:
+        self._to_server.put_nowait({"type": "websocket.receive", "text": json.dumps(request)})
+
+    @property
+    def heard_everything(self) -> bool:
+        return self._to_server.empty()
+
+    def vanish(self) -> None:
+        self._to_server.put_nowait({"type": "websocket.disconnect", "code": 1006})
+
+    def of_type(self, kind: str) -> list[dict[str, Any]]:
+        return [message for message in self.received if message["type"] == kind]
+
+    async def _send(self, message: Any) -> None:
+        if message["type"] == "websocket.send":
+            if self._stuck:
+                await asyncio.Event().wait()
+            self.received.append(json.loads(message["text"]))
+        elif message["type"] == "websocket.close":
+            self.closed_with = message["code"]
+
+
+async def until(what: str, condition: Callable[[], object]) -> None:
+    deadline_s = asyncio.get_running_loop().time() + LIMIT_S
+    while not condition():
+        assert asyncio.get_running_loop().time() < deadline_s, f"timed out: {what}"
+        await asyncio.sleep(0.01)
+
+
+def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> None:
+    async def main() -> None:
+        store = FrameStore()
+        store.update_mesh(MeshStatus(1.0, [NodeStatus(1, connected=True)]), 0.0)
+        server = ConsoleServer(store, PromptControls(), Access(), [(0, "0: field case")])
+        try:
+            await scenario(server, store)
+        finally:
+            server.close()
+
+    asyncio.run(main())
+
+
+def test_a_page_is_greeted_and_then_told_everything():
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server).open()
+        await until("a frame", lambda: page.of_type("frame"))
+        assert page.received[0] == {"type": "hello", "layouts": [[0, "0: field case"]]}
+        assert page.received[1]["full"]
+
+    run(scenario)
+
+
+def test_a_page_that_takes_nothing_is_cut_off_while_another_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr(server_module, "SEND_TIMEOUT_S", 0.3)
+
+    async def scenario(server: ConsoleServer, store: FrameStore) -> None:
+        stuck, well = FakePage(server, stuck=True).open(), FakePage(server).open()
+        for tick in range(200):
+            store.update_mesh(MeshStatus(2.0 + tick, [NodeStatus(1, hops=tick % 9)]), float(tick))
+            await asyncio.sleep(0.005)
+            if stuck.task is not None and stuck.task.done():
+                break
+        assert stuck.task is not None
+        await until("the stuck page is cut off", stuck.task.done)
+        frames = len(well.of_type("frame"))
+        store.update_mesh(MeshStatus(500.0, [NodeStatus(1)]), 500.0)
+        await until("the other goes on", lambda: len(well.of_type("frame")) > frames)
+        assert well.of_type("frame")[-1]["clock"]["t"] == 500.0
+
+    run(scenario)
+
+
+def test_frames_come_at_most_at_the_frame_rate():
+    async def scenario(server: ConsoleServer, store: FrameStore) -> None:
+        page = FakePage(server).open()
+        await until("the first frame", lambda: page.of_type("frame"))
+        started_s = asyncio.get_running_loop().time()
+        before = len(page.of_type("frame"))
+        tick = 0
+        while asyncio.get_running_loop().time() - started_s < 0.5:
+            tick += 1
+            store.update_mesh(MeshStatus(2.0 + tick, [NodeStatus(1, hops=tick % 9)]), 0.0)
+            await asyncio.sleep(0.002)
+        assert tick > 20
+        assert 1 <= len(page.of_type("frame")) - before <= 4
+
+    run(scenario)
+
+
+def test_orders_are_answered_by_their_numbers():
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server).open()
+        page.say(do="power", number=4, node=3, on=False)
+        page.say(do="layout", number=5, case=9)
+        page.say(do="layout", number=6, case="x")
+        await until("three answers", lambda: len(page.of_type("answer")) == 3)
+        answers = {answer["number"]: answer for answer in page.of_type("answer")}
+        assert (answers[4]["done"], answers[4]["text"]) == (True, "3 False")
+        assert (answers[5]["done"], answers[5]["text"]) == (False, "no case 9")
+        assert not answers[6]["done"]
+
+    run(scenario)
+
+
+def test_a_watched_node_comes_with_its_neighbours():
+    async def scenario(server: ConsoleServer, store: FrameStore) -> None:
+        page = FakePage(server).open()
+        page.say(do="watch", node=1)
+        node = NodeStatus(1, neighbours=b"\x00\x07", neighbour_ages=b"\x01\x09")
+        wanted = {"type": "detail", "node": 1, "neighbours": [[0, 1], [7, 9]]}
+        store.update_mesh(MeshStatus(2.0, [node]), 1.0)
+        await until("the request is heard", lambda: page.heard_everything)
+        store.update_mesh(MeshStatus(3.0, [node]), 2.0)
+        await until("details", lambda: wanted in page.received)
+
+    run(scenario)
+
+
+@pytest.mark.parametrize(
+    "headers", [{"origin": "http://evil.example"}, {"host": "evil.example"}, {"origin": ""}]
+)
+def test_a_stranger_is_closed_before_anything_is_said(headers):
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server, **headers).open()
+        await until("closed", lambda: page.closed_with)
+        assert page.closed_with == 1008
+        assert page.received == []
+
+    run(scenario)
+
+
+def test_so_many_pages_and_no_more_and_the_place_of_one_that_vanished_is_free():
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        pages = [FakePage(server).open() for _ in range(MOST_PAGES)]
+        await until("all are greeted", lambda: all(page.received for page in pages))
+        late = FakePage(server).open()
+        await until("closed", lambda: late.closed_with)
+        assert late.closed_with == 1013
+        pages[0].vanish()
+        assert pages[0].task is not None
+        await until("it is forgotten", pages[0].task.done)
+        later = FakePage(server).open()
+        await until("greeted", lambda: later.received)
+
+    run(scenario)
