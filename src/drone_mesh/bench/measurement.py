@@ -39,6 +39,8 @@ class RosResult:
     lost_before: float | None  # packets for nodes in range, most of them not quite there yet
     cpu_ms_per_message: float | None  # of all processes, the master's included
     cores: dict[str, float]  # by process
+    links: int  # pairs of neighbours, at the end
+    cpu_ms_per_sim_s_and_link: float | None
     pss_mb: float  # of all processes
     rss_mb: float
     threads: int
@@ -136,6 +138,8 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         lost_before=first.lost,
         cpu_ms_per_message=1000 * sum(cores.values()) * wall_s / messages if messages else None,
         cores=cores,
+        links=last.look.links,
+        cpu_ms_per_sim_s_and_link=_per_link(sum(cores.values()) * wall_s, sim_s, last.look.links),
         pss_mb=last.use.pss_bytes / MEGABYTE,
         rss_mb=last.use.rss_bytes / MEGABYTE,
         threads=last.use.threads,
@@ -143,6 +147,10 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         reached_real_time_factor=sim_s / wall_s,
         worst_timer_lag_s=watch.worst.get(WORST_LAG),
     )
+
+
+def _per_link(cpu_s: float, sim_s: float, links: int) -> float | None:
+    return 1000.0 * cpu_s / sim_s / links if sim_s and links else None
 
 
 def _increase(before: float | None, after: float | None) -> float | None:

@@ -27,6 +27,7 @@ class Look:
     on: int  # nodes with power
     connected: int  # routers with power and a gateway
     messages: int  # sum of total_messages over all nodes
+    links: int  # pairs of nodes that know each other as neighbours
 
 
 @dataclass(frozen=True)

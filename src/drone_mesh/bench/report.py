@@ -107,7 +107,9 @@ def ros_tables(results: Sequence[RosResult]) -> str:
                     for result in results
                 ],
             ),
-            "Cost. Cores used, by process; memory of all, in MB.\n\n" + _cost_table(results),
+            "Cost. Cores used, by process; milliseconds of processor time of all of them per "
+            "message, and per simulated second and link; memory of all, in MB.\n\n"
+            + _cost_table(results),
         )
     )
 
@@ -136,19 +138,24 @@ def _cost_table(results: Sequence[RosResult]) -> str:
     names = sorted(
         {name for result in results for name, cores in result.cores.items() if cores > SMALL_CORES}
     )
-    headings = ["drones", "spacing", "speed", *names, "all", "ms CPU/message", "PSS", "RSS"]
+    headings = [
+        *("drones", "spacing", "speed", *names, "all"),
+        *("ms/message", "links", "ms/s and link", "PSS", "RSS"),
+    ]
     rows = [
         [
             *_fleet(result),
             *(_number(result.cores.get(name), 2) for name in names),
             f"{sum(result.cores.values()):.2f}",
             _number(result.cpu_ms_per_message, 2),
+            str(result.links),
+            _number(result.cpu_ms_per_sim_s_and_link, 2),
             f"{result.pss_mb:.0f}",
             f"{result.rss_mb:.0f}",
         ]
         for result in results
     ]
-    return table([*headings[:-2], "PSS (MB)", "RSS (MB)"], rows)
+    return table(headings, rows)
 
 
 def inprocess_table(results: Sequence[InProcessResult]) -> str:

@@ -60,6 +60,7 @@ class Probe:
                 on=len(on),
                 connected=sum(node.connected for node in routers),
                 messages=sum(node.total_messages for node in mesh.nodes),
+                links=sum(len(node.neighbours) for node in on) // 2,
             )
         )
 

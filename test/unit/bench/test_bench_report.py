@@ -23,6 +23,8 @@ RESULT = RosResult(
     lost_before=7.0,
     cpu_ms_per_message=0.5,
     cores={"DroneFactory": 0.4, "rosout": 0.001},
+    links=342,
+    cpu_ms_per_sim_s_and_link=1.25,
     pss_mb=200.0,
     rss_mb=300.0,
     threads=50,
@@ -51,7 +53,7 @@ def test_each_fleet_has_a_row_in_each_table():
     start, traffic, cost = rows(ros_tables([RESULT]))[1::2]
     assert start == ["100", "6 m", "1", "8.2", "1.5", "1.6"]
     assert traffic == ["100", "6 m", "1", "305", "400", "0.000%", "7", "1.00", "12 ms"]
-    assert cost == ["100", "6 m", "1", "0.40", "0.40", "0.50", "200", "300"]
+    assert cost == ["100", "6 m", "1", "0.40", "0.40", "0.50", "342", "1.25", "200", "300"]
 
 
 def test_what_is_not_known_is_a_dash_and_a_fleet_that_never_met_says_how_far_it_came():
