@@ -117,7 +117,8 @@ class WorldWindow:
         for key, state in events.items():
             if key in self._held_keys and state & pybullet.KEY_IS_DOWN:
                 self._held_keys[key]()
-            elif key in self._keys and state & pybullet.KEY_WAS_TRIGGERED:
+            elif key in self._keys and state & pybullet.KEY_WAS_RELEASED:
+                # Pressed and released between two looks, a key shows only that it was released.
                 self._keys[key]()
             if not self.is_open():
                 return

@@ -18,7 +18,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.picture import Scene
 
 LOOK_PERIOD_S = 0.05  # wall; at most 20 scenes a second
-END_TIMEOUT_S = 3.0  # wall; a window that has not closed by then is ended
+END_TIMEOUT_S = 3.0  # wall; from the end of the pipe to that of the process
 
 _log = logging.getLogger(__name__)
 
@@ -85,10 +85,8 @@ class WindowProcess:
         self._stopped.set()
         if self._thread is None or self._process is None:
             return
-        self._thread.join(END_TIMEOUT_S)
-        if self._thread.is_alive():  # the window takes no more scenes
-            self._process.kill()
-            self._thread.join()
+        self._process.terminate()  # it has nothing to put in order, and closing takes a second
+        self._thread.join()
 
     def _run(self, scenes: Connection, process: subprocess.Popen[bytes]) -> None:
         try:
