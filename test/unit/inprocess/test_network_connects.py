@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import pytest
 from air_watch import AirWatch
-from scenarios import assert_hops_are_paths, events, fleet, flown, hops_across, layout, line
+from scenarios import (
+    LAYOUTS,
+    assert_hops_are_paths,
+    events,
+    fleet,
+    flown,
+    hops_across,
+    layout,
+    line,
+)
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.drone import InProcessDrone
+from drone_mesh.inprocess.radio import InProcessAntenna
 
 SHORT = ("STARTED", "CONNECTED", "DISCONNECTED", "EMERGENCY", "FLIGHT_DECIDED", "LANDED")
 
@@ -109,6 +121,49 @@ def test_an_order_reaches_a_drone_four_hops_away_and_only_it():
     place = network.location(4)
     assert (place.longitude, place.latitude) == (24.0, 5.0)
     assert network.run_until(network.all_connected, within_s=1.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_field_case_reaches_everybody_and_all_are_connected_after_the_landing(seed):
+    """Layout 0 from the default start, 1 m apart: the far end is ordered first."""
+    network = Network(seed=seed)
+    network.add_fleet(gateways=1, routers=17, gridsize=6, spacing=1.0)
+    network.run_for(20.0)
+    orders = LAYOUTS.orders(0)
+    for node, goal in orders:
+        assert network.order(node, goal.longitude, goal.latitude), f"drone {node} has no route"
+    assert network.run_until(lambda: len(events(network, "LANDED")) == 17, within_s=60.0)
+    assert network.run_until(network.all_connected, within_s=60.0)
+    network.run_for(120.0)
+    assert network.all_connected()
+    assert flown(network) == set()
+    for node, goal in orders:
+        assert network.location(node).distance_m(goal) < 0.05
+
+
+class StrangersNode:
+    """A radio of somebody else, with nothing of ours behind it. Keeps what it hears."""
+
+    def __init__(self, network, node, x, y):
+        self.heard = []
+        drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda started: None)
+        self.antenna = InProcessAntenna(network.air, node, drone, self.heard.append)
+        self.antenna.start_antenna(None)
+
+
+def test_a_stranger_is_answered_on_the_first_try():
+    network = line(2)
+    network.run_for(20.0)
+    stranger = StrangersNode(network, 99, 18.0, 0.0)
+    assert stranger.antenna.send_message_to(bytes((99, 99, 2, 2, 2)).ljust(32, b"\0"))
+    network.run_for(0.1)
+    assert [heard[:15] for heard in stranger.heard] == [
+        bytes.fromhex("02 02 01 63 63 00 00 00 00 00 00 40 41 00 00")  # longitude 12
+    ]
+    stranger.heard.clear()
+    assert stranger.antenna.send_message_to(bytes((99, 99, 4, 2, 0, 0, 255)).ljust(32, b"\0"))
+    network.run_for(0.1)
+    assert [heard[:8] for heard in stranger.heard] == [bytes.fromhex("00 02 04 63 63 01 00 02")]
 
 
 def test_a_drone_that_cannot_be_reached_does_not_move():
