@@ -12,6 +12,7 @@ if [ -e "$noetic" ]; then
     ros-noetic-{rosbash,rosgraph-msgs,roslaunch,rosmsg,rosnode,rosparam,rospy,rosservice,rostest}
     ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
   )
+  screen_packages=(libgl1 libxtst6 tshark xvfb)
   rviz_package=ros-noetic-rviz
 else
   ros_packages=(
@@ -22,6 +23,7 @@ else
     ros-{diagnostic,geometry,rosgraph,std,tf2,visualization}-msgs
     python3-{diagnostic,geometry,tf2,visualization}-msgs python3-rospy python3-rostest
   )
+  screen_packages=(chromium libgl1 libxtst6 tshark xvfb)
   rviz_package=rviz
 fi
 
@@ -120,4 +122,10 @@ prepare_unit_tests() {
 prepare_checks() {
   prepare_unit_tests
   pip_install requirements/checks.txt
+}
+
+prepare_everything() {
+  apt_install "${ros_packages[@]}" "${screen_packages[@]}"
+  prepare_checks
+  pip_install requirements/browser.txt
 }
