@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""/mesh/state, /mesh/events and /diagnostics; and that nothing of the viewers runs by itself."""
+
+from __future__ import annotations
+
+import unittest
+
+import rosgraph
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from drone_mesh.msg import MeshEvent, MeshState
+from drone_mesh.srv import PowerSwitch, RequestDroneFlight, SetSpeed
+from rostest_support import WALL_LIMIT_S, LogWatch, call, wait_for
+
+
+class MeshStateTest(unittest.TestCase):
+    def setUp(self) -> None:
+        if not rospy.core.is_initialized():
+            rospy.init_node("test_mesh_state")
+        self.state: MeshState | None = None
+        self.events: list[MeshEvent] = []
+        self.diagnostics: DiagnosticArray | None = None
+        self.log = LogWatch()
+        rospy.Subscriber("/mesh/state", MeshState, self._on_state)
+        rospy.Subscriber("/mesh/events", MeshEvent, self.events.append)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
+
+    def _on_state(self, message: MeshState) -> None:
+        self.state = message
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        self.diagnostics = message
+
+    def hops(self) -> list[int | None]:
+        nodes = self.state.nodes if self.state else []
+        return [node.hops if node.connected and node.on else None for node in nodes]
+
+    def has_event(self, node: int, kind: str) -> bool:
+        return any(event.node == node and event.kind == kind for event in list(self.events))
+
+    def levels(self) -> dict[str, int]:
+        return {s.name: s.level for s in self.diagnostics.status} if self.diagnostics else {}
+
+    def test_1_a_state_tells_what_the_mesh_knows_and_where_it_is(self) -> None:
+        wait_for("all connected", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])
+        wait_for("routes and heartbeats", WALL_LIMIT_S, lambda: len(self.state.nodes[3].route) == 3)
+        far = self.state.nodes[3]
+        self.assertEqual(list(far.route), [3, 2, 0])
+        self.assertEqual((far.gateway, far.next_hop, far.on, list(far.path)), (0, 2, True, []))
+        self.assertEqual([round(metres, 3) for metres in far.position], [12.0, 0.0, 0.0])
+        self.assertEqual(list(far.neighbours), [2])
+        self.assertLess(far.report_age, 3.0)
+        self.assertEqual(self.state.max_distance, 9.0)
+        self.assertEqual(self.state.real_time_factor, 4.0)
+        wait_for("no trouble", WALL_LIMIT_S, lambda: self.levels() == {"drone_mesh: mesh": 0})
+
+    def test_2_a_power_off_is_an_event_and_trouble(self) -> None:
+        wait_for("all connected", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])
+        call("/Nodes/2/powerSwitch", PowerSwitch, False)
+        wait_for("2 is off", WALL_LIMIT_S, lambda: not self.state.nodes[2].on)
+        wait_for("its event", WALL_LIMIT_S, lambda: self.has_event(2, "power off"))
+        wait_for("3 is lost", WALL_LIMIT_S, lambda: self.hops() == [0, 1, None, None])
+        wait_for("its event", WALL_LIMIT_S, lambda: self.has_event(3, "disconnected"))
+        wait_for(
+            "diagnostics",
+            WALL_LIMIT_S,
+            lambda: (
+                self.levels().get("drone_mesh: node 2") == 1
+                and self.levels().get("drone_mesh: node 3") == 2
+            ),
+        )
+        call("/Nodes/2/powerSwitch", PowerSwitch, True)
+        wait_for("all connected again", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])
+
+    def test_3_a_flight_is_seen_and_the_world_can_be_paused(self) -> None:
+        wait_for("all connected", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])
+        call("/DroneManager/requestDroneMovement", RequestDroneFlight, 3, 30.0, 12.0, 0)
+        wait_for("3 flies", WALL_LIMIT_S, lambda: len(self.state.nodes[3].path) >= 3)
+        self.assertEqual(list(self.state.nodes[3].path[-3:]), [12.0, 30.0, 0.0])
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, True, 0.0).success)
+        wait_for("paused", WALL_LIMIT_S, lambda: self.state.paused)
+        stood, place = self.state.header.stamp, tuple(self.state.nodes[3].position)
+        seen = self.state.header.seq
+        wait_for("news while paused", WALL_LIMIT_S, lambda: self.state.header.seq > seen + 3)
+        self.assertEqual(
+            (self.state.header.stamp, tuple(self.state.nodes[3].position)), (stood, place)
+        )
+        self.assertFalse(call("/DroneFactory/setSpeed", SetSpeed, False, -1.0).success)
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 8.0).success)
+        wait_for("3 landed", WALL_LIMIT_S, lambda: len(self.state.nodes[3].path) == 0)
+        self.assertEqual(self.state.real_time_factor, 8.0)
+        self.assertEqual(self.log.failures(), [])
+
+    def test_4_viewers_that_nobody_asked_for_do_not_exist(self) -> None:
+        publishers, subscribers, _services = rosgraph.Master("/test").getSystemState()
+        nodes = {node for _topic, names in publishers + subscribers for node in names}
+        self.assertFalse(nodes & {"/mesh_console", "/mesh_markers", "/mesh_rviz"})
+        topics = {topic for topic, _names in publishers}
+        self.assertFalse(topics & {"/mesh/markers", "/tf"})
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "mesh_state", MeshStateTest)
