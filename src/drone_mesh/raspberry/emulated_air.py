@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import random
+from pathlib import Path
 
 from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance
+from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
@@ -18,14 +22,23 @@ COLUMN_M = {DataRate.KBPS_250: 70.0, DataRate.MBPS_1: 32.0, DataRate.MBPS_2: 25.
 _ROW_COLUMNS = 0.25  # the rows lie that many columns to the left and to the right
 
 
+_log = logging.getLogger(__name__)
+
+
 class EmulatedAir:
     """Makes emulated radios: node 0, then pairs of nodes, each pair further away than the last."""
 
-    def __init__(self, settings: RadioSettings) -> None:
-        """Starts a thread that `close` ends."""
+    def __init__(self, settings: RadioSettings, trace_file: Path | None = None) -> None:
+        """Starts a thread that `close` ends. ConfigurationError if the file cannot be written."""
+        self._trace_file = trace_file
+        self._trace = FrameTrace()
+        if trace_file is not None:
+            self._write_trace(trace_file)
         self._settings = settings
         self._clock = WallClock()
         self._air = Air(self._clock, LogDistance(random.Random()), random.Random())
+        if trace_file is not None:
+            self._air.observe(self._trace.see)
 
     def place(self, node_id: int) -> Location:
         """Where a node stands."""
@@ -49,5 +62,14 @@ class EmulatedAir:
         )
 
     def close(self) -> None:
-        """End the air, when its radios are closed."""
+        """End the air, when its radios are closed, and write what was on it."""
         self._clock.close()
+        if self._trace_file is not None:
+            frames = self._write_trace(self._trace_file)
+            _log.info("%d frames that were on the air are in %s", frames, self._trace_file)
+
+    def _write_trace(self, file: Path) -> int:
+        try:
+            return self._trace.write(file)
+        except OSError as error:
+            raise ConfigurationError(f"--trace {file}: {error.strerror or error}") from error

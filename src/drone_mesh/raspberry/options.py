@@ -56,6 +56,7 @@ class Options:
     routing: str
     location: Location
     emulated: int  # that many emulated nodes instead of the real one; 0: the real one
+    trace: Path | None  # where to write what was on the emulated air
     log_level: str
     http: HttpOptions | None  # None: not a gateway
 
@@ -198,6 +199,13 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     place.add_argument("--longitude", type=float, default=0.0, help="x (default: %(default)g)")
     place.add_argument("--height", type=float, default=0.0, help="(default: %(default)g)")
     parser.add_argument(
+        "--trace",
+        type=Path,
+        metavar="FILE",
+        help="with --emulated: write the last 100,000 frames on the air to this file at the end "
+        "(pcapng, for Wireshark)",
+    )
+    parser.add_argument(
         "--log-level", choices=LOG_LEVELS, default="info", help="(default: %(default)s)"
     )
     return parser
@@ -218,6 +226,8 @@ def _add_emulated(who: argparse._MutuallyExclusiveGroup) -> None:
 def _options(
     parser: argparse.ArgumentParser, parsed: argparse.Namespace, environment: Mapping[str, str]
 ) -> Options:
+    if parsed.trace is not None and not parsed.emulated:
+        parser.error("--trace needs --emulated: a real radio does not hear what others send")
     location = Location(parsed.latitude, parsed.longitude, parsed.height)
     try:
         check_goal(*location)
@@ -236,6 +246,7 @@ def _options(
             routing=parsed.routing,
             location=location,
             emulated=parsed.emulated,
+            trace=parsed.trace,
             log_level=parsed.log_level,
             http=_http_options(parsed, environment) if "bind" in parsed else None,
         )

@@ -118,7 +118,7 @@ def _open_radio(
 
 
 def _emulated_nodes(options: Options, stack: contextlib.ExitStack) -> list[RadioNode]:
-    air = EmulatedAir(options.radio)
+    air = EmulatedAir(options.radio, options.trace)
     stack.callback(air.close)
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
     return [

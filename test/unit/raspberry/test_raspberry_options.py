@@ -30,6 +30,7 @@ def test_a_router_needs_but_its_id_and_has_the_settings_of_the_reference():
         routing="child_table_tree",
         location=Location(0.0, 0.0, 0.0),
         emulated=0,
+        trace=None,
         log_level="info",
         http=None,
     )
@@ -56,6 +57,7 @@ def test_each_option_reaches_what_it_is_for():
         routing="drone_mesh.communication.child_table_tree:ChildTableTree",
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),
         emulated=0,
+        trace=None,
         log_level="debug",
         http=None,
     )
@@ -99,6 +101,7 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --routing flooding", "'flooding' is not known: use one of child_table_tree"),
         ("--id 3 --latitude 5001", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --longitude inf", "longitude inf is not a finite number"),
+        ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
         ("--emulated 1", "'1' is not a whole number of 2..32"),
         ("--id 3 --log-level loud", "invalid choice: 'loud'"),
         ("--id 3 --port 9080", "unrecognized arguments: --port"),

@@ -93,18 +93,24 @@ def free_port():
     ("name", "line", "reason"),
     [
         ("raspberry_router", "--id 3 --spi 99.0", "/dev/spidev99.0 does not exist: switch SPI on"),
+        (
+            "raspberry_router",
+            "--emulated 2 --trace /no/such/file",
+            "--trace /no/such/file: No such",
+        ),
         ("raspberry_gateway", "--spi 99.0", "/dev/spidev99.0 does not exist: switch SPI on"),
     ],
 )
-def test_without_spi_one_line_says_what_is_missing_and_how_to_switch_it_on(name, line, reason):
+def test_what_is_missing_is_said_in_one_line_with_what_to_do(name, line, reason):
     with Program(name, *line.split()) as program:
         assert program.result() == 1
         assert program.said.startswith(f"{name}: {reason}")
         assert program.said.count("\n") == 1
 
 
-def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c():
-    with Program("raspberry_router", "--emulated", "5") as program:
+def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c(tmp_path):
+    trace = tmp_path / "air.pcapng"
+    with Program("raspberry_router", "--emulated", "5", "--trace", str(trace)) as program:
         found = program.wait_for(r"all 5 nodes are connected after .* s; hops to the gateway: (.*)")
         hops = dict(map(int, pair.split(":")) for pair in found[1].split())
         assert hops[0] == 0
@@ -116,6 +122,8 @@ def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c():
         assert seconds < END_WITHIN_S
         assert "Traceback" not in program.said
         assert program.said.count("packets: sent") == 5
+        assert re.search(r"\d+ frames that were on the air are in ", program.said)
+        assert trace.read_bytes().startswith(bytes.fromhex("0a0d0d0a"))  # pcapng
 
 
 def test_an_emulated_gateway_sends_an_order_over_several_hops_and_ends_on_sigterm():
