@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""The console's orders reach the real system, and its page the real state."""
+
+from __future__ import annotations
+
+import json
+import threading
+import unittest
+from urllib.request import urlopen
+
+import rospy
+import rostest
+import websockets.exceptions
+import websockets.sync.client
+from rostest_support import (
+    WALL_LIMIT_S,
+    LogWatch,
+    kill_and_wait_for_respawn,
+    wait_for,
+)
+
+HOST = "127.0.0.1:18181"
+
+
+class Page:
+    """What a browser's page does: it applies frames and sends orders."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[str, dict] = {}
+        self.clock: dict = {}
+        self.layouts: list = []
+        self.answers: dict[int, dict] = {}
+        self._socket = websockets.sync.client.connect(
+            f"ws://{HOST}/ws", origin=f"http://{HOST}", proxy=None, max_size=None
+        )
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        try:
+            for text in self._socket:
+                self._apply(json.loads(text))
+        except websockets.exceptions.ConnectionClosed:
+            pass
+
+    def _apply(self, message: dict) -> None:
+        if message["type"] == "hello":
+            self.layouts = message["layouts"]
+        elif message["type"] == "answer":
+            self.answers[message["number"]] = message
+        elif message["type"] == "frame":
+            self.clock = message["clock"]
+            for node, fields in message.get("nodes", {}).items():
+                self.nodes.setdefault(node, {}).update(fields)
+
+    def order(self, **request: object) -> dict:
+        number = len(self.answers) + 1
+        self._socket.send(json.dumps({**request, "number": number}))
+        wait_for(f"an answer to {request}", WALL_LIMIT_S, lambda: number in self.answers)
+        return self.answers[number]
+
+
+def open_page() -> Page:
+    pages: list[Page] = []
+
+    def tried() -> bool:
+        try:
+            pages.append(Page())
+        except (OSError, websockets.exceptions.InvalidHandshake):
+            return False
+        return True
+
+    wait_for("the console to answer", WALL_LIMIT_S, tried)
+    page = pages[0]
+    wait_for(
+        "two connected routers on the page",
+        WALL_LIMIT_S,
+        lambda: sum(node["connected"] for node in list(page.nodes.values())) == 3,
+    )
+    return page
+
+
+class MeshConsoleTest(unittest.TestCase):
+    def setUp(self) -> None:
+        if not rospy.core.is_initialized():
+            rospy.init_node("test_mesh_console")
+
+    def test_1_orders_are_carried_out(self) -> None:
+        log = LogWatch()
+        page = open_page()
+        self.assertIn([202, "202: 5 drones"], page.layouts)
+        self.assertTrue(page.order(do="power", node=1, on=False)["done"])
+        wait_for("1 is off", WALL_LIMIT_S, lambda: not page.nodes["1"]["on"])
+        self.assertTrue(page.order(do="power", node=1, on=True)["done"])
+        wait_for("1 is connected", WALL_LIMIT_S, lambda: page.nodes["1"]["connected"])
+        self.assertTrue(page.order(do="fly", node=2, x=5.0, y=4.0, z=0)["done"])
+        wait_for("2 arrived", WALL_LIMIT_S, lambda: page.nodes["2"]["at"] == [5.0, 4.0, 0.0])
+        self.assertTrue(page.order(do="speed", paused=True, factor=0)["done"])
+        wait_for("paused", WALL_LIMIT_S, lambda: page.clock["paused"])
+        self.assertTrue(page.order(do="speed", paused=False, factor=5)["done"])
+        wait_for("faster", WALL_LIMIT_S, lambda: page.clock["factor"] == 5)
+        self.assertTrue(page.order(do="layout", case=1)["done"])
+        wait_for("1 flies", WALL_LIMIT_S, lambda: page.nodes["1"]["path"])
+        self.assertEqual(log.failures(), [])
+
+    def test_2_what_cannot_be_done_is_answered_in_words(self) -> None:
+        page = open_page()
+        unknown = page.order(do="layout", case=77)
+        self.assertFalse(unknown["done"])
+        self.assertIn("no case 77", unknown["text"])
+        nobody = page.order(do="power", node=200, on=False)
+        self.assertFalse(nobody["done"])
+        self.assertIn("nobody answers at /Nodes/200/powerSwitch", nobody["text"])
+
+    def test_3_after_a_crash_of_the_console_a_page_finds_it_again(self) -> None:
+        open_page()
+        kill_and_wait_for_respawn("/mesh_console")
+        open_page()
+        with urlopen(f"http://{HOST}/", timeout=5) as answer:
+            self.assertIn(b"<title>Drone mesh</title>", answer.read())
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "mesh_console", MeshConsoleTest)
