@@ -225,3 +225,10 @@ def test_a_chip_that_removes_payloads_read_in_part_goes_on_with_the_next(lab):
     ptx.send(b"\x05\x06\x07\x08")
     assert prx.unload(2) == b"\x01\x02"
     assert prx.unload(4) == b"\x05\x06\x07\x08"
+
+
+def test_a_flag_without_a_payload_is_cleared_so_that_the_irq_pin_rises(lab):
+    receiver = lab.driver(10, 100.0)
+    receiver.chip.set_flags(0x40)
+    assert receiver.receive(0.05) == []
+    assert receiver.chip.irq.value
