@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""What rviz is shown: frames and markers; and that rviz itself runs with our configuration."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import unittest
+
+import rosgraph
+import rospkg
+import rospy
+import rostest
+from drone_mesh.srv import PowerSwitch
+from rostest_support import WALL_LIMIT_S, call, wait_for
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+RVIZ_LIMIT_S = 40.0  # software rendering takes its time
+SCREEN = ":94"
+
+
+class MeshMarkersTest(unittest.TestCase):
+    def setUp(self) -> None:
+        if not rospy.core.is_initialized():
+            rospy.init_node("test_mesh_markers")
+        self.markers: dict[tuple[str, int], Marker] = {}
+        self.frames: dict[str, tuple[float, float, float]] = {}
+        self.subscribers = [
+            rospy.Subscriber("/mesh/markers", MarkerArray, self._on_markers),
+            rospy.Subscriber("/tf", TFMessage, self._on_frames),
+        ]
+
+    def tearDown(self) -> None:
+        for subscriber in self.subscribers:
+            subscriber.unregister()
+
+    def _on_markers(self, array: MarkerArray) -> None:
+        for marker in array.markers:
+            if marker.action == Marker.DELETE:
+                self.markers.pop((marker.ns, marker.id), None)
+            else:
+                self.markers[marker.ns, marker.id] = marker
+
+    def _on_frames(self, message: TFMessage) -> None:
+        for transform in message.transforms:
+            place = transform.transform.translation
+            self.frames[transform.child_frame_id] = (place.x, place.y, place.z)
+            self.assertEqual(transform.header.frame_id, "map")
+
+    def points(self, name: str) -> int:
+        marker = self.markers.get((name, 0))
+        return 0 if marker is None else len(marker.points)
+
+    def test_1_everybody_has_a_frame_a_box_a_name_and_the_links_that_are_there(self) -> None:
+        wait_for("frames", WALL_LIMIT_S, lambda: len(self.frames) == 3)
+        self.assertEqual(self.frames["drone_2"], (6.0, 0.0, 0.0))
+        wait_for(
+            "boxes",
+            WALL_LIMIT_S,
+            lambda: (self.points("routers"), self.points("gateways")) == (2, 1),
+        )
+        self.assertEqual(
+            sorted(marker.text for (name, _), marker in self.markers.items() if name == "ids"),
+            ["0", "1", "2"],
+        )
+        # 0 and 1 are 1 m apart, 0 and 2 are 7 m, 1 and 2 are 6 m: three links, two of them ways.
+        wait_for("ways", WALL_LIMIT_S, lambda: self.points("links: way to a gateway") == 4)
+        wait_for("a known link", WALL_LIMIT_S, lambda: self.points("links: known") == 2)
+
+    def test_2_a_node_that_is_off_is_grey_and_its_links_are_lost(self) -> None:
+        wait_for("ways", WALL_LIMIT_S, lambda: self.points("links: way to a gateway") == 4)
+        call("/Nodes/2/powerSwitch", PowerSwitch, False)
+        wait_for("lost links", WALL_LIMIT_S, lambda: self.points("links: just lost") == 4)
+        wait_for("one way left", WALL_LIMIT_S, lambda: self.points("links: way to a gateway") == 2)
+        red, green, blue = (getattr(self.markers["routers", 0].colors[1], c) for c in "rgb")
+        self.assertLess(max(red, green, blue) - min(red, green, blue), 0.1)
+        call("/Nodes/2/powerSwitch", PowerSwitch, True)
+        wait_for("no lost links", WALL_LIMIT_S, lambda: self.points("links: just lost") == 0)
+
+    @unittest.skipUnless(shutil.which("rviz") and shutil.which("Xvfb"), "rviz or Xvfb is missing")
+    def test_3_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:
+        config = os.path.join(rospkg.RosPack().get_path("drone_mesh"), "config", "drone_mesh.rviz")
+        environment = {**os.environ, "DISPLAY": SCREEN, "LIBGL_ALWAYS_SOFTWARE": "1"}
+        screen = subprocess.Popen(
+            ["Xvfb", SCREEN, "-screen", "0", "1000x700x24", "-nolisten", "tcp"]
+        )
+        rviz = None
+        try:
+            wait_for(
+                "a screen", WALL_LIMIT_S, lambda: os.path.exists(f"/tmp/.X11-unix/X{SCREEN[1:]}")
+            )
+            rviz = subprocess.Popen(["rviz", "-d", config, "__name:=test_rviz"], env=environment)
+            wait_for("rviz to subscribe", RVIZ_LIMIT_S, self._rviz_looks)
+            self.assertIsNone(rviz.poll(), "rviz ended")
+        finally:
+            for process in (rviz, screen):
+                if process is not None:
+                    process.terminate()
+                    process.wait(timeout=WALL_LIMIT_S)
+
+    def _rviz_looks(self) -> bool:
+        _publishers, subscribers, _services = rosgraph.Master("/test").getSystemState()
+        return "/test_rviz" in dict(subscribers).get("/mesh/markers", [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "mesh_markers", MeshMarkersTest)
