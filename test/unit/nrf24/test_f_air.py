@@ -62,6 +62,19 @@ def test_a_frame_that_began_before_the_receiver_listened_is_not_heard(lab):
     assert prx.unload_all() == []
 
 
+def test_a_receiver_that_looks_away_in_mid_frame_does_not_hear_it(lab):
+    prx = lab.wires("prx", 100.0).become_prx()
+    one = broadcasting(lab, "one", 0.0)
+    one.load(no_ack=True)
+    one.pulse()
+    lab.wait_us(300)
+    prx.chip.ce.value = False
+    lab.wait_us(10)
+    prx.chip.ce.value = True
+    lab.wait_us(5_000)
+    assert prx.unload_all() == []
+
+
 def test_row_48_a_node_that_comes_into_range_is_reached():
     lab = Lab(IdealDisc(9.0))
     sender, receiver = lab.driver(5), lab.driver(10, 9.0)
