@@ -337,16 +337,19 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         identity = b""
         if creator == self._node_id:
             self._drop_circulating(payload, forward, routing.get_direction_to_node(forward))
+            self._stranded(kind, forward)
             return
         if kind != _HEARTBEAT:
             identity = payload[:1] + payload[2:3] + payload[4:]
             first = self._circulation.came_round(identity, from_, self._now_s)
             if first is not None:
                 self._drop_circulating(payload, forward, first.went_to)
+                self._stranded(kind, forward)
                 return
         for _attempt in range(2):
             to = routing.get_direction_to_node(forward)
             if to in (NO_ROUTE, from_):
+                self._stranded(kind, forward)
                 self._tell_missing(forward, first=from_)
                 return
             sent_on = messages.next_hop(payload, self._node_id, to)
@@ -357,6 +360,14 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
                 if identity:
                     self._circulation.passed(identity, from_, to, self._now_s)
                 return
+        self._stranded(kind, forward)
+
+    def _stranded(self, kind: int, forward: int) -> None:
+        """People want to know of an order that goes no further, though its gateway had a route."""
+        if kind == MessageType.MOVE_TO_LOCATION:
+            reason = f"no route to drone {forward}"
+            self.complaints.add(reason, "an order for it ends here", self._now_s)
+            self._report(MeshEventKind.NO_ROUTE, forward)
 
     def _drop_circulating(self, payload: bytes, forward: int, used: int) -> None:
         self._drop("a packet that goes round in circles", payload)

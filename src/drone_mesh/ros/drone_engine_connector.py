@@ -48,11 +48,6 @@ class RosDroneEngineConnector(IDroneEngine):
             raise LocationUnknown(str(error)) from error
         return Location(answer.latitude, answer.longitude, float(answer.height))
 
-    def close(self) -> None:
-        """Give connection and topic back."""
-        self._gps.close()
-        self._goal.unregister()
-
     def _ask(self) -> Location:
         if not self._gps.is_connected():
             if time.monotonic() < self._gone_until_s:

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import MeshObserver
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.execution import Seat
+from drone_mesh.internet.http_internet import DEFAULT_PORT, HttpInternet
+from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.ros.drone_engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.internet_mock import RosInternetMock
-from drone_mesh.ros.simulator_link import SimulatorLink
-from drone_mesh.ros.virtual_nrf24 import VirtualNRF24
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class MeshSettings:
     seed: int
     debug: bool
     observer: MeshObserver
+    internet: str  # "mock" or "http"
 
 
 class VirtualRaspberryPi(abc.ABC):
@@ -38,14 +40,14 @@ class VirtualRaspberryPi(abc.ABC):
     """
 
     def __init__(
-        self, node_id: int, settings: MeshSettings, link: SimulatorLink, seat: Seat
+        self, node_id: int, settings: MeshSettings, antenna: IWirelessCommunication, seat: Seat
     ) -> None:
         """Raises ConfigurationError for a routing technique that does not exist."""
         self.node_id = node_id
         self.settings = settings
         self.routing = create_routing_technique(settings.routing)
         self.engine = RosDroneEngineConnector(node_id)
-        self.antenna = VirtualNRF24(node_id, link, seat)
+        self.antenna = antenna
         self.rng = random.Random(f"{settings.seed}/{node_id}")
         self.seat = seat
         self.component = self._make_component()
@@ -55,10 +57,9 @@ class VirtualRaspberryPi(abc.ABC):
         self.component.start(now_s)
         self.seat.take(self.component)
 
-    def stop(self) -> None:
-        """Switch off, and leave the ROS graph."""
+    def stop(self, _now_s: float) -> None:
+        """Switch off."""
         self.component.stop()
-        self.engine.close()
 
     @abc.abstractmethod
     def _make_component(self) -> MeshnetworkComponent:
@@ -90,9 +91,17 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
             self.antenna,
             self.engine,
             self.routing,
-            RosInternetMock(self.node_id, self.seat),
+            self._make_internet(),
             rng=self.rng,
             timing=self.settings.timing,
             observer=self.settings.observer,
             debug=self.settings.debug,
+        )
+
+    def _make_internet(self) -> IInternetConnection:
+        mock = RosInternetMock(self.node_id, self.seat)
+        if self.settings.internet == "mock":
+            return mock
+        return SeveralInternets(
+            mock, HttpInternet(self.seat.submit, port=DEFAULT_PORT + self.node_id)
         )

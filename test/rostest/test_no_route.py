@@ -1,0 +1,36 @@
+#!/usr/bin/env python3
+"""An order to a drone that the gateway cannot reach."""
+
+from __future__ import annotations
+
+import time
+import unittest
+
+import rospy
+import rostest
+from drone_mesh.srv import RequestDroneFlight
+from rostest_support import LogWatch, MeshWatch, call, wait_for
+
+LIMIT_S = 5.0
+
+
+class NoRouteTest(unittest.TestCase):
+    def test_it_does_not_move_the_call_returns_and_the_log_names_it(self) -> None:
+        rospy.init_node("test_no_route")
+        log = LogWatch()
+        mesh = MeshWatch(3)
+        mesh.wait("all connected", 30, mesh.connected)
+        start_place = mesh.place(2)
+        mesh.switch(2, False)
+        begun_s = time.monotonic()
+        answer = call("/DroneManager/requestDroneMovement", RequestDroneFlight, 2, 4.0, 3.0, 0)
+        self.assertLess(time.monotonic() - begun_s, LIMIT_S)
+        self.assertEqual(answer.status, 1)
+        wait_for("no line that names drone 2", 10, lambda: log.lines("no route to drone 2"))
+        mesh.pass_time(3.0)
+        self.assertEqual(mesh.place(2), start_place)
+        self.assertEqual(log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "no_route", NoRouteTest)
