@@ -31,6 +31,8 @@ class FactoryConfiguration:
     gui: bool = False
     real_time_factor: float = 1.0  # 0: as fast as possible
     max_distance: float = 9.0  # metres; in range is nearer than this
+    radio: str = "virtual"  # or "nrf24": the real driver on emulated chips
+    internet: str = "mock"  # or "http": gateways also take orders over HTTP
     routing: str = "child_table_tree"
     check_period: float = 10.0  # seconds
     connection_lost_after: float = 30.0  # seconds
@@ -131,6 +133,16 @@ def _seed(value: object) -> int | None:
     return int(number)
 
 
+def _one_of(*words: str) -> _Rule:
+    def convert(value: object) -> str:
+        word = str(value).strip()
+        if word not in words:
+            raise ValueError
+        return word
+
+    return _Rule(" or ".join(words), convert)
+
+
 _SWITCH = _Rule("true or false", _switch)
 _RULES: dict[str, _Rule] = {
     "gateways": _whole(0, 254, "a whole number of drones"),
@@ -140,6 +152,8 @@ _RULES: dict[str, _Rule] = {
     "gui": _SWITCH,
     "real_time_factor": _at_least(0.0, 1000.0, "a factor (0: as fast as possible)"),
     "max_distance": _above_zero(10_000.0, "metres"),
+    "radio": _one_of("virtual", "nrf24"),
+    "internet": _one_of("mock", "http"),
     "routing": _Rule("the name of a routing technique", _name),
     "check_period": _at_least(0.1, 3600.0, "seconds"),
     "connection_lost_after": _at_least(0.1, 3600.0, "seconds"),

@@ -9,6 +9,7 @@ import rospy
 
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.ros.emulated_nrf24 import EmulatedRadios
 from drone_mesh.ros.engine_server import EngineServer, PositionReporter
 from drone_mesh.ros.fleet import mesh_settings, tell_hosts
 from drone_mesh.ros.logs import show_library_logs_on_rosout
@@ -37,6 +38,17 @@ def _read_parameters() -> tuple[FactoryConfiguration, MeshSettings, int]:
     hosts = str(rospy.get_param("~hosts", "") or 1)
     if not hosts.isdigit():
         raise ConfigurationError(f"argument: hosts is {hosts!r}, want a whole number, 0 or more")
+    if configuration.radio == "nrf24":
+        if int(hosts) != 1:
+            raise ConfigurationError(
+                f"argument: hosts is {hosts}, but with radio nrf24 all chips are on one air, "
+                "which lives in one process: want 1"
+            )
+        if configuration.real_time_factor != 1.0:
+            raise ConfigurationError(
+                f"real_time_factor is {configuration.real_time_factor:g}, but with radio nrf24 the "
+                "chips live by the time of the wall: want 1"
+            )
     return configuration, mesh_settings(configuration), int(hosts)
 
 
@@ -49,7 +61,7 @@ def main() -> None:
     rospy.init_node("DroneFactory", disable_signals=True)
     show_library_logs_on_rosout()
     configuration, settings, hosts = or_stop(_read_parameters)
-    host = None
+    host = radios = None
     with OrderlyStop() as stop, BulletWorld() as world:
         factory = DroneFactory(
             world,
@@ -71,15 +83,20 @@ def main() -> None:
                 return
             EngineServer(drone, reporter)
         if hosts == 1 and factory.drones:
-            host = MeshHost(settings, lambda: world.now_s)
+            if configuration.radio == "nrf24":
+                radios = EmulatedRadios(
+                    factory.drones, configuration.max_distance, configuration.seed
+                )
+            else:
+                _log.info("radio virtual: an ideal disc of %g m", configuration.max_distance)
+            host = MeshHost(settings, lambda: world.now_s, radios)
             host.start()
-            host.wait_for_simulator(stop.requested)
+            if radios is None:
+                host.wait_for_simulator(stop.requested)
             host.serve(drone.node_id for drone in factory.drones)
         tell_hosts(configuration)
         try:
-            runner = WorldRunner(
-                world, configuration.real_time_factor, None if host is None else host.executor
-            )
+            runner = WorldRunner(world, configuration.real_time_factor, host)
             state = MeshStatePublisher(
                 lambda: WorldView(
                     world.now_s,
@@ -100,3 +117,5 @@ def main() -> None:
         finally:
             if host is not None:
                 host.stop()
+            if radios is not None:
+                radios.close()

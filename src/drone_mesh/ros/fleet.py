@@ -24,6 +24,7 @@ def mesh_settings(configuration: FactoryConfiguration) -> MeshSettings:
         seed=configuration.seed,
         debug=configuration.debug,
         observer=ignore_events,
+        internet=configuration.internet,
     )
 
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-import threading
-from typing import Callable
-
 import rospy
 
 from drone_mesh.communication.interfaces import (
@@ -15,16 +11,10 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.messages import FROM
 from drone_mesh.execution import Seat
-from drone_mesh.msg import NRF24, NodeDebugInfo
+from drone_mesh.msg import NRF24
 from drone_mesh.ros import names
+from drone_mesh.ros.antenna_panel import AntennaPanel
 from drone_mesh.ros.simulator_link import SimulatorLink
-from drone_mesh.srv import PowerSwitch, PowerSwitchResponse
-
-DEBUG_PERIOD_S = 1.0  # reference, section 4: 1 Hz
-SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers at the latest after this (wall) time
-_MAX_UINT16 = 0xFFFF
-
-_log = logging.getLogger(__name__)
 
 
 class VirtualNRF24(IWirelessCommunication):
@@ -47,9 +37,7 @@ class VirtualNRF24(IWirelessCommunication):
         self._on = False
         self._mesh: IMeshNetwork | None = None
         self._subscriber: rospy.Subscriber | None = None
-        self._switch: rospy.Service | None = None
-        self._debug_publisher: rospy.Publisher | None = None
-        self._stop_debugging: Callable[[], None] | None = None
+        self._panel = AntennaPanel(node_id, seat, self.on, self._switch_power)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Power on, subscribe, announce; the simulator need not be there yet."""
@@ -58,21 +46,19 @@ class VirtualNRF24(IWirelessCommunication):
         self._subscriber = rospy.Subscriber(
             names.node_topic(self.node_id), NRF24, self._heard, tcp_nodelay=True
         )
-        self._switch = rospy.Service(
-            names.power_switch(self.node_id), PowerSwitch, self._power_switched
-        )
+        self._panel.start()
         self._link.add(self, lambda: self._seat.submit(mesh.on_antenna_registered))
 
     def stop_antenna(self) -> None:
         """Power off, and leave the ROS graph."""
-        if self._subscriber is None or self._switch is None:
+        if self._subscriber is None:
             return
         self._on = False
         self._link.announce(self)
         self._link.remove(self)
         self._subscriber.unregister()
-        self._switch.shutdown()
-        self._subscriber = self._switch = self._mesh = None
+        self._panel.stop()
+        self._subscriber = self._mesh = None
 
     def send_message_to(self, payload: bytes) -> bool:
         """To the node in byte 3. False: it did not get it, or there is no simulator."""
@@ -85,34 +71,11 @@ class VirtualNRF24(IWirelessCommunication):
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Start or stop to publish NodeDebugInfo."""
-        if self._stop_debugging is not None and self._debug_publisher is not None:
-            self._stop_debugging()
-            self._debug_publisher.unregister()
-            self._stop_debugging = self._debug_publisher = None
-        if on:
-            publisher = rospy.Publisher(
-                names.debug_topic(self.node_id), NodeDebugInfo, queue_size=2
-            )
-            self._debug_publisher = publisher
-            self._stop_debugging = self._seat.call_every(
-                DEBUG_PERIOD_S, lambda _now_s: publisher.publish(self._debug_info(info))
-            )
+        self._panel.debugging_mode(info, on)
 
     def on(self) -> bool:
         """Whether the antenna has power."""
         return self._on
-
-    def _debug_info(self, info: IMeshDebugInfo) -> NodeDebugInfo:
-        return NodeDebugInfo(
-            nodeID=self.node_id,
-            ConnectedWithGateway=info.get_connected_to_gateway(),
-            familySize=min(info.get_router_tech_table_size(), _MAX_UINT16),
-            totalMessages=info.get_total_message_sent(),
-            prefferedGateWay=info.get_preferred_gateway(),
-            on=self._on,
-            hops=info.get_hops_from_gateway_away(),
-            prefLoc=info.get_last_good_known_location_id(),
-        )
 
     # Threads of rospy ------------------------------------------------------------------------
 
@@ -127,18 +90,9 @@ class VirtualNRF24(IWirelessCommunication):
         if self._on and self._mesh is not None:
             self._mesh.on_msg(payload, now_s)
 
-    def _power_switched(self, request: PowerSwitch) -> PowerSwitchResponse:
+    def _switch_power(self, on: bool) -> None:
         mesh = self._mesh
-        if mesh is not None and request.power != self._on:
-            self._on = request.power
+        if mesh is not None:
+            self._on = on
             self._link.announce(self)
-            done = threading.Event()
-
-            def switch(now_s: float) -> None:
-                mesh.on_antenna_power(request.power, now_s)
-                done.set()
-
-            self._seat.submit(switch)
-            if not done.wait(SWITCH_TIMEOUT_S):
-                _log.warning("node %d: switched, but the node has not noticed yet", self.node_id)
-        return PowerSwitchResponse()
+            self._seat.submit(lambda now_s: mesh.on_antenna_power(on, now_s))

@@ -5,13 +5,12 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import Callable
+from typing import Callable, Protocol
 
 import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32, Header
 
-from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros import names
 from drone_mesh.ros.pace import Pace
 from drone_mesh.srv import SetSpeed, SetSpeedResponse
@@ -28,11 +27,21 @@ _PAUSE_NAP_S = 0.02
 _log = logging.getLogger(__name__)
 
 
+class PacedNodes(Protocol):
+    """Nodes that live by the time of the world."""
+
+    def lag_s(self, now_s: float) -> float:
+        """For how many simulated seconds the oldest undone work has been waiting."""
+
+    def time_advanced(self) -> None:
+        """The world has made a step."""
+
+
 class _Hosts:
     """How far the nodes have worked: those of this process, and of hosts in other ones."""
 
-    def __init__(self, executor: MeshExecutor | None) -> None:
-        self._executor = executor
+    def __init__(self, nodes: PacedNodes | None) -> None:
+        self._nodes = nodes
         # Host -> (simulated, monotonic) seconds of what it said last. Filled by rospy's threads.
         self._progress: dict[str, tuple[float, float]] = {}
         rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._heard, tcp_nodelay=True)
@@ -42,7 +51,7 @@ class _Hosts:
 
     def lag_s(self, now_s: float) -> float:
         """For how many simulated seconds the oldest undone work has been waiting."""
-        lag_s = 0.0 if self._executor is None else self._executor.lag_s(now_s)
+        lag_s = 0.0 if self._nodes is None else self._nodes.lag_s(now_s)
         for host, (done_s, said_s) in list(self._progress.items()):
             if time.monotonic() - said_s > HOST_TIMEOUT_S:
                 _log.warning("host %s is silent, the world goes on without it", host)
@@ -52,8 +61,8 @@ class _Hosts:
         return lag_s
 
     def time_advanced(self) -> None:
-        if self._executor is not None:
-            self._executor.time_advanced()
+        if self._nodes is not None:
+            self._nodes.time_advanced()
 
 
 class WorldRunner:
@@ -67,10 +76,10 @@ class WorldRunner:
     time slows down, and no timer is late. `_paused` and `_wanted` are set by rospy's threads.
     """
 
-    def __init__(self, world: World, factor: float, executor: MeshExecutor | None) -> None:
-        """`executor` drives the nodes of this process, if there are any."""
+    def __init__(self, world: World, factor: float, nodes: PacedNodes | None) -> None:
+        """`nodes` are those of this process, if there are any."""
         self._world = world
-        self._hosts = _Hosts(executor)
+        self._hosts = _Hosts(nodes)
         self._paused = False
         self._wanted = factor
         self._clock = rospy.Publisher(names.CLOCK_TOPIC, Clock, tcp_nodelay=True, queue_size=100)

@@ -1,0 +1,22 @@
+"""SeveralInternets: a gateway that can be reached in more than one way."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
+
+
+class SeveralInternets(IInternetConnection):
+    """Connects and disconnects all of them."""
+
+    def __init__(self, *connections: IInternetConnection) -> None:
+        self._connections = connections
+
+    def connect(self, commands: IGatewayCommands) -> None:
+        """Connect all, in their order."""
+        for connection in self._connections:
+            connection.connect(commands)
+
+    def disconnect(self) -> None:
+        """Disconnect all."""
+        for connection in self._connections:
+            connection.disconnect()
