@@ -40,10 +40,11 @@ INK: Colour = (0.09, 0.12, 0.16, 1.0)
 FAINT_INK: Colour = (0.42, 0.46, 0.50, 1.0)
 
 LEGEND_WIDTH = 168  # pixels
+NARROWEST_WITH_LEGEND = 500  # pixels; a picture of less width is all map
 DRONE_PIXELS = 24  # about as wide as a drone should be
 SMALLEST_ID, LARGEST_ID = 9.0, 15.0  # pixels: height of the text
 GRID_LINES = 12  # about as many as should be seen across
-MARGINS = Margins(left=64, top=56, right=LEGEND_WIDTH + 24, bottom=56)  # pixels
+MARGINS = Margins(left=64, top=56, right=24, bottom=56)  # pixels
 LIGHT_FROM = (-3.0, -6.0, 12.0)
 
 
@@ -54,7 +55,7 @@ def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE)
     written.
     """
     canvas_size = (size[0] * OVERSAMPLING, size[1] * OVERSAMPLING)
-    margins = Margins(*(side * OVERSAMPLING for side in MARGINS))
+    margins = Margins(*(side * OVERSAMPLING for side in margins_of(size)))
     camera = frame(Camera(canvas_size), scene.points(), margins)
     wanted = DRONE_PIXELS * OVERSAMPLING / camera.pixels_per_metre() / DRONE_WIDTH_M
     scale = drawing_scale(scene.drones, wanted)
@@ -66,9 +67,19 @@ def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE)
     _draw_flights(sketch, scene.drones, scale)
     _paste_boxes(image, camera, scene.drones, scale)
     _draw_ids(sketch, scene.drones, scale)
-    _draw_legend(sketch, scene)
+    if _has_legend(size):
+        _draw_legend(sketch, scene)
     sketch.words((16, 12), scene.title, 20, INK, anchor="la")
     image.resize(size, Image.Resampling.LANCZOS).save(path, format="PNG")
+
+
+def margins_of(size: tuple[int, int]) -> Margins:
+    """Where no drone is drawn in a picture of that size: numbers, title and legend stand there."""
+    return MARGINS._replace(right=MARGINS.right + LEGEND_WIDTH) if _has_legend(size) else MARGINS
+
+
+def _has_legend(size: tuple[int, int]) -> bool:
+    return size[0] >= NARROWEST_WITH_LEGEND
 
 
 def _draw_ground(sketch: Sketch, drones: Sequence[DronePicture], scale: float) -> None:
