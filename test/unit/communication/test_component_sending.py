@@ -120,6 +120,29 @@ def test_a_packet_that_is_taken_counts_as_sent_and_teaches():
     assert bench.routing.get_direction_to_node(5) == 5
 
 
+def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
+    """Whatever technique it is: this one is told, and has no table to guess from."""
+    told = []
+
+    class Told(ChildTableTree):
+        def can_communicate_with_node(self, node):
+            told.append(("can", node))
+            super().can_communicate_with_node(node)
+
+        def cant_communicate_with_node(self, node):
+            told.append(("cannot", node))
+            return super().cant_communicate_with_node(node)
+
+    antenna = RecordingAntenna()
+    mesh = MeshnetworkRouter(1, antenna, BenchEngine(), Told(), AlwaysHalf())
+    mesh.start(0.0)
+    mesh.on_msg(packet(ASK), 0.0)
+    assert told == [("can", 5), ("can", 5)]  # heard, and has taken the answer
+    antenna.dead = {5}
+    mesh.on_msg(packet(ASK), 0.0)
+    assert told[2:] == [("can", 5), ("cannot", 5)]
+
+
 def test_broadcasts_do_not_count_as_sent():
     bench = Bench()
     bench.mesh.search_other_nodes_in_range()
