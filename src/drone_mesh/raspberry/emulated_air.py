@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import random
 from pathlib import Path
 
@@ -19,22 +20,25 @@ from drone_mesh.nrf24.settings import DataRate, RadioSettings
 # From one column to the next: 0.7 of the distance at which one frame in four is lost (0 dBm, path
 # loss exponent 2.7). So the next column is in reach, the one after it is not.
 COLUMN_M = {DataRate.KBPS_250: 70.0, DataRate.MBPS_1: 32.0, DataRate.MBPS_2: 25.0}
-_ROW_COLUMNS = 0.25  # the rows lie that many columns to the left and to the right
+MOST_COLUMNS = 4  # of routers; over more hops, collisions make the answers of a gateway too late
+FEWEST_IN_COLUMN = 2  # so that each router has a detour
+_COLUMN_WIDTH = 0.5  # from its first to its last router, in distances between columns
 
 
 _log = logging.getLogger(__name__)
 
 
 class EmulatedAir:
-    """Makes emulated radios: node 0, then pairs of nodes, each pair further away than the last."""
+    """Makes emulated radios: node 0, then columns of nodes, each further away than the last."""
 
-    def __init__(self, settings: RadioSettings, trace_file: Path | None = None) -> None:
+    def __init__(self, settings: RadioSettings, nodes: int, trace_file: Path | None = None) -> None:
         """Starts a thread that `close` ends. ConfigurationError if the file cannot be written."""
         self._trace_file = trace_file
         self._trace = FrameTrace()
         if trace_file is not None:
             self._write_trace(trace_file)
-        self._settings = settings
+        self._column_m = COLUMN_M[settings.data_rate]
+        self._in_column = max(FEWEST_IN_COLUMN, math.ceil((nodes - 1) / MOST_COLUMNS))
         self._clock = WallClock()
         self._air = Air(self._clock, LogDistance(random.Random()), random.Random())
         if trace_file is not None:
@@ -42,10 +46,13 @@ class EmulatedAir:
 
     def place(self, node_id: int) -> Location:
         """Where a node stands."""
-        column_m = COLUMN_M[self._settings.data_rate]
-        column, row = (node_id + 1) // 2, node_id % 2
-        side = (_ROW_COLUMNS if row else -_ROW_COLUMNS) if node_id else 0.0
-        return Location(latitude=side * column_m, longitude=column * column_m, height=0.0)
+        if node_id == 0:
+            return Location(0.0, 0.0, 0.0)
+        column, row = divmod(node_id - 1, self._in_column)
+        side = _COLUMN_WIDTH * (row / (self._in_column - 1) - 0.5)
+        return Location(
+            latitude=side * self._column_m, longitude=(column + 1) * self._column_m, height=0.0
+        )
 
     def radio(self, node_id: int, settings: RadioSettings) -> NRF24LowLevelInterface:
         """The driver of a new chip at the place of that node."""

@@ -28,7 +28,7 @@ MakeInternet = Callable[[Callable[[Work], None]], IInternetConnection]
 
 
 class RadioNode:
-    """A router, or a gateway if it is given an internet side. Belongs to the thread that made it.
+    """A router, or a gateway if it is given an internet side. One thread at a time may use it.
 
     The node's own thread works in the component, from start to stop.
     """
@@ -56,14 +56,11 @@ class RadioNode:
         self._seat.submit(lambda _now_s: self._seat.take(self.component))
         self._executor.start()
 
-    def switch_off(self) -> None:
-        """Off the air; what the software still wants to send fails at once."""
-        self._antenna.switch_power(False)
-
     def stop(self) -> None:
         """End the software and its thread, and give the radio back, powered down."""
         if self._started:
             self._started = False
+            self._antenna.switch_power(False)  # what is still to be sent fails at once
             self._seat.submit(lambda _now_s: self.component.stop())
             self._executor.stop()
             counters = dataclasses.asdict(self._antenna.statistics())

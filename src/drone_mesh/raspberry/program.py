@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from types import FrameType
 from typing import Callable, Iterator, Sequence
 
@@ -66,10 +67,7 @@ def _signals() -> Iterator[threading.Event]:
 def _run(options: Options, ended: threading.Event) -> None:
     with contextlib.ExitStack() as stack:
         nodes = _emulated_nodes(options, stack) if options.emulated else [_real_node(options)]
-        for node in nodes:
-            stack.callback(node.stop)
-        # Called before any stop: so no node spends the end on calling those that are gone.
-        stack.callback(_switch_off, nodes)
+        stack.callback(_stop, nodes)
         for node in nodes:
             node.start()
         watch = _Watch(nodes, options)
@@ -78,9 +76,11 @@ def _run(options: Options, ended: threading.Event) -> None:
         _log.info("ending")
 
 
-def _switch_off(nodes: Sequence[RadioNode]) -> None:
-    for node in nodes:
-        node.switch_off()
+def _stop(nodes: Sequence[RadioNode]) -> None:
+    """All at once: one after the other they would spend the end on calling those that are gone."""
+    with ThreadPoolExecutor(len(nodes)) as pool:
+        for stopped in [pool.submit(node.stop) for node in nodes]:
+            stopped.result()
 
 
 def _real_node(options: Options) -> RadioNode:
@@ -118,7 +118,7 @@ def _open_radio(
 
 
 def _emulated_nodes(options: Options, stack: contextlib.ExitStack) -> list[RadioNode]:
-    air = EmulatedAir(options.radio, options.trace)
+    air = EmulatedAir(options.radio, options.emulated, options.trace)
     stack.callback(air.close)
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
     return [

@@ -102,7 +102,7 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --latitude 5001", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --longitude inf", "longitude inf is not a finite number"),
         ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
-        ("--emulated 1", "'1' is not a whole number of 2..32"),
+        ("--emulated 1", "'1' is not a whole number of 2..17"),
         ("--id 3 --log-level loud", "invalid choice: 'loud'"),
         ("--id 3 --port 9080", "unrecognized arguments: --port"),
     ],
