@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import random
-from typing import Callable, Iterable
+from typing import Callable, Iterable, Mapping
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import (
@@ -11,7 +12,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.inprocess.clock import VirtualClock
 
 HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)
@@ -47,6 +48,7 @@ class InProcessAir:
         # Who hears whom among those that stand still: it changes with who comes, goes and flies,
         # and is looked up for each packet.
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
+        self._standing: dict[int, Location] = {}  # where those are
         self._flying: set[int] = set()
         self.delivered = 0
 
@@ -79,12 +81,17 @@ class InProcessAir:
         """The antennas that `node` could reach if they were on, by id. Do not change it."""
         links = self._links.get(node)
         if links is None:
-            return self._heard_by(node, self._antennas)
+            return self._heard_by(node, self._places(self._antennas))
         if self._flying:
-            return {**links, **self._heard_by(node, self._flying & self._antennas.keys())}
+            return {**links, **self._heard_by(node, self._places(self._flying))}
         return links
 
-    def _heard_by(self, node: int, others: Iterable[int]) -> dict[int, InProcessAntenna]:
+    def _places(self, nodes: Iterable[int]) -> dict[int, Location]:
+        """Where those of these nodes are that are in the air at all."""
+        antennas = self._antennas
+        return {node: antennas[node].drone.get_location() for node in nodes if node in antennas}
+
+    def _heard_by(self, node: int, others: Mapping[int, Location]) -> dict[int, InProcessAntenna]:
         antennas = self._antennas
         if node not in antennas:
             return {}
@@ -92,8 +99,8 @@ class InProcessAir:
         reach_m = self.max_distance_m
         heard = {
             other: antennas[other]
-            for other in others
-            if here.distance_m(antennas[other].drone.get_location()) < reach_m
+            for other, there in others.items()
+            if math.dist(here, there) < reach_m
         }
         heard.pop(node, None)
         if self._cut:
@@ -103,12 +110,14 @@ class InProcessAir:
     def _link(self, node: int) -> None:
         """Find the links of a node that stands; nothing for one that flies or is not there."""
         if node in self._antennas and node not in self._flying:
-            links = self._heard_by(node, self._links)
+            links = self._heard_by(node, self._standing)
             self._links[node] = links
+            self._standing[node] = self._antennas[node].drone.get_location()
             for other in links:
                 self._links[other][node] = self._antennas[node]
 
     def _unlink(self, node: int) -> None:
+        self._standing.pop(node, None)
         for other in self._links.pop(node, ()):
             del self._links[other][node]
 
@@ -116,7 +125,7 @@ class InProcessAir:
         """Hand a packet over; True when the receiver has it, or will in a moment."""
         sender, to = payload[messages.FROM], payload[messages.TO]
         if self._flying and (sender in self._flying or to in self._flying):
-            receiver = self._heard_by(sender, self._antennas.keys() & {to}).get(to)
+            receiver = self._heard_by(sender, self._places((to,))).get(to)
         else:
             links = self._links.get(sender)
             receiver = links.get(to) if links else None
