@@ -88,7 +88,7 @@ def phases_of(outage: Outage, end_s: float) -> list[tuple[float, float, str, str
             name, colour = PHASES[0][1:] if outage.decided_s is None else PHASES[2][1:]
         elif attribute == "decided_s" and outage.emergency_s is None:
             name, colour = PHASES[0][1:]
-        stop_s = end_s if stop_s is None else stop_s
+        stop_s = end_s if stop_s is None else min(stop_s, outage.connected_s or end_s)
         if stop_s > start_s:
             phases.append((start_s, stop_s, name, colour))
         start_s = max(start_s, stop_s)

@@ -53,7 +53,7 @@ def repair_rows(story: RunStory) -> list[dict[str, str]]:
             "decided": _seconds(outage.lost_s, outage.decided_s),
             "flown": _seconds(outage.decided_s, outage.landed_s),
             "place": "–" if outage.place_of is None else str(outage.place_of),
-            "connected": _seconds(outage.landed_s or outage.lost_s, outage.connected_s),
+            "connected": _seconds(_stood_s(outage), outage.connected_s),
             "total": _seconds(_began_s(outage), outage.connected_s),
             "on_ground": _on_ground(outage),
         }
@@ -87,6 +87,15 @@ def _cell(value: object) -> object:
     return " ".join(map(str, value)) if isinstance(value, tuple) else value
 
 
+def _stood_s(outage: Outage) -> float:
+    """When it could be connected at all: it had landed, or was lost and stayed where it was."""
+    if outage.landed_s is None:
+        return outage.lost_s
+    return (
+        outage.landed_s if outage.connected_s is None else min(outage.landed_s, outage.connected_s)
+    )
+
+
 def _began_s(outage: Outage) -> float:
     return outage.lost_s if outage.cause_s is None else outage.cause_s
 
@@ -101,5 +110,5 @@ def _on_ground(outage: Outage) -> str:
         return "–"
     flown_s = 0.0
     if outage.decided_s is not None and outage.landed_s is not None:
-        flown_s = outage.landed_s - outage.decided_s
+        flown_s = _stood_s(outage) - outage.decided_s
     return f"{outage.connected_s - _began_s(outage) - flown_s:.1f} s"

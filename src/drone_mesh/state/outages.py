@@ -27,7 +27,7 @@ class Outage:
     emergency_s: float | None = None  # its patience ran out
     decided_s: float | None = None  # it decided to fly
     place_of: int | None = None  # the node whose place it took
-    landed_s: float | None = None
+    landed_s: float | None = None  # it noticed that it stands: may be after it is connected
     connected_s: float | None = None
     switched_off: bool = False  # it was switched off itself: nothing to repair
 
@@ -38,13 +38,12 @@ class Outage:
 
 
 def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
-    """Each time that a node which had been connected was without a gateway, in order of loss.
+    """Each time that a node lost its gateway and was without one, in order of loss.
 
     A node that flies because it was ordered to is lost, too, until it is connected again.
     """
     done: list[Outage] = []
     open_of: dict[int, Outage] = {}
-    connected = set()
     power_offs: list[tuple[float, int]] = []
     for event in sorted(events, key=lambda event: event.stamp_s):
         node = event.node
@@ -53,15 +52,15 @@ def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
             power_offs.append((event.stamp_s, node))
             if outage is not None:
                 open_of[node] = replace(outage, switched_off=True)
-        elif event.kind == _DISCONNECTED and node in connected:
-            connected.discard(node)
+        elif event.kind == _DISCONNECTED:
             open_of[node] = _new_outage(event, power_offs)
         elif event.kind == _CONNECTED:
-            connected.add(node)
             if outage is not None:
                 done.append(replace(open_of.pop(node), connected_s=event.stamp_s))
         elif outage is not None:
             open_of[node] = _with_phase(outage, event)
+        elif event.kind == _LANDED:
+            _land_afterwards(done, event)
     return sorted([*done, *open_of.values()], key=lambda outage: (outage.lost_s, outage.node))
 
 
@@ -72,6 +71,16 @@ def _new_outage(event: EventRecord, power_offs: Sequence[tuple[float, int]]) -> 
         if stamp_s == event.stamp_s:
             return Outage(event.node, event.stamp_s, switched_off=True)
     return Outage(event.node, event.stamp_s)
+
+
+def _land_afterwards(done: list[Outage], event: EventRecord) -> None:
+    """A drone looks once a second whether it stands, and may be connected before that."""
+    for index in range(len(done) - 1, -1, -1):
+        outage = done[index]
+        if outage.node == event.node:
+            if outage.decided_s is not None and outage.landed_s is None:
+                done[index] = replace(outage, landed_s=event.stamp_s)
+            return
 
 
 def _with_phase(outage: Outage, event: EventRecord) -> Outage:

@@ -85,6 +85,15 @@ def test_the_phases_of_a_bar_follow_one_another():
     ]
 
 
+def test_who_is_connected_before_it_lands_flew_until_it_was_connected():
+    late = [*EVENTS[:-2], EventRecord(142.5, 2, "connected", (0,)), EventRecord(143.0, 2, "landed")]
+    story = tell_story(STATES, late)
+    (row,) = repair_rows(story)
+    assert (row["flown"], row["connected"], row["on_ground"]) == ("5.0 s", "0.0 s", "38.0 s")
+    *_, (start, stop, name, _colour) = phases_of(story.outages[0], 150.0)
+    assert (start, stop, name) == (138.0, 142.5, "flies")
+
+
 def test_a_loss_that_lasts_is_drawn_to_the_end():
     (outage,) = tell_story(STATES[:3], EVENTS[:7]).outages
     assert [(start, stop) for start, stop, *_ in phases_of(outage, 150.0)] == [(101.0, 150.0)]

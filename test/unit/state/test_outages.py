@@ -36,14 +36,26 @@ def test_a_repair_has_its_phases():
     assert repair.seconds == 50.5
 
 
+def test_a_drone_may_be_connected_before_it_notices_that_it_stands():
+    late = [*REPAIR[:-2], *story((153.5, 3, "connected", 0), (154.0, 3, "landed"))]
+    *_, repair = find_outages(late)
+    assert (repair.landed_s, repair.connected_s) == (154.0, 153.5)
+
+
+def test_a_landing_long_after_is_none_of_the_repair():
+    *_, repair = find_outages([*REPAIR, *story((300.0, 3, "landed"))])
+    assert repair.landed_s == 153.0
+
+
 def test_a_loss_that_lasts_stays_open():
     *_, repair = find_outages(REPAIR[:6])
     assert repair.connected_s is None
     assert repair.seconds is None
 
 
-def test_who_never_was_connected_was_not_lost():
-    assert find_outages(story((5.0, 1, "disconnected", 0))) == []
+def test_a_recording_may_begin_when_everybody_is_connected_already():
+    *_, repair = find_outages(REPAIR[2:])
+    assert (repair.node, repair.lost_s, repair.connected_s) == (3, 103.0, 153.5)
 
 
 def test_a_loss_without_a_power_off_has_no_cause():
