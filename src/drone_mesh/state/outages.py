@@ -15,6 +15,8 @@ _EMERGENCY = MeshEventKind.EMERGENCY.value
 _FLIGHT_DECIDED = MeshEventKind.FLIGHT_DECIDED.value
 _LANDED = MeshEventKind.LANDED.value
 
+CAUSE_WITHIN_S = 60.0  # our choice: a loss is noticed within 30 s (reference, section 15)
+
 
 @dataclass(frozen=True)
 class Outage:
@@ -66,6 +68,8 @@ def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
 
 def _new_outage(event: EventRecord, power_offs: Sequence[tuple[float, int]]) -> Outage:
     for stamp_s, node in reversed(power_offs):
+        if event.stamp_s - stamp_s > CAUSE_WITHIN_S:
+            break
         if node != event.node:
             return Outage(event.node, event.stamp_s, cause_s=stamp_s, cause_node=node)
         if stamp_s == event.stamp_s:

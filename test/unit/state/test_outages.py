@@ -64,6 +64,11 @@ def test_a_loss_without_a_power_off_has_no_cause():
     assert outage.cause_node is None
 
 
+def test_a_power_off_long_ago_is_no_cause():
+    (outage,) = find_outages(story((1.0, 2, "power off"), (90.0, 1, "disconnected", 0)))
+    assert outage.cause_node is None
+
+
 def test_a_node_that_was_lost_and_then_switched_off_is_not_to_be_repaired():
     (outage,) = find_outages(
         story((1.0, 1, "connected", 0), (9.0, 1, "disconnected", 0), (12.0, 1, "power off"))
