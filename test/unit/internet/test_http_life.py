@@ -44,7 +44,8 @@ def slow():
     pool = ThreadPoolExecutor(max_workers=1)
     internet = HttpInternet(lambda work: pool.submit(work, 0.0), port=0, answer_within_s=0.2)
     internet.connect(gateway)
-    yield gateway, internet
+    with httpx.Client(base_url=internet.url, timeout=PATIENCE_S, verify=False) as client:
+        yield gateway, client
     gateway.go_on.set()
     internet.disconnect()
     pool.shutdown()
@@ -67,27 +68,27 @@ def test_an_order_that_the_gateway_has_not_come_to_is_refused_and_never_done(mak
 
 
 def test_an_order_that_the_gateway_does_not_finish_is_answered_504(slow):
-    _gateway, internet = slow
-    answer = httpx.post(f"{internet.url}/DroneMovement/1/2/3/4", timeout=PATIENCE_S)
+    _gateway, client = slow
+    answer = client.post("/DroneMovement/1/2/3/4")
     assert answer.status_code == 504
     assert "has begun" in answer.json()["detail"]
 
 
 def test_after_a_late_answer_the_next_request_is_answered_as_usual(slow):
-    gateway, internet = slow
-    httpx.post(f"{internet.url}/DroneMovement/1/2/3/4", timeout=PATIENCE_S)
+    gateway, client = slow
+    client.post("/DroneMovement/1/2/3/4")
     gateway.go_on.set()
     deadline = time.monotonic() + PATIENCE_S
-    while httpx.get(f"{internet.url}/ready", timeout=PATIENCE_S).status_code != 200:
+    while client.get("/ready").status_code != 200:
         assert time.monotonic() < deadline, "the gateway did not recover"
-    assert httpx.post(f"{internet.url}/DroneMovement/1/2/3/4").status_code == 200
+    assert client.post("/DroneMovement/1/2/3/4").status_code == 200
 
 
 def test_a_bug_behind_one_request_is_logged_and_stops_nothing(slow, caplog):
-    _gateway, internet = slow
-    assert httpx.get(f"{internet.url}/nodes", timeout=PATIENCE_S).status_code == 500
+    _gateway, client = slow
+    assert client.get("/nodes").status_code == 500
     wait_until(lambda: "a bug in the routing technique" in caplog.text, "nothing was logged")
-    assert httpx.get(f"{internet.url}/ready", timeout=PATIENCE_S).status_code == 200
+    assert client.get("/ready").status_code == 200
 
 
 def test_disconnecting_on_the_gateways_own_thread_refuses_who_waits_and_ends(make_mesh):
