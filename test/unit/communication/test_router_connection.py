@@ -206,6 +206,29 @@ def test_waiting_for_the_first_answer_is_not_being_connected():
     assert bench.sent() == []
 
 
+def test_while_the_first_answer_is_waited_for_no_other_offer_is_taken():
+    bench = Bench()
+    bench.hear("02 02 04 01 01 01 00 00")
+    bench.forget()
+    bench.hear("03 03 03 01 fe 02 01", "03 03 04 01 01 01 09 00")
+    assert bench.tried() == []
+    assert bench.mesh.get_preferred_gateway() == 0
+    bench.wait(0.6)
+    bench.hear("03 03 04 01 01 01 09 00")
+    assert bench.mesh.get_preferred_gateway() == 9
+
+
+def test_a_check_while_the_first_answer_is_waited_for_does_not_drop_the_way():
+    bench = Bench()
+    bench.wait_until(4.8)
+    bench.hear("02 02 04 01 01 01 00 00")
+    bench.wait_until(5.1)
+    assert bench.sent(5) == []
+    assert bench.mesh.get_route_to_gateway() == 2
+    bench.hear("00 02 04 01 01 01 00 01")
+    assert bench.mesh.get_connected_to_gateway()
+
+
 # Heartbeats of routers -----------------------------------------------------------------------
 
 

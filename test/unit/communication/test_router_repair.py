@@ -166,6 +166,21 @@ def test_after_the_landing_the_time_without_a_gateway_counts_from_the_next_check
     assert bench.engine.goals[1:] == [GATEWAY_PLACE]
 
 
+def test_an_order_ends_the_time_without_a_gateway():
+    bench = lone_bench()
+    bench.wait_until(30.0)  # the timer runs since 15 s
+    bench.hear("09 03 06 01 01 00 00 a0 41")
+    bench.antenna.dead = {2, 3, 9}
+    fly(bench, Location(16.0, 0.0, 0.0))
+    bench.hear(bid(3, 1.0))
+    assert bench.sent(BID) == []
+    fly(bench, Location(20.0, 0.0, 0.0))
+    bench.wait_until(64.9)  # it runs again from the check at 35 s
+    assert len(bench.engine.goals) == 1
+    bench.wait_until(65.1)
+    assert len(bench.engine.goals) == 2
+
+
 def test_the_same_order_during_the_flight_is_no_new_flight():
     bench = Bench()
     bench.hear("00 02 06 01 01 00 00 a0 41", "09 03 06 01 01 00 00 a0 41")
