@@ -11,6 +11,7 @@ from typing import Callable, Mapping, Sequence
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.console.access import access_for
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
@@ -263,6 +264,10 @@ def _http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) ->
             raise ConfigurationError(f"--token-file {parsed.token_file}: {error}") from error
         if not token:
             raise ConfigurationError(f"--token-file {parsed.token_file}: there is no token in it")
+    try:
+        access_for(parsed.bind, token)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{error} (--token-file, or {TOKEN_VARIABLE})") from error
     return HttpOptions(parsed.bind, parsed.port, token)
 
 

@@ -72,8 +72,8 @@ def test_a_gateway_is_node_0_and_serves_this_machine_alone():
 def test_the_token_comes_from_the_environment_or_from_a_file_which_wins(tmp_path):
     file = tmp_path / "token"
     file.write_text(f"{TOKEN}\n")
-    environment = {"DRONE_MESH_TOKEN": "of the environment"}
-    assert parse_gateway([], environment).http.token == "of the environment"
+    environment = {"DRONE_MESH_TOKEN": "of the environment it is"}
+    assert parse_gateway([], environment).http.token == "of the environment it is"
     assert parse_gateway(["--token-file", str(file)], environment).http.token == TOKEN
 
 
@@ -118,6 +118,7 @@ def test_a_wrong_option_ends_the_program_with_status_2_and_the_reason(capsys, li
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
+        ("--bind 0.0.0.0", "0.0.0.0 can be reached by others: give a token.*--token-file"),
         ("--port 0", "'0' is not a whole number of 1..65535"),
         ("--token-file /no/such/file", "--token-file /no/such/file: .*No such file"),
         ("--token-file /dev/null", "--token-file /dev/null: there is no token in it"),
