@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""status, snapshot and report: live, from a bag that record.launch made, and without a master."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import rospkg
+import rospy
+import rostest
+from drone_mesh.msg import MeshState
+from drone_mesh.srv import PowerSwitch
+from rostest_support import WALL_LIMIT_S, call, wait_for
+
+TOOLS = ("status", "snapshot", "report")
+TOOL_LIMIT_S = 60.0
+
+
+def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A tool as rosrun starts it, but for the time that rosrun takes to find it."""
+    program = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes" / tool
+    return subprocess.run(
+        [sys.executable, str(program), *arguments],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=TOOL_LIMIT_S,
+        check=False,
+    )
+
+
+class ToolsTest(unittest.TestCase):
+    def setUp(self) -> None:
+        if not rospy.core.is_initialized():
+            rospy.init_node("test_tools")
+        self.state: MeshState | None = None
+        self.subscriber = rospy.Subscriber("/mesh/state", MeshState, self._on_state)
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def _on_state(self, message: MeshState) -> None:
+        self.state = message
+
+    def connected(self) -> int:
+        return sum(node.connected for node in self.state.nodes) if self.state else 0
+
+    def test_1_each_tool_explains_itself(self) -> None:
+        for tool in TOOLS:
+            told = subprocess.run(
+                ["rosrun", "drone_mesh", tool, "--help"],
+                capture_output=True,
+                text=True,
+                timeout=TOOL_LIMIT_S,
+                check=False,
+            )
+            self.assertEqual(told.returncode, 0, told.stderr)
+            self.assertIn(f"usage: rosrun drone_mesh {tool}", told.stdout)
+            self.assertIn("Exit code", told.stdout)
+
+    def test_2_without_a_master_there_is_one_line_that_says_so(self) -> None:
+        for arguments in (["status"], ["status", "--watch"], ["snapshot", "picture.png"]):
+            told = run(*arguments, ROS_MASTER_URI="http://127.0.0.1:9")
+            self.assertEqual(told.returncode, 2)
+            self.assertIn("no ROS master at http://127.0.0.1:9", told.stderr)
+            self.assertNotIn("Traceback", told.stderr)
+
+    def test_3_a_run_is_seen_live_and_recorded_and_told(self) -> None:
+        recorder = subprocess.Popen(
+            ["roslaunch", "drone_mesh", "record.launch", f"bag:={self.folder}/run"],
+            stdout=subprocess.DEVNULL,
+        )
+        try:
+            wait_for("a bag", WALL_LIMIT_S, lambda: list(self.folder.glob("*.bag.active")))
+            wait_for("all connected", WALL_LIMIT_S, lambda: self.connected() == 4)
+            told = run("status")
+            self.assertEqual(told.returncode, 0, told.stdout + told.stderr)
+            self.assertIn("3 of 3 routers connected", told.stdout)
+            self.assertNotIn("\x1b", told.stdout)
+            self.assertEqual(run("snapshot", f"{self.folder}/live.png").returncode, 0)
+            call("/Nodes/2/powerSwitch", PowerSwitch, False)
+            wait_for("3 is lost", WALL_LIMIT_S, lambda: self.connected() == 2)
+            self.assertEqual(run("status").returncode, 1)
+            wait_for("the repair", 2 * WALL_LIMIT_S, lambda: self.connected() == 3)
+            self.assertEqual(run("status").returncode, 0)
+        finally:
+            recorder.send_signal(signal.SIGINT)
+            recorder.wait(timeout=WALL_LIMIT_S)
+        (bag,) = self.folder.glob("*.bag")
+        self._look_into(bag)
+
+    def _look_into(self, bag: Path) -> None:
+        told = run("status", "--bag", str(bag))
+        self.assertEqual(told.returncode, 0, told.stderr)
+        self.assertIn("2 of 2 routers connected, 1 switched off", told.stdout)
+        self.assertEqual(run("snapshot", "--bag", str(bag), f"{self.folder}/bag.png").returncode, 0)
+        for picture in ("live.png", "bag.png"):
+            self.assertEqual((self.folder / picture).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        told = run("report", str(bag), "-o", f"{self.folder}/run.html", "--csv", str(self.folder))
+        self.assertEqual(told.returncode, 0, told.stderr)
+        page = (self.folder / "run.html").read_text(encoding="utf-8")
+        self.assertTrue("<td>2 off</td>" in page, "the page does not tell the cause of the loss")
+        self.assertIn("flight decided", (self.folder / "events.csv").read_text(encoding="utf-8"))
+
+    def test_4_what_is_no_bag_is_refused_in_one_line(self) -> None:
+        nonsense = self.folder / "nonsense.bag"
+        nonsense.write_bytes(b"\x89 this is no bag")
+        for path in (nonsense, self.folder / "missing.bag"):
+            for arguments in (["status", "--bag"], ["report"]):
+                told = run(*arguments, str(path))
+                self.assertEqual(told.returncode, 2)
+                self.assertIn(str(path), told.stderr)
+                self.assertNotIn("Traceback", told.stderr)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "tools", ToolsTest)
