@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.state.model import NodeStatus, Role
 from drone_mesh.state.register import DroneView
@@ -27,11 +29,12 @@ def describe_component(
     status.known_nodes = component.get_router_tech_table_size()
     status.total_messages = component.get_total_message_sent()
     heard_s = component.get_neighbours()
-    ids = sorted(heard_s)
-    status.neighbours = bytes(ids)
-    status.neighbour_ages = bytes(
-        [max(0, min(OLDEST_AGE_S, int(now_s - heard_s[node]))) for node in ids]
-    )
+    # numpy, because a crowd of 254 has 36,000 neighbours to write down twice a second.
+    ids = np.fromiter(heard_s, np.uint8, len(heard_s))
+    ages_s = now_s - np.fromiter(heard_s.values(), float, len(heard_s))
+    by_id = ids.argsort()
+    status.neighbours = ids[by_id].tobytes()
+    status.neighbour_ages = ages_s.clip(0, OLDEST_AGE_S).astype(np.uint8)[by_id].tobytes()
 
 
 def view_drone(drone: VirtualDrone, now_s: float) -> DroneView:
