@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import queue
 import re
@@ -21,6 +22,11 @@ ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0  # until all are connected; on an idle machine it takes 3 s
 END_WITHIN_S = 5.0
 TOKEN = "0123456789abcdef"
+NO_SPI = (
+    "/dev/spidev99.0 does not exist: switch SPI on"
+    if importlib.util.find_spec("spidev")
+    else "cannot use /dev/spidev99.0: the Python package spidev is missing (sudo apt install"
+)
 
 
 class Program:
@@ -92,13 +98,13 @@ def free_port():
 @pytest.mark.parametrize(
     ("name", "line", "reason"),
     [
-        ("raspberry_router", "--id 3 --spi 99.0", "/dev/spidev99.0 does not exist: switch SPI on"),
+        ("raspberry_router", "--id 3 --spi 99.0", NO_SPI),
         (
             "raspberry_router",
             "--emulated 2 --trace /no/such/file",
             "--trace /no/such/file: No such",
         ),
-        ("raspberry_gateway", "--spi 99.0", "/dev/spidev99.0 does not exist: switch SPI on"),
+        ("raspberry_gateway", "--spi 99.0", NO_SPI),
     ],
 )
 def test_what_is_missing_is_said_in_one_line_with_what_to_do(name, line, reason):
