@@ -136,9 +136,7 @@ class ConsoleServer:
     async def _index(self, request: Request) -> Response:
         if "token" in request.query_params:
             moved = RedirectResponse("/", 303)
-            moved.set_cookie(
-                COOKIE, request.query_params["token"], httponly=True, samesite="strict"
-            )
+            moved.set_cookie(COOKIE, request.query_params["token"], httponly=True, samesite="lax")
             return moved
         return FileResponse(STATIC / "index.html")
 

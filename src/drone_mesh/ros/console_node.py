@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import secrets
+import socket
 import threading
 import time
 from functools import partial
@@ -29,6 +30,7 @@ from drone_mesh.ros.parameters import file_parameter
 LOOK_PERIOD_S = 1.0  # wall time between two looks at the master
 OLD_NEWS_S = 3.0  # wall time without a state after which the page says so
 TOKEN_BYTES = 18
+EVERYWHERE = ("0.0.0.0", "::")  # addresses that stand for all of this machine's
 
 log = logging.getLogger(__name__)
 
@@ -127,7 +129,8 @@ def _run() -> int:
     stopped = threading.Event()
     rospy.on_shutdown(stopped.set)
     runner.start()
-    name = f"[{address}]" if ":" in address else address
+    name = socket.gethostname() if address in EVERYWHERE else address
+    name = f"[{name}]" if ":" in name else name
     # Not to the log: it is public on /rosout, and the token is not.
     print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
     try:

@@ -90,7 +90,8 @@ export class MapView {
     const left = this.options.known && drawn.linksDrawn < drawn.links ? " (those of the selected node are shown)" : "";
     const text = `${drawn.drones} drones, ${drawn.links} links${left}, ${drawn.ways} on the way to a gateway`;
     if (this.note.textContent !== text) this.note.textContent = text;
-    Object.assign(this.note.dataset, drawn);
+    const { x, y, scale } = this.camera;
+    Object.assign(this.note.dataset, drawn, { x, y, scale });
   }
 
   #resize() {
