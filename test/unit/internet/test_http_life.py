@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import http.client
 import logging
@@ -138,7 +139,8 @@ def test_a_client_that_says_nothing_does_not_hold_up_the_end(make_mesh):
     silent.connect()
     silent.sock.sendall(b"GET /ready HT")
     mesh.internet.disconnect()
-    assert silent.sock.recv(1) == b""
+    with contextlib.suppress(ConnectionResetError):  # the end, too, with bytes not read by then
+        assert silent.sock.recv(1) == b""
     silent.close()
 
 
