@@ -35,9 +35,7 @@ class ChildTableTree(IRoutingTechnique):
         if self._essentials is None:
             raise RuntimeError("maintain_routing before start_routing")
         self._essentials.search_other_nodes_in_range()
-        for child in sorted(self._children):
-            if child in self._children:  # a failed heartbeat may have cost more than one child
-                self._essentials.send_heartbeat(child)
+        self._essentials.send_heartbeats(sorted(self._children))
 
     def node_moved_location(self) -> None:
         """Forget everything."""

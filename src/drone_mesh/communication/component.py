@@ -10,6 +10,7 @@ import abc
 import math
 import random
 from collections import deque
+from typing import Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.circulation import CirculationGuard
@@ -246,6 +247,19 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """A heartbeat towards `other`."""
         return self._send_own(_HEARTBEAT, other, self._heartbeat_body())
 
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """A heartbeat towards each of these; those for direct neighbours leave together."""
+        me, body, routing = self._node_id, self._heartbeat_body(), self._routing
+        direct = [other for other in others if routing.get_direction_to_node(other) == other]
+        packets = [messages.packet(_HEARTBEAT, me, me, other, other, body) for other in direct]
+        for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
+            if taken:
+                self._sent(other)
+            elif not self._send(packet, other, self._timing.send_attempts - 1):
+                self._send_own(_HEARTBEAT, other, body)
+        for other in set(others).difference(direct):
+            self.send_heartbeat(other)
+
     # For the router and the gateway to fill in -----------------------------------------------
 
     @abc.abstractmethod
@@ -379,15 +393,18 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     # Sending ---------------------------------------------------------------------------------
 
-    def _send(self, payload: bytes, to: int) -> bool:
+    def _send(self, payload: bytes, to: int, attempts: int | None = None) -> bool:
         """Hand a packet to neighbour `to`, more than once if need be. The routes learn from it."""
-        for _attempt in range(self._timing.send_attempts):
+        for _attempt in range(self._timing.send_attempts if attempts is None else attempts):
             if self._antenna.send_message_to(payload):
-                self._total_sent += 1
-                self._routing.can_communicate_with_node(to)
+                self._sent(to)
                 return True
         self._neighbour_lost(to)
         return False
+
+    def _sent(self, to: int) -> None:
+        self._total_sent += 1
+        self._routing.can_communicate_with_node(to)
 
     def _send_own(self, kind: int, other: int, body: bytes = b"") -> bool:
         """Send a packet of our own towards `other`, over one route after the other."""

@@ -8,7 +8,7 @@ snapshots and may be read from any thread.
 from __future__ import annotations
 
 import abc
-from typing import NamedTuple
+from typing import NamedTuple, Sequence
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = 253  # reference, section 3
@@ -113,6 +113,13 @@ class IWirelessCommunication(abc.ABC):
     def send_message_to(self, payload: bytes) -> bool:
         """Send to the node in byte 3. True: that node has it."""
 
+    def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
+        """Send each to the node in its byte 3, in this order; for each whether that node has it.
+
+        A radio that can hand over many at once does that here.
+        """
+        return [self.send_message_to(payload) for payload in payloads]
+
     @abc.abstractmethod
     def broadcast_message(self, payload: bytes) -> None:
         """Send to every node in range; each of them finds its own id in byte 3."""
@@ -148,6 +155,11 @@ class IRoutingEssentials(abc.ABC):
     @abc.abstractmethod
     def send_heartbeat(self, other: int) -> bool:
         """Send a heartbeat towards node `other`. False: there is no route, or nobody took it."""
+
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """Send a heartbeat towards each of these nodes; what fails shows in the routes."""
+        for other in others:
+            self.send_heartbeat(other)
 
 
 class IRoutingTechnique(abc.ABC):

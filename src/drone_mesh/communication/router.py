@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import random
-from typing import NamedTuple
+from typing import NamedTuple, Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.component import MeshnetworkComponent
@@ -82,6 +82,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if other == self._preferred_gateway:
             return self._send_heartbeat_to_gateway()
         return super().send_heartbeat(other)
+
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """A heartbeat towards each of these; the one to the preferred gateway is as always."""
+        if self._preferred_gateway in others:
+            self._send_heartbeat_to_gateway()
+        super().send_heartbeats([other for other in others if other != self._preferred_gateway])
 
     # The periodic check ----------------------------------------------------------------------
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 SIGNAL_TOPIC = "/WirelessSignalSimulator"  # DroneInfo: every engine and antenna -> simulator
 SIGNAL_QUEUE = 4096  # DroneInfo that may wait for a simulator that is slow; the oldest is dropped
 MESSAGE_SERVICE = "/SignalSimulator/message"
+MESSAGES_SERVICE = "/SignalSimulator/messages"  # ours: one call instead of one per packet
 OTHERS_IN_RANGE_SERVICE = "/SignalSimulator/othersinRange"
 BROADCAST_SERVICE = "/SignalSimulator/broadcast"  # ours: one call instead of one per neighbour
 

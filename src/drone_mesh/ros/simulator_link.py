@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
+import struct
 import threading
-from typing import Callable, NamedTuple, Protocol
+from typing import Callable, NamedTuple, Protocol, Sequence
 
 import rospy
 
@@ -15,11 +16,13 @@ from drone_mesh.msg import DroneInfo
 from drone_mesh.ros import names
 from drone_mesh.ros.logs import ThrottledLog
 from drone_mesh.ros.persistent_service import PersistentService, ServiceGone, ServiceRefused
-from drone_mesh.srv import Broadcast, WirelessMessage
+from drone_mesh.srv import Broadcast, WirelessMessage, WirelessMessages
 
 LOOK_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
 ANNOUNCE_AGAIN_AFTER = 20  # looks; our choice: an antenna not yet registered speaks up again
 _NO_PLACE = (0.0, 0.0, 0.0)  # an antenna never gives a position, reference 14.1
+
+_LENGTH = struct.Struct("<I")  # of an array, as ROS serialises it
 
 _log = logging.getLogger(__name__)
 
@@ -37,6 +40,7 @@ class _Services(NamedTuple):
     """Connections to one simulator."""
 
     message: PersistentService
+    messages: PersistentService
     broadcast: PersistentService
 
 
@@ -150,6 +154,25 @@ class SimulatorLink(rospy.SubscribeListener):
             self._lost(services, error)
         return False
 
+    def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
+        """Hand packets of one node to the nodes in their byte 3; for each whether that has it."""
+        services = self._services
+        if services is None or not payloads:
+            return [self.send(payload) for payload in payloads]
+        packets = b"".join(payloads)
+        # The fields of a WirelessMessagesRequest.
+        fields = payloads[0][FROM : FROM + 1] + _LENGTH.pack(len(packets)) + packets
+        try:
+            answer = services.messages.call_bytes(fields)
+        except ServiceRefused as error:
+            self._complaints.warning("packets refused", str(error))
+        except ServiceGone as error:
+            self._never_handed_over += len(payloads)
+            self._lost(services, error)
+        else:
+            return [bool(taken) for taken in answer[_LENGTH.size :]]
+        return [False] * len(payloads)
+
     def broadcast(self, payload: bytes) -> None:
         """Hand a packet to everybody in range of the node in its byte 1."""
         services = self._services
@@ -218,6 +241,7 @@ class SimulatorLink(rospy.SubscribeListener):
             return
         services = _Services(
             PersistentService(names.MESSAGE_SERVICE, WirelessMessage),
+            PersistentService(names.MESSAGES_SERVICE, WirelessMessages),
             PersistentService(names.BROADCAST_SERVICE, Broadcast),
         )
         try:

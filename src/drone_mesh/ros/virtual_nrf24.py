@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Sequence
+
 import rospy
 
 from drone_mesh.communication.interfaces import (
@@ -63,6 +65,10 @@ class VirtualNRF24(IWirelessCommunication):
     def send_message_to(self, payload: bytes) -> bool:
         """To the node in byte 3. False: it did not get it, or there is no simulator."""
         return self._on and self._link.send(payload)
+
+    def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
+        """Each to the node in its byte 3, in one call."""
+        return self._link.send_all(payloads) if self._on else [False] * len(payloads)
 
     def broadcast_message(self, payload: bytes) -> None:
         """To everybody in range."""

@@ -11,6 +11,7 @@ import warnings
 import rospy
 from rospy.impl.transport import Transport
 
+from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros import names
 from drone_mesh.ros.figures import Figures
@@ -24,6 +25,8 @@ from drone_mesh.srv import (
     BroadcastResponse,
     WirelessMessage,
     WirelessMessageResponse,
+    WirelessMessages,
+    WirelessMessagesResponse,
 )
 
 STUCK_RECEIVER_S = 0.2  # our choice: who does not empty its socket for so long is cut off
@@ -86,7 +89,8 @@ class WirelessSignalSimulator:
     Subscribes: /WirelessSignalSimulator (DroneInfo)
     Publishes:  the topic that each antenna asked for, usually /Node/<id> (NRF24)
     Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
-                (AreaScan), /SignalSimulator/broadcast (Broadcast)
+                (AreaScan), /SignalSimulator/messages (WirelessMessages),
+                /SignalSimulator/broadcast (Broadcast)
     Figures:    delivered, lost in range, on /diagnostics
 
     The handlers run in the threads of rospy's connections. `_lock` guards the register and the
@@ -104,6 +108,7 @@ class WirelessSignalSimulator:
         self._delivered = self._lost = 0
         # The services first: who sees that we subscribe may call at once.
         rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
+        rospy.Service(names.MESSAGES_SERVICE, WirelessMessages, self._messages)
         rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
         rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
         rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
@@ -148,6 +153,22 @@ class WirelessSignalSimulator:
         if request.from_ == request.to:  # an antenna asks whether it is known yet
             return WirelessMessageResponse(self._send(topic, request.message))
         return WirelessMessageResponse(self._carry(topic, request.message))
+
+    def _messages(self, request: WirelessMessages) -> WirelessMessagesResponse:
+        joined = request.packets
+        if len(joined) % PAYLOAD_BYTES:
+            raise rospy.ServiceException(
+                f"packets: {len(joined)} bytes, want {PAYLOAD_BYTES} for each of them"
+            )
+        packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
+        with self._lock:
+            topics = [self._register.link(request.from_, packet[_TO]) for packet in packets]
+        return WirelessMessagesResponse(
+            [
+                topic is not None and self._carry(topic, NRF24(packet))
+                for packet, topic in zip(packets, topics)
+            ]
+        )
 
     def _broadcast(self, request: Broadcast) -> BroadcastResponse:
         with self._lock:

@@ -136,12 +136,13 @@ def test_maintaining_searches_again_and_sends_a_heartbeat_to_each_child():
     assert essentials.asked == ["search", "search", 1, 3]
 
 
-def test_maintaining_goes_on_when_a_heartbeat_costs_more_than_one_child():
+def test_maintaining_asks_for_all_children_together_even_if_one_heartbeat_costs_two_of_them():
     tree = tree_with((1, 4), (2, 5), (3, 6))
     essentials = Essentials(tree, gone=(1, 2))
     tree.start_routing(essentials)
     tree.maintain_routing()
-    assert essentials.asked == ["search", "search", 1, 3]
+    assert essentials.asked == ["search", "search", 1, 2, 3]
+    assert tree.get_set_of_children() == {3}
 
 
 def test_maintaining_before_starting_is_a_mistake():
