@@ -164,7 +164,8 @@ def inprocess_table(results: Sequence[InProcessResult]) -> str:
     period = f"{results[0].simulated_s:g} simulated seconds"
     return (
         f"In process, one core: simulated seconds per second of processor time (of wall time). "
-        f"Medians of {runs} runs and the best one, for the first {period} from the start and the {period} after.\n\n"
+        f"Medians of {runs} runs and the best one, for the first {period} from the start and the "
+        f"{period} after.\n\n"
         + table(
             ("nodes", "spacing", "from the start", "best", "after", "best", "all connected"),
             [
