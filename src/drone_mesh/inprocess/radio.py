@@ -6,12 +6,12 @@ import math
 import random
 from typing import Callable, Iterable, Mapping
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import (
     IMeshDebugInfo,
     IMeshNetwork,
     IWirelessCommunication,
 )
+from drone_mesh.communication.messages import FROM, TO
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.inprocess.clock import VirtualClock
 
@@ -123,7 +123,7 @@ class InProcessAir:
 
     def send(self, payload: bytes) -> bool:
         """Hand a packet over; True when the receiver has it, or will in a moment."""
-        sender, to = payload[messages.FROM], payload[messages.TO]
+        sender, to = payload[FROM], payload[TO]
         if self._flying and (sender in self._flying or to in self._flying):
             receiver = self._heard_by(sender, self._places((to,))).get(to)
         else:
@@ -134,10 +134,12 @@ class InProcessAir:
         if self.loss and self._rng.random() < self.loss:
             return False
         self.delivered += 1
-        at_s = self._clock.now_s + self._delay_s
+        clock = self._clock
+        at_s = clock.now_s + self._delay_s
         if self._jitter_s:
-            at_s += self._rng.random() * self._jitter_s
-        self._clock.call_in_line(at_s, receiver.receive, payload)
+            clock.call_at(at_s + self._rng.random() * self._jitter_s, receiver.receive, payload)
+        else:
+            clock.call_in_line(at_s, receiver.receive, payload)
         return True
 
 
@@ -171,7 +173,7 @@ class InProcessAntenna(IWirelessCommunication):
     def broadcast_message(self, payload: bytes) -> None:
         """Send to each node in range."""
         if self.powered:
-            before, after = payload[: messages.TO], payload[messages.TO + 1 :]
+            before, after = payload[:TO], payload[TO + 1 :]
             for other in self._air.in_range(self.node_id):
                 self._air.send(before + bytes((other,)) + after)
 
