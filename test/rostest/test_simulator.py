@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The WirelessSignalSimulator alone: its topic, its three services, and honest answers."""
+"""The WirelessSignalSimulator alone: its topic, its services, and honest answers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import unittest
 import rospy
 import rostest
 from drone_mesh.msg import NRF24, DroneInfo
-from drone_mesh.srv import AreaScan, Broadcast
+from drone_mesh.srv import AreaScan, Broadcast, WirelessMessages
 from rostest_support import LogWatch, Stranger, call, wait_for
 
 # A receiver in a process of its own, to be killed.
@@ -74,6 +74,17 @@ class SimulatorTest(unittest.TestCase):
             got = stranger.wait_for_packet(b"\x02\x02\xc8", "the broadcast did not arrive")
             self.assertEqual(got, bytes((2, 2, 200, stranger.node_id, 254)).ljust(32, b"\x07"))
         self.assertEqual(self.b.heard, [])
+
+    def test_packets_handed_over_together_each_go_to_their_receiver(self) -> None:
+        near, unknown, far = packet(1, 2), packet(1, 77), packet(1, 3)
+        joined = b"".join(part.ljust(32, b"\x05") for part in (near, unknown, far, near))
+        taken = call("/SignalSimulator/messages", WirelessMessages, 1, joined).succes
+        self.assertEqual(list(taken), [True, False, False, True])
+        got = self.b.wait_for_packet(near, "the packet for 2 did not arrive")
+        self.assertEqual(got, near.ljust(32, b"\x05"))
+        self.assertEqual(self.far.heard, [])
+        with self.assertRaisesRegex(rospy.ServiceException, "33 bytes, want 32 for each"):
+            call("/SignalSimulator/messages", WirelessMessages, 1, bytes(33))
 
     def test_a_node_that_is_off_neither_sends_nor_receives(self) -> None:
         self.b.tell((0.0, 0.0, 0.0), "/stranger_b", on=False)
