@@ -27,6 +27,7 @@ SCREEN = ":95"
 SCREEN_SIZE = (1400, 900)
 CASE, LOST_ROUTER = 202, 2
 ROUTERS = 5
+ROUNDS_S = 25.0  # simulated; by then each node has asked where the next hop is
 FAST = 4.0  # while nobody takes a picture
 LIMIT_S = 240.0  # wall time for each thing that is waited for
 SETTLE_S = 3.0  # until what is on a screen has been drawn
@@ -42,6 +43,11 @@ class Watch:
 
     def _on_state(self, state: MeshState) -> None:
         self.state = state
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time."""
+        return 0.0 if self.state is None else self.state.header.stamp.to_sec()
 
     def wait_for(self, what: str, condition: Callable[[MeshState], bool]) -> None:
         print(f"waiting: {what}", flush=True)
@@ -93,6 +99,8 @@ def take_pictures(browser: Browser, folder: Path) -> None:
         controls.layout(CASE)
         watch.wait_for("the drones on their way", somebody_flies)
         watch.wait_for("all connected in their places", everybody_stands_connected)
+        everybody_settled_s = watch.time_s + ROUNDS_S
+        watch.wait_for("some rounds", lambda _state: watch.time_s >= everybody_settled_s)
         controls.power(LOST_ROUTER, False)
         watch.wait_for("the repair flies", somebody_flies)
         controls.speed(True, 0.0)

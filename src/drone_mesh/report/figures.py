@@ -15,6 +15,7 @@ from drone_mesh.state.model import MeshStatus, NodeStatus, Role, position_is_kno
 from drone_mesh.state.outages import Outage
 
 WIDTH_IN = 10.0  # the page scales it
+SHORTEST_S = 0.05  # a phase that lasted less cannot be seen
 CONNECTED, LOST, OFF, GATEWAY, FLIGHT, LINK = (
     "#0b8a5c", "#d0271d", "#8b95a5", "#6d3fd1", "#d97a00", "#b4bfce",
 )  # fmt: skip
@@ -89,7 +90,7 @@ def phases_of(outage: Outage, end_s: float) -> list[tuple[float, float, str, str
         elif attribute == "decided_s" and outage.emergency_s is None:
             name, colour = PHASES[0][1:]
         stop_s = end_s if stop_s is None else min(stop_s, outage.connected_s or end_s)
-        if stop_s > start_s:
+        if stop_s - start_s > SHORTEST_S:
             phases.append((start_s, stop_s, name, colour))
         start_s = max(start_s, stop_s)
     return phases
