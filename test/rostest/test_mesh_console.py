@@ -83,6 +83,8 @@ class MeshConsoleTest(unittest.TestCase):
     def setUp(self) -> None:
         if not rospy.core.is_initialized():
             rospy.init_node("test_mesh_console")
+        for service in ("/DroneManager/SetToCasus", "/DroneManager/requestDroneMovement"):
+            rospy.wait_for_service(service, timeout=WALL_LIMIT_S)
 
     def test_1_orders_are_carried_out(self) -> None:
         log = LogWatch()

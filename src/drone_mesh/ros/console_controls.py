@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 from genpy import Message
 
 from drone_mesh.console.orders import OrderRefused
@@ -17,6 +19,8 @@ from drone_mesh.srv import (
     SetSpeed,
     SetSpeedRequest,
 )
+
+log = logging.getLogger(__name__)
 
 ORDER_TIMEOUT_S = 10  # wall time; longer than the DroneManager waits for a gateway
 
@@ -59,6 +63,7 @@ def _call(name: str, service_class: type, request: Message) -> Message:
         service.connect()
         return service.call(request)
     except ServiceGone as error:
+        log.warning("an order of the console was not carried out: %s", error)
         raise OrderRefused(f"nobody answers at {name}: is the simulation running?") from error
     except ServiceRefused as error:
         said = str(error).partition(" responded with an error: ")[2]
