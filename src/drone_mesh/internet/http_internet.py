@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import errno
 import logging
-import socket
 import threading
 
 import uvicorn
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.console.access import access_for
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.console.listening import listen
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk, Submit
 from drone_mesh.internet.request_guard import MOST_HEAD_BYTES
 
-MAX_PORT = 65535
 DEFAULT_PORT = 9080  # reference, section 13
 ANSWER_WITHIN_S = 2.0  # our choice: over ten times what an order to a node that is gone takes
 MOST_CONNECTIONS = 64  # our choice; more are answered 503
@@ -49,7 +46,7 @@ class HttpInternet(IInternetConnection):
         access = access_for(bind_address, token)
         self._desk = GatewayDesk(submit, answer_within_s)
         self._app = make_api(self._desk, access)
-        self._socket = _listen(bind_address, port)
+        self._socket = listen(bind_address, port)
         self.port: int = self._socket.getsockname()[1]
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -95,33 +92,3 @@ class HttpInternet(IInternetConnection):
 
     def _serve(self, server: uvicorn.Server) -> None:
         server.run(sockets=[self._socket])
-
-
-def _listen(bind_address: str, port: int) -> socket.socket:
-    wanted = f"HTTP address {bind_address} port {port}"
-    if not 0 <= port <= MAX_PORT:
-        raise ConfigurationError(f"{wanted} cannot be had: ports are 0..{MAX_PORT}")
-    sock = None
-    try:
-        # asyncio answers without delay (TCP_NODELAY) only where the protocol was named: on such a
-        # socket a request takes 1 ms, on that of socket.create_server 45.
-        family, kind, protocol, _, where = socket.getaddrinfo(
-            bind_address, port, type=socket.SOCK_STREAM, proto=socket.IPPROTO_TCP
-        )[0]
-        sock = socket.socket(family, kind, protocol)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        sock.bind(where)
-        sock.listen(MOST_CONNECTIONS)
-    except OSError as error:
-        if sock is not None:
-            sock.close()
-        hint = _HINTS.get(error.errno or 0, str(error))
-        raise ConfigurationError(f"{wanted} cannot be had: {hint}") from error
-    return sock
-
-
-_HINTS = {
-    errno.EADDRINUSE: "another program uses it; choose another port",
-    errno.EACCES: "only root may use it; choose a port from 1024 up",
-    errno.EADDRNOTAVAIL: "it is not an address of this machine",
-}
