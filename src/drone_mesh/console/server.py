@@ -152,6 +152,7 @@ class ConsoleServer:
             sender = asyncio.ensure_future(self._send_frames(page))
             receiver = asyncio.ensure_future(self._receive(page))
             await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
+            self._pages.discard(page)
             receiver.cancel()
             await asyncio.gather(receiver, return_exceptions=True)
         finally:
@@ -163,12 +164,15 @@ class ConsoleServer:
     async def _receive(self, page: Page) -> None:
         async for text in page.socket.iter_text():
             await self._on_request(page, text)
+            if page not in self._pages:
+                return
 
     async def _send_frames(self, page: Page) -> None:
         loop = asyncio.get_running_loop()
         try:
             await self._send(page, json.dumps({"type": "hello", "layouts": list(self._layouts)}))
-            while True:
+            # wait_for may swallow a cancellation that comes as a send ends (before Python 3.12).
+            while page in self._pages:
                 started = loop.time()
                 if page.version != self._store.version:
                     frame, page.version = self._store.frame_since(page.version), self._store.version
