@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 class RosDroneEngineConnector(IDroneEngine):
     """Publishes /Drones/<id>/goal (Location), calls /Drones/<id>/gps (RequestGPS).
 
-    Belongs to the executor's worker. The connection is made when it is first needed and kept.
+    Belongs to the executor's worker. The connection is kept, and made anew when it is needed.
     """
 
     def __init__(self, node_id: int) -> None:
@@ -34,6 +34,13 @@ class RosDroneEngineConnector(IDroneEngine):
         self._gone_until_s = -math.inf  # monotonic
         self._complaints = ThrottledLog(_log)
         self._goal = rospy.Publisher(names.goal_topic(node_id), LocationMsg, queue_size=10)
+
+    def connect(self) -> None:
+        """Connect before it is needed, so that the number of connections stays what it is."""
+        try:
+            self._gps.connect()
+        except ServiceGone as error:
+            _log.debug("drone %d: %s", self._node_id, error)
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there (metres); the height is rounded to whole metres, as its field is."""

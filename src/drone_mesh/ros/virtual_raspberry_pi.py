@@ -54,6 +54,7 @@ class VirtualRaspberryPi(abc.ABC):
 
     def start(self, now_s: float) -> None:
         """Switch on."""
+        self.engine.connect()
         self.component.start(now_s)
         self.seat.take(self.component)
 
