@@ -120,7 +120,7 @@ def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c(tmp_path):
         found = program.wait_for(r"all 5 nodes are connected after .* s; hops to the gateway: (.*)")
         hops = dict(map(int, pair.split(":")) for pair in found[1].split())
         assert hops[0] == 0
-        # No fewer hops than the places allow; a frame that was lost when they met may cost a detour.
+        # No fewer hops than the places allow; a frame lost when they met may cost a detour.
         assert all(hops[node] >= shortest for node, shortest in ((1, 1), (2, 1), (3, 2), (4, 2)))
         status, seconds = program.end(signal.SIGINT)
         assert status == 0
