@@ -31,6 +31,8 @@ class HostsTest(unittest.TestCase):
         self.assertIn("node 3 is already served by another process", refused.stderr)
         self.assertNotIn("Traceback", refused.stderr)
 
+        # A node that starts anew counts from 0: it has to have sent enough to be told apart.
+        mesh.wait("14 has sent 40 messages", 90, lambda: mesh.info(14).totalMessages >= 40)
         old_pid = pid_of("/mesh_host_3")
         os.kill(old_pid, signal.SIGKILL)
         sent = mesh.info(14).totalMessages
