@@ -58,6 +58,7 @@ class Station:
         self.got += [int.from_bytes(r.payload[:4], "little") for r in self.driver.receive(0.0)]
 
 
+@pytest.mark.slow
 def test_row_58_and_59_ten_thousand_packets_each_way_arrive_once_if_they_were_confirmed(lab):
     one, other = Station(lab, 1, 2, 0.0), Station(lab, 2, 1, 100.0)
     lab.at_once(
