@@ -197,7 +197,10 @@ def verdict_lines(result: SoakResult) -> str:
     """What became more after the first ten minutes."""
     verdict = result.verdict()
     if verdict is None:
-        return "too short to tell whether anything grows: it takes 13 minutes at least"
+        return (
+            "too short to tell whether anything grows: "
+            "it takes 13 simulated minutes and a minute and a half at least"
+        )
     return "\n".join(
         (
             f"memory: {verdict.memory_before_mb:.1f} MB early after the first ten minutes, "

@@ -3,11 +3,13 @@
 from drone_mesh.bench.soak import Sample, judge
 
 
-def samples(memory_mb, minutes=60, threads=lambda minute: 40, files=lambda minute: 90):
+def samples(
+    memory_mb, minutes=60, threads=lambda minute: 40, files=lambda minute: 90, minute_wall_s=10.0
+):
     return [
         Sample(
             sim_s=60.0 * minute,
-            wall_s=6.0 * minute,
+            wall_s=4.0 + minute_wall_s * minute,
             pss_mb=0.0,
             rss_mb=memory_mb(minute),
             threads=threads(minute) + 3,
@@ -47,5 +49,13 @@ def test_one_connection_more_is_noticed():
     assert not verdict.steady
 
 
+def test_idle_connections_of_the_start_may_go_in_the_first_minute_and_a_half_of_the_wall():
+    fast = samples(lambda m: 100.0, files=lambda m: 90 + (m < 30), minute_wall_s=3.0)
+    assert judge(fast).steady
+    late = samples(lambda m: 100.0, files=lambda m: 90 + (m < 31), minute_wall_s=3.0)
+    assert judge(late).open_files == (95, 96)
+
+
 def test_a_run_that_was_too_short_has_no_verdict():
     assert judge(samples(lambda minute: 100.0, minutes=11)) is None
+    assert judge(samples(lambda minute: 100.0, minute_wall_s=1.0)) is None
