@@ -28,3 +28,7 @@ class Complaints:
         _log.warning(
             "node %d: %s: %s (%d so far)", self._node_id, reason, detail, self.counts[reason]
         )
+
+    def dropped(self, reason: str, payload: bytes, now_s: float) -> None:
+        """A packet was dropped."""
+        self.add(f"dropped {reason}", payload.hex(), now_s)

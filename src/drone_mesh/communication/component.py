@@ -9,14 +9,14 @@ from __future__ import annotations
 import abc
 import math
 import random
-from collections import deque
 from typing import Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.circulation import CirculationGuard
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.deadlines import Deadlines, Due
+from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Flight
+from drone_mesh.communication.forwarding import Forwarding
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -85,14 +85,20 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._gateway_location: Location | None = None
         self._good_location: Location | None = None
         self._good_location_id = NO_ROUTE
-        self._total_sent = 0
-        self._heard_s: dict[int, float] = {}
         self._deadlines = Deadlines()
         self._flight: Flight | None = None
-        self._circulation = CirculationGuard()
-        self._missing_to_tell: deque[tuple[int, int, int]] = deque()
-        self._telling = False
         self.complaints = Complaints(node_id)
+        self._delivery = Delivery(
+            node_id,
+            antenna,
+            routing,
+            self._timing.send_attempts,
+            self._report,
+            self._on_neighbour_lost,
+        )
+        self._forwarding = Forwarding(
+            node_id, routing, self._delivery, self.complaints, self._report
+        )
 
     # Driven from outside ---------------------------------------------------------------------
 
@@ -156,9 +162,15 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if kind in _TYPES_WITH_NUMBERS and not messages.is_finite(payload):
             self._drop("not a finite number", payload)
             return
-        self._learn(creator, from_, kind)
+        heard_s = self._delivery.heard_s
+        if from_ not in heard_s:
+            self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
+        heard_s[from_] = now_s
+        self._routing.can_communicate_with_node(from_)
+        if creator not in (from_, me):
+            self._learn_path(creator, from_, kind)
         if forward not in (me, BROADCAST):
-            self._forward(payload, creator, from_, kind, forward)
+            self._forwarding.forward(payload, now_s)
         elif kind == _HEARTBEAT:
             body = messages.HeartbeatMessage.BODY.unpack_from(payload, messages.HEADER_BYTES)
             self._on_heartbeat(creator, from_, *body)
@@ -196,7 +208,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     def get_total_message_sent(self) -> int:
         """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
-        return self._total_sent
+        return self._delivery.total_sent
 
     def get_preferred_gateway(self) -> int:
         """Id of the gateway this node uses, or NO_ROUTE while it knows none."""
@@ -216,7 +228,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     def get_neighbours(self) -> dict[int, float]:
         """Direct neighbours, and when each was last heard (seconds of the core's clock)."""
-        return dict(self._heard_s)
+        return dict(self._delivery.heard_s)
 
     def get_route_to_gateway(self) -> int:
         """The neighbour that leads to the preferred gateway; the own id for a gateway itself."""
@@ -245,20 +257,11 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`."""
-        return self._send_own(_HEARTBEAT, other, self._heartbeat_body())
+        return self._delivery.send_own(_HEARTBEAT, other, self._heartbeat_body())
 
     def send_heartbeats(self, others: Sequence[int]) -> None:
         """A heartbeat towards each of these; those for direct neighbours leave together."""
-        me, body, routing = self._node_id, self._heartbeat_body(), self._routing
-        direct = [other for other in others if routing.get_direction_to_node(other) == other]
-        packets = [messages.packet(_HEARTBEAT, me, me, other, other, body) for other in direct]
-        for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
-            if taken:
-                self._sent(other)
-            elif not self._send(packet, other, self._timing.send_attempts - 1):
-                self._send_own(_HEARTBEAT, other, body)
-        for other in set(others).difference(direct):
-            self.send_heartbeat(other)
+        self._delivery.send_own_to_each(_HEARTBEAT, others, self._heartbeat_body())
 
     # For the router and the gateway to fill in -----------------------------------------------
 
@@ -292,20 +295,17 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     def _flight_started(self) -> None:
         """The drone leaves its place."""
 
+    def _on_neighbour_lost(self, node: int) -> None:
+        """A neighbour could not be handed a packet; the routes know already."""
+
     def _knows_gateway(self) -> bool:
         """What the packets of this node say of its connection."""
         return self._connected
 
     # Receiving -------------------------------------------------------------------------------
 
-    def _learn(self, creator: int, from_: int, kind: int) -> None:
-        if from_ not in self._heard_s:
-            self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
-        self._heard_s[from_] = self._now_s
+    def _learn_path(self, creator: int, from_: int, kind: int) -> None:
         routing = self._routing
-        routing.can_communicate_with_node(from_)
-        if creator == from_ or creator == self._node_id:
-            return
         if kind == _HEARTBEAT:
             routing.proven_path_to_node(from_, creator)
         elif routing.get_direction_to_node(creator) == NO_ROUTE:
@@ -319,7 +319,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         elif kind == MessageType.MISSING:
             missing = messages.MissingMessage.from_payload(payload).missing
             if missing != self._node_id:
-                self._forget_route(creator, missing, told_by=from_)
+                self._delivery.forget_route(creator, missing, told_by=from_)
         elif kind == MessageType.MOVE_TO_LOCATION:
             self._on_order(messages.GoToLocationMessage.from_payload(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
@@ -346,77 +346,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._report(MeshEventKind.FLIGHT_ORDERED, order.creator, _in_words(goal))
         self._fly_to(goal)
 
-    def _forward(self, payload: bytes, creator: int, from_: int, kind: int, forward: int) -> None:
-        routing = self._routing
-        identity = b""
-        if creator == self._node_id:
-            self._drop_circulating(payload, forward, routing.get_direction_to_node(forward))
-            self._stranded(kind, forward)
-            return
-        if kind != _HEARTBEAT:
-            identity = payload[:1] + payload[2:3] + payload[4:]
-            first = self._circulation.came_round(identity, from_, self._now_s)
-            if first is not None:
-                self._drop_circulating(payload, forward, first.went_to)
-                self._stranded(kind, forward)
-                return
-        for _attempt in range(2):
-            to = routing.get_direction_to_node(forward)
-            if to in (NO_ROUTE, from_):
-                self._stranded(kind, forward)
-                self._tell_missing(forward, first=from_)
-                return
-            sent_on = messages.next_hop(payload, self._node_id, to)
-            if sent_on is None:
-                self._drop("a heartbeat with too many hops", payload)
-                return
-            if self._send(sent_on, to):
-                if identity:
-                    self._circulation.passed(identity, from_, to, self._now_s)
-                return
-        self._stranded(kind, forward)
-
-    def _stranded(self, kind: int, forward: int) -> None:
-        """People want to know of an order that goes no further, though its gateway had a route."""
-        if kind == MessageType.MOVE_TO_LOCATION:
-            reason = f"no route to drone {forward}"
-            self.complaints.add(reason, "an order for it ends here", self._now_s)
-            self._report(MeshEventKind.NO_ROUTE, forward)
-
-    def _drop_circulating(self, payload: bytes, forward: int, used: int) -> None:
-        self._drop("a packet that goes round in circles", payload)
-        if used not in (forward, NO_ROUTE):
-            self._routing.other_cant_communicate_with_node(used, forward)
-
     def _drop(self, reason: str, payload: bytes) -> None:
-        self.complaints.add(f"dropped {reason}", payload.hex(), self._now_s)
-
-    # Sending ---------------------------------------------------------------------------------
-
-    def _send(self, payload: bytes, to: int, attempts: int | None = None) -> bool:
-        """Hand a packet to neighbour `to`, more than once if need be. The routes learn from it."""
-        for _attempt in range(self._timing.send_attempts if attempts is None else attempts):
-            if self._antenna.send_message_to(payload):
-                self._sent(to)
-                return True
-        self._neighbour_lost(to)
-        return False
-
-    def _sent(self, to: int) -> None:
-        self._total_sent += 1
-        self._routing.can_communicate_with_node(to)
-
-    def _send_own(self, kind: int, other: int, body: bytes = b"") -> bool:
-        """Send a packet of our own towards `other`, over one route after the other."""
-        me = self._node_id
-        tried: list[int] = []
-        while True:
-            to = self._routing.get_direction_to_node(other)
-            if to == NO_ROUTE or to in tried:
-                return False
-            if self._send(messages.packet(kind, me, me, to, other, body), to):
-                return True
-            tried.append(to)
+        self.complaints.dropped(reason, payload, self._now_s)
 
     def _heartbeat_body(self) -> bytes:
         return messages.HeartbeatMessage.BODY.pack(
@@ -429,57 +360,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             body = messages.LocationMessage.BODY.pack(
                 *_on_the_wire(location), int(self._now_s) % 2**32
             )
-            self._send_own(MessageType.LOCATION, asker, body)
-
-    # Lost nodes ------------------------------------------------------------------------------
-
-    def _neighbour_lost(self, node: int) -> None:
-        if self._heard_s.pop(node, None) is not None:
-            self._report(MeshEventKind.NEIGHBOUR_LOST, node)
-        if self._routing.cant_communicate_with_node(node):
-            self._report(MeshEventKind.NODE_MISSING, node)
-            self._tell_missing(node)
-
-    def _forget_route(self, other: int, node: int, told_by: int) -> None:
-        """`other` cannot reach `node`; if that was the last route, the others have to know."""
-        if other == node:
-            self._heard_s.pop(node, None)
-        if self._routing.other_cant_communicate_with_node(other, node):
-            self._report(MeshEventKind.NODE_MISSING, node)
-            self._tell_missing(node, told_by=told_by)
-
-    def _drop_routes_to(self, node: int) -> None:
-        """Forget every way to `node`, one after the other."""
-        while True:
-            to = self._routing.get_direction_to_node(node)
-            if to == NO_ROUTE:
-                return
-            if to == node:
-                self._heard_s.pop(node, None)
-                self._routing.cant_communicate_with_node(node)
-            else:
-                self._routing.other_cant_communicate_with_node(to, node)
-
-    def _tell_missing(self, missing: int, first: int = NO_ROUTE, told_by: int = NO_ROUTE) -> None:
-        """MISSING to every neighbour, `first` before the others and `told_by` not at all.
-
-        A neighbour that cannot be told is lost itself: that is told after this, not within it, so
-        that the depth of the call does not grow with the number of neighbours.
-        """
-        self._missing_to_tell.append((missing, first, told_by))
-        if self._telling:
-            return
-        self._telling = True
-        try:
-            while self._missing_to_tell:
-                missing, first, told_by = self._missing_to_tell.popleft()
-                body = bytes((missing,))
-                neighbours = self._routing.get_set_of_children() - {missing, told_by}
-                for neighbour in sorted(neighbours, key=lambda n: (n != first, n)):
-                    if self._routing.get_direction_to_node(neighbour) == neighbour:
-                        self._send_own(MessageType.MISSING, neighbour, body)
-        finally:
-            self._telling = False
+            self._delivery.send_own(MessageType.LOCATION, asker, body)
 
     # Flight ----------------------------------------------------------------------------------
 
@@ -507,7 +388,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self.search_other_nodes_in_range()
 
     def _forget_neighbourhood(self) -> None:
-        self._heard_s.clear()
+        self._delivery.heard_s.clear()
         self._routing.node_moved_location()
 
     def _own_location(self) -> Location | None:

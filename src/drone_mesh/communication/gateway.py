@@ -70,7 +70,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             self._fly_to(Location(latitude, longitude, height))
             return True
         body = messages.GoToLocationMessage.BODY.pack(latitude, longitude, height)
-        if self._send_own(MessageType.MOVE_TO_LOCATION, node_id, body):
+        if self._delivery.send_own(MessageType.MOVE_TO_LOCATION, node_id, body):
             return True
         _log.warning("gateway %d: no route to drone %d, it stays", self._node_id, node_id)
         self._report(MeshEventKind.NO_ROUTE, node_id)
@@ -84,7 +84,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
                 continue
             next_hop = self._routing.get_direction_to_node(node)
             hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
-            heard_s = max(heard_s, self._heard_s.get(node, -math.inf))
+            heard_s = max(heard_s, self._delivery.heard_s.get(node, -math.inf))
             if next_hop != NO_ROUTE or heard_s > -math.inf:
                 nodes.append(KnownNode(node, next_hop, hops, heard_s))
         return nodes

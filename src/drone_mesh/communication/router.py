@@ -112,9 +112,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _ask_for_locations(self) -> None:
         next_hop = self.get_route_to_gateway()
         if self._gateway_location is None or next_hop == self._preferred_gateway:
-            self._send_own(MessageType.REQUESTLOCATION, self._preferred_gateway)
+            self._delivery.send_own(MessageType.REQUESTLOCATION, self._preferred_gateway)
         if next_hop not in (self._preferred_gateway, NO_ROUTE):
-            self._send_own(MessageType.REQUESTLOCATION, next_hop)
+            self._delivery.send_own(MessageType.REQUESTLOCATION, next_hop)
 
     # Connection ------------------------------------------------------------------------------
 
@@ -140,9 +140,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
             to = shortcut.neighbour
             its_gateway = self._gateway_of.get(to, gateway)
             packet = messages.packet(MessageType.HEARTBEAT, me, me, to, its_gateway, body)
-            if self._send(packet, to) and its_gateway == gateway:
+            if self._delivery.send(packet, to) and its_gateway == gateway:
                 return True
-        if self._send_own(MessageType.HEARTBEAT, gateway, body):
+        if self._delivery.send_own(MessageType.HEARTBEAT, gateway, body):
             return True
         self._heartbeat_sent_s = -math.inf
         self._stop_awaiting()
@@ -209,7 +209,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if gateway > MAX_NODE_ID or gateway == self._node_id:
             return
         self._prefer(gateway)
-        self._drop_routes_to(gateway)
+        self._delivery.drop_routes_to(gateway)
         self._routing.other_can_communicate_with_node(neighbour, gateway)
         self._send_heartbeat_to_gateway()
 
@@ -238,8 +238,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._lost_since_s = due_s
             self._disconnect()
             if self._preferred_gateway != NO_ROUTE:
-                self._drop_routes_to(self._preferred_gateway)
-                self._tell_missing(self._preferred_gateway)
+                self._delivery.drop_routes_to(self._preferred_gateway)
+                self._delivery.tell_missing(self._preferred_gateway)
         elif self._negotiation.running:
             pass  # the emergency is being dealt with
         elif due_s - self._lost_since_s >= self._timing.connection_lost_after_s - ROUNDING_S:
@@ -294,7 +294,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._negotiation.start(self._node_id, score_on_the_air, self._now_s)
         self._deadlines.set(Due.DECIDE, self._negotiation.due_s)
         for neighbour in sorted(self._routing.get_set_of_children()):
-            self._send_own(MessageType.MOVEMENT_NEGOTIATION, neighbour, body)
+            self._delivery.send_own(MessageType.MOVEMENT_NEGOTIATION, neighbour, body)
         self._decide_negotiation()
 
     def _score(self) -> float:
@@ -316,8 +316,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._negotiate()
         self._decide_negotiation()
 
-    def _neighbour_lost(self, node: int) -> None:
-        super()._neighbour_lost(node)
+    def _on_neighbour_lost(self, node: int) -> None:
         if self._negotiation.running:  # nobody waits for the bid of a node that is gone
             self._deadlines.set(Due.DECIDE, self._now_s)
 
