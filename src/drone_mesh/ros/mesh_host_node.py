@@ -25,12 +25,16 @@ from drone_mesh.srv import PowerSwitch
 
 LOOK_PERIOD_S = 0.1
 TELL_PERIOD_S = 5.0  # wall; while there is nothing to do but wait
+PROGRESS_PERIOD_S = 0.5  # wall; the world gives up a host that is silent for two seconds
 
 _log = logging.getLogger(__name__)
 
 
 class FollowedClock:
-    """Simulated time as /clock tells it. `now_s` is set by rospy's thread and read by all."""
+    """Simulated time as /clock tells it, and what the world is told of how far the work is.
+
+    `now_s` is set by rospy's thread and read by all.
+    """
 
     def __init__(self) -> None:
         self.now_s = 0.0
@@ -44,13 +48,25 @@ class FollowedClock:
         """Let this executor know of the time, and the world of what it has worked off."""
         self._executor = executor
 
+    def is_followed(self) -> bool:
+        """Whether the world listens to how far the work is."""
+        return self._progress.get_num_connections() > 0
+
+    def tell_progress(self) -> None:
+        """Say how far the work is; also while one piece of it takes long, or time stands still."""
+        assert self._executor is not None
+        now_s = self.now_s
+        self._publish(rospy.Time.from_sec(now_s - self._executor.lag_s(now_s)))
+
     def _advance(self, clock: Clock) -> None:
         self.now_s = clock.clock.to_sec()
         if self._executor is not None:
-            progress = Header(stamp=clock.clock, frame_id=rospy.get_name())
             self._executor.time_advanced()
             # Comes after everything that was due by now, or was submitted before.
-            self._executor.submit(lambda _now_s: self._progress.publish(progress))
+            self._executor.submit(lambda _now_s: self._publish(clock.clock))
+
+    def _publish(self, done: rospy.Time) -> None:
+        self._progress.publish(Header(stamp=done, frame_id=rospy.get_name()))
 
 
 def _wait_for(what: str, is_there: Callable[[], bool], give_up: Callable[[], bool]) -> None:
@@ -124,6 +140,10 @@ def main() -> None:
         clock.drive(host.executor)
         host.start()
         host.wait_for_simulator(stop.requested)
+        # Or time would go on while the nodes are started, and their timers would be late.
+        _wait_for("/DroneFactory to listen", clock.is_followed, stop.requested)
+        clock.tell_progress()
         host.serve(ids)
-        stop.wait()
+        while not stop.wait(PROGRESS_PERIOD_S):
+            clock.tell_progress()
         host.stop()

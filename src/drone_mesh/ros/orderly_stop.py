@@ -37,9 +37,9 @@ class OrderlyStop:
         """Whether it is time to leave. Any thread."""
         return self._requested.is_set()
 
-    def wait(self) -> None:
-        """Return when it is time to leave."""
-        self._requested.wait()
+    def wait(self, timeout_s: float) -> bool:
+        """Return when it is time to leave (True), or after so many wall seconds (False)."""
+        return self._requested.wait(timeout_s)
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
         self._requested.set()

@@ -47,7 +47,10 @@ class _Hosts:
         rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._heard, tcp_nodelay=True)
 
     def _heard(self, progress: Header) -> None:
-        self._progress[progress.frame_id] = (progress.stamp.to_sec(), time.monotonic())
+        before_s, _said_s = self._progress.get(progress.frame_id, (0.0, 0.0))
+        # Two threads of a host tell: a later one may know less.
+        done_s = max(before_s, progress.stamp.to_sec())
+        self._progress[progress.frame_id] = (done_s, time.monotonic())
 
     def lag_s(self, now_s: float) -> float:
         """For how many simulated seconds the oldest undone work has been waiting."""

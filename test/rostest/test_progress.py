@@ -1,0 +1,94 @@
+#!/usr/bin/env python3
+"""The world and the processes that host its nodes keep together."""
+
+from __future__ import annotations
+
+import collections
+import time
+import unittest
+
+import rospy
+import rostest
+from drone_mesh.srv import SetSpeed
+from rosgraph_msgs.msg import Clock
+from rostest_support import WALL_LIMIT_S, MeshWatch, call, wait_for
+from std_msgs.msg import Header
+
+NOTHING_DONE = rospy.Time()
+REPEAT_S = 0.2  # wall
+STANDS_FOR_S = 3.0  # wall; longer than the world waits for a host that is silent
+
+
+class ProgressTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        rospy.init_node("test_progress")
+        cls.mesh = MeshWatch(4)
+        cls.now_s = 0.0
+        cls.said: collections.Counter[str] = collections.Counter()
+        rospy.Subscriber("/clock", Clock, cls._tick)
+        rospy.Subscriber("/mesh/progress", Header, lambda told: cls.said.update([told.frame_id]))
+        cls.mesh.wait("all connected", 60, cls.mesh.connected)
+
+    @classmethod
+    def _tick(cls, clock: Clock) -> None:
+        cls.now_s = clock.clock.to_sec()
+
+    def test_each_host_goes_on_telling_while_time_stands_still(self) -> None:
+        self.addCleanup(self._go_on)
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, True, 0.0).success)
+        self._wait_until_time_stands()
+        before = self.said.copy()
+        hosts = ("/mesh_host_1", "/mesh_host_2")
+        wait_for(
+            "both hosts said twice how far they are",
+            WALL_LIMIT_S,
+            lambda: all(self.said[host] - before[host] >= 2 for host in hosts),
+        )
+        self._go_on()
+        self.mesh.pass_time(1.0)
+
+    def test_the_world_waits_for_a_host_that_is_behind_but_not_for_a_silent_one(self) -> None:
+        slow = rospy.Publisher("/mesh/progress", Header, queue_size=10)
+        wait_for("the world listens", WALL_LIMIT_S, lambda: slow.get_num_connections() >= 2)
+        late = Header(stamp=NOTHING_DONE, frame_id="/slow_host")
+        self._wait_until_time_stands(lambda: slow.publish(late))
+        stands_at_s, until_s = self.now_s, time.monotonic() + STANDS_FOR_S
+        while time.monotonic() < until_s:
+            slow.publish(late)
+            time.sleep(REPEAT_S)
+            self.assertEqual(self.now_s, stands_at_s)
+        wait_for("time goes on", WALL_LIMIT_S, lambda: self.now_s > stands_at_s + 1.0)
+
+    def test_what_a_host_said_too_late_takes_nothing_back(self) -> None:
+        host = rospy.Publisher("/mesh/progress", Header, queue_size=10)
+        wait_for("the world listens", WALL_LIMIT_S, lambda: host.get_num_connections() >= 2)
+        begun_s = self.now_s
+        ahead = rospy.Time.from_sec(begun_s + 1000.0)
+        host.publish(Header(stamp=ahead, frame_id="/hasty_host"))
+
+        def time_went_on() -> bool:
+            host.publish(Header(stamp=NOTHING_DONE, frame_id="/hasty_host"))
+            time.sleep(REPEAT_S)
+            return self.now_s > begun_s + 2.0
+
+        wait_for("time goes on all the same", WALL_LIMIT_S, time_went_on)
+
+    def _go_on(self) -> None:
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 0.0).success)
+
+    def _wait_until_time_stands(self, meanwhile=lambda: None) -> None:
+        seen_s = -1.0
+
+        def stands() -> bool:
+            nonlocal seen_s
+            meanwhile()
+            before_s, seen_s = seen_s, self.now_s
+            time.sleep(REPEAT_S)
+            return before_s == seen_s == self.now_s
+
+        wait_for("time stands still", WALL_LIMIT_S, stands)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "progress", ProgressTest)
