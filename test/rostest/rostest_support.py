@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import threading
 import time
 from typing import Callable, Iterable
@@ -34,6 +35,13 @@ def call(service: str, service_class: type, *arguments: object) -> object:
     """Call a service once it is there."""
     rospy.wait_for_service(service, timeout=WALL_LIMIT_S)
     return rospy.ServiceProxy(service, service_class)(*arguments)
+
+
+def free_port() -> int:
+    """A TCP port that nobody listens on, for a master of one's own."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def pid_of(node: str) -> int | None:

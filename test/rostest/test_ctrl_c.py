@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import tempfile
 import time
@@ -13,16 +12,10 @@ import unittest
 from pathlib import Path
 
 import rostest
-from rostest_support import wait_for
+from rostest_support import free_port, wait_for
 
 LIMIT_S = 5.0
 NODES = ("wireless_signal_simulator", "drone_manager", "drone_factory")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def processes_of(port: int) -> list[str]:

@@ -25,7 +25,7 @@ from drone_mesh.ros.command_line import require_master, run_tool
 from drone_mesh.ros.console_controls import RosControls
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.mesh_state import mesh_status
-from drone_mesh.ros.parameters import file_parameter
+from drone_mesh.ros.parameters import manager_layouts
 
 LOOK_PERIOD_S = 1.0  # wall time between two looks at the master
 OLD_NEWS_S = 3.0  # wall time without a state after which the page says so
@@ -123,7 +123,7 @@ def _run() -> int:
     if not token and not is_loopback(address):
         token = secrets.token_urlsafe(TOKEN_BYTES)
     store = FrameStore()
-    layouts = layout_names(Layouts.load(_casus_file()))
+    layouts = layout_names(manager_layouts())
     server = ConsoleServer(store, RosControls(), access_for(address, token), layouts)
     runner = ConsoleRunner(server, address, port)
     stopped = threading.Event()
@@ -148,8 +148,3 @@ def _port(value: object) -> int:
     if not 0 <= port <= 65535:
         raise ConfigurationError(f"port: {value!r} is not a whole number from 0 to 65535")
     return port
-
-
-def _casus_file() -> str:
-    manager = str(rospy.get_param("/DroneManager/casus", ""))
-    return manager or str(file_parameter("casus", "casus.yaml"))

@@ -16,7 +16,7 @@ from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.mesh_host import MeshHost
 from drone_mesh.ros.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.orderly_stop import OrderlyStop
-from drone_mesh.ros.parameters import factory_configuration, or_stop
+from drone_mesh.ros.parameters import factory_configuration, manager_layouts, or_stop
 from drone_mesh.ros.virtual_raspberry_pi import MeshSettings
 from drone_mesh.ros.world_runner import WorldRunner
 from drone_mesh.ros.world_window import window_of
@@ -35,6 +35,7 @@ def _read_parameters() -> tuple[FactoryConfiguration, MeshSettings, int]:
     plan_fleet(*fleet, configuration.gridsize, configuration.spacing)
     if configuration.gui:
         require_screen()
+    manager_layouts()  # with a bad file the manager is restarted for ever; this ends the launch
     hosts = str(rospy.get_param("~hosts", "") or 1)
     if not hosts.isdigit():
         raise ConfigurationError(f"argument: hosts is {hosts!r}, want a whole number, 0 or more")
@@ -56,7 +57,8 @@ def main() -> None:
     """Run the node.
 
     Parameters (private): all keys of config/factory.yaml, each overruling the file; ~config, that
-    file; ~hosts (int, 1): 1 = the nodes run in this process, otherwise they are left to others.
+    file; ~hosts (int, 1): 1 = the nodes run in this process, otherwise they are left to others;
+    /DroneManager/casus, which is looked at only.
     """
     rospy.init_node("DroneFactory", disable_signals=True)
     show_library_logs_on_rosout()

@@ -11,6 +11,7 @@ import rospy
 
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.layouts import Layouts
 
 PACKAGE = "drone_mesh"
 
@@ -32,6 +33,15 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
     """
     given = {key: rospy.get_param(f"~{key}", "") for key in keys}
     return load_configuration(file_parameter("config", "factory.yaml"), given)
+
+
+def manager_layouts() -> Layouts:
+    """The layouts of the DroneManager, from the file that its parameter names.
+
+    Raises ConfigurationError.
+    """
+    given = str(rospy.get_param("/DroneManager/casus", ""))
+    return Layouts.load(given or file_parameter("casus", "casus.yaml"))
 
 
 def file_parameter(name: str, default: str) -> Path:

@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+"""An argument that makes no sense ends the whole launch, with one line that says what is wrong."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import unittest
+
+import rostest
+from rostest_support import free_port
+
+LIMIT_S = 30.0
+
+
+class BadArgumentsTest(unittest.TestCase):
+    def launch_and_expect(self, argument: str, line: str) -> None:
+        port = free_port()
+        launch = subprocess.run(
+            ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", argument],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"},
+            timeout=LIMIT_S,
+            check=False,
+            text=True,
+        )
+        self.assertIn(f"/DroneFactory: {line}", launch.stdout)
+        self.assertNotIn("Traceback", launch.stdout)
+
+    def test_a_number_that_is_out_of_bounds(self) -> None:
+        self.launch_and_expect("max_distance:=-1", "argument: max_distance is '-1', want metres")
+
+    def test_a_number_that_is_none(self) -> None:
+        self.launch_and_expect("hosts:=many", "argument: hosts is 'many', want a whole number")
+
+    def test_a_file_of_layouts_that_is_not_there(self) -> None:
+        self.launch_and_expect("casus:=/no/such.yaml", "/no/such.yaml: No such file or directory")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "bad_arguments", BadArgumentsTest)
