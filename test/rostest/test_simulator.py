@@ -11,9 +11,10 @@ import unittest
 
 import rospy
 import rostest
+from diagnostic_msgs.msg import DiagnosticArray
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.srv import AreaScan, Broadcast, WirelessMessages
-from rostest_support import LogWatch, Stranger, call, wait_for
+from rostest_support import WALL_LIMIT_S, LogWatch, Stranger, call, wait_for
 
 # A receiver in a process of its own, to be killed.
 RECEIVER = """
@@ -46,6 +47,21 @@ class SimulatorTest(unittest.TestCase):
 
     def in_range(self, node_id: int) -> list[int]:
         return list(call("/SignalSimulator/othersinRange", AreaScan, node_id).near)
+
+    def knows(self, node_id: int) -> bool:
+        try:
+            self.in_range(node_id)
+        except rospy.ServiceException:
+            return False
+        return True
+
+    def figure(self, name: str) -> float:
+        """What the simulator tells of its work, told after this was called."""
+        told: list[float] = []
+        for _message in range(2):  # the first may have been on its way
+            array = rospy.wait_for_message("/diagnostics", DiagnosticArray, WALL_LIMIT_S)
+            told += [float(v.value) for s in array.status for v in s.values if v.key == name]
+        return told[-1]
 
     def test_a_packet_reaches_the_topic_of_its_receiver_unchanged(self) -> None:
         sent = packet(1, 2) + bytes(range(27))
@@ -112,6 +128,22 @@ class SimulatorTest(unittest.TestCase):
         finally:
             receiver.kill()
             receiver.wait()
+
+    def test_only_who_has_listened_before_can_lose_a_packet(self) -> None:
+        late = Stranger(8, "/stranger_late", (1.0, 1.0, 0.1))
+        late.subscriber.unregister()
+        late.tell((1.0, 1.0, 0.1), "/stranger_late")
+        wait_for("8 is known", WALL_LIMIT_S, lambda: self.knows(8))
+        lost = self.figure("lost in range")
+        self.assertFalse(self.a.send(packet(1, 8)))
+        self.assertEqual(self.figure("lost in range"), lost)
+
+        subscriber = rospy.Subscriber("/stranger_late", NRF24, lambda _packet: None)
+        wait_for("8 listens", WALL_LIMIT_S, lambda: self.a.send(packet(1, 8)))
+        subscriber.unregister()
+        wait_for("8 listens no more", WALL_LIMIT_S, lambda: not self.a.send(packet(1, 8)))
+        self.assertGreater(self.figure("lost in range"), lost)
+        late.tell((0.0, 0.0, 0.0), "/stranger_late", on=False)
 
     def test_bad_information_changes_nothing_and_does_not_flood_the_log(self) -> None:
         nan = float("nan")

@@ -39,6 +39,7 @@ class _Listener(rospy.SubscribeListener):
     """The topic of one antenna. `deliver` tells the truth about whether somebody is there."""
 
     def __init__(self, topic: str) -> None:
+        self.has_listened = False  # set by rospy's thread: the first receiver has connected
         with warnings.catch_warnings():
             # Synchronous on purpose: a queue costs a thread and two switches per packet, and hides
             # that the receiver is gone. What it protects from is seen to in peer_subscribe.
@@ -49,6 +50,7 @@ class _Listener(rospy.SubscribeListener):
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """A receiver that is stuck may hold up a sender for a moment only, then it is cut off."""
+        self.has_listened = True
         timeval = struct.pack("@ll", 0, int(STUCK_RECEIVER_S * 1e6))
         for connection in self._connections():
             if connection.socket is not None:
@@ -151,7 +153,10 @@ class WirelessSignalSimulator:
         if topic is None:
             return WirelessMessageResponse(False)
         if request.from_ == request.to:  # an antenna asks whether it is known yet
-            return WirelessMessageResponse(self._send(topic, request.message))
+            listener = self._listeners.get(topic)
+            return WirelessMessageResponse(
+                listener is not None and listener.deliver(request.message)
+            )
         return WirelessMessageResponse(self._carry(topic, request.message))
 
     def _messages(self, request: WirelessMessages) -> WirelessMessagesResponse:
@@ -203,21 +208,18 @@ class WirelessSignalSimulator:
         return listener is not None and listener.has_receiver()
 
     def _carry(self, topic: str, message: NRF24) -> bool:
-        delivered = self._send(topic, message)
+        listener = self._listeners.get(topic)
+        delivered = listener is not None and listener.deliver(message)
         with self._lock:
             if delivered:
                 self._delivered += 1
-            else:
-                self._lost += 1
+            elif listener is not None and listener.has_listened:
+                self._lost += 1  # before that it is on its way into the air, and misses nothing
         return delivered
 
     def _figures(self) -> dict[str, float]:
         with self._lock:
             return {names.DELIVERED: self._delivered, names.LOST_IN_RANGE: self._lost}
-
-    def _send(self, topic: str, message: NRF24) -> bool:
-        listener = self._listeners.get(topic)
-        return listener is not None and listener.deliver(message)
 
 
 def main() -> None:
