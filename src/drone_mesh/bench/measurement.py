@@ -54,6 +54,7 @@ class _Moment:
     look: Look
     use: Use
     delivered: float | None
+    delivered_s: float  # when that was told: once a second, and not with the look
     lost: float | None
 
 
@@ -108,7 +109,13 @@ def _take_moment(system: System) -> _Moment:
     if not system.wait_for(lambda: len(watch.looks) >= seen + 2, LOOK_WITHIN_S, lambda: None):
         raise BenchmarkError(f"no /mesh/state for {LOOK_WITHIN_S:g} s")
     look = watch.looks[-1]
-    return _Moment(look, system.use(), watch.total(DELIVERED), watch.total(LOST_IN_RANGE))
+    return _Moment(
+        look,
+        system.use(),
+        watch.total(DELIVERED),
+        watch.told_s(DELIVERED),
+        watch.total(LOST_IN_RANGE),
+    )
 
 
 def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosResult:
@@ -133,7 +140,7 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         window_sim_s=sim_s,
         messages_per_wall_s=messages / wall_s,
         messages_per_sim_s=messages / sim_s if sim_s else 0.0,
-        deliveries_per_wall_s=None if delivered is None else delivered / wall_s,
+        deliveries_per_wall_s=_rate(delivered, last.delivered_s - first.delivered_s),
         lost_share=_share(lost, delivered),
         lost_before=first.lost,
         cpu_ms_per_message=1000 * sum(cores.values()) * wall_s / messages if messages else None,
@@ -155,6 +162,10 @@ def _per_link(cpu_s: float, sim_s: float, links: int) -> float | None:
 
 def _increase(before: float | None, after: float | None) -> float | None:
     return None if before is None or after is None else after - before
+
+
+def _rate(increase: float | None, seconds: float) -> float | None:
+    return None if increase is None or seconds <= 0.0 else increase / seconds
 
 
 def _share(lost: float | None, delivered: float | None) -> float | None:

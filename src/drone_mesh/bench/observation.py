@@ -44,6 +44,7 @@ class Figures:
     """Numbers that a part of the system publishes about itself, by name."""
 
     of: str
+    wall_s: float  # when they arrived, time.monotonic
     values: dict[str, float] = field(default_factory=dict)
 
 
@@ -73,7 +74,7 @@ class Watch:
         self._drones = drones
         self._happenings: list[Happening] = []
         self.looks: list[Look] = []
-        self.figures: dict[str, dict[str, float]] = {}
+        self.figures: dict[str, Figures] = {}  # the latest, by who tells them
         self.worst: dict[str, float] = {}  # the largest value of each figure, whoever told it
         self.all_on: Look | None = None  # the first in which they were
         self.all_connected: Look | None = None
@@ -83,7 +84,7 @@ class Watch:
         if isinstance(sight, Happening):
             self._happenings.append(sight)
         elif isinstance(sight, Figures):
-            self.figures[sight.of] = sight.values
+            self.figures[sight.of] = sight
             for name, value in sight.values.items():
                 self.worst[name] = max(value, self.worst.get(name, -math.inf))
         else:
@@ -114,8 +115,15 @@ class Watch:
 
     def total(self, name: str) -> float | None:
         """The sum of a figure over all who tell it; None: nobody does."""
-        told = [values[name] for values in self.figures.values() if name in values]
+        told = [figures.values[name] for figures in self._who_tell(name)]
         return sum(told) if told else None
+
+    def told_s(self, name: str) -> float:
+        """When the latest of what `total` sums arrived, time.monotonic; 0: nobody tells it."""
+        return max((figures.wall_s for figures in self._who_tell(name)), default=0.0)
+
+    def _who_tell(self, name: str) -> list[Figures]:
+        return [figures for figures in self.figures.values() if name in figures.values]
 
 
 def first_time_all_are_connected(happenings: Iterable[Happening], routers: int) -> float | None:

@@ -343,8 +343,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         except GoalRefused as error:
             self.complaints.add("order refused", str(error), self._now_s)
             return
-        self._report(MeshEventKind.FLIGHT_ORDERED, order.creator, _in_words(goal))
-        self._fly_to(goal)
+        self._take_order(order.creator, goal)
 
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._now_s)
@@ -364,9 +363,13 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     # Flight ----------------------------------------------------------------------------------
 
-    def _fly_to(self, goal: Location) -> None:
+    def _take_order(self, creator: int, goal: Location) -> None:
         if self._flight is not None and self._flight.goal == goal:
             return  # a second gateway orders the same flight (reference 14.11)
+        self._report(MeshEventKind.FLIGHT_ORDERED, creator, _in_words(goal))
+        self._fly_to(goal)
+
+    def _fly_to(self, goal: Location) -> None:
         self._flight = Flight(goal)
         self._deadlines.set(Due.ASK_POSITION, self._now_s + FLIGHT_POSITION_PERIOD_S)
         self._engine.set_goal(*goal)

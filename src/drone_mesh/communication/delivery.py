@@ -50,16 +50,17 @@ class Delivery:
 
     # Sending ---------------------------------------------------------------------------------
 
-    def send(self, payload: bytes, to: int, failures: int = 0) -> bool:
+    def send(self, payload: bytes, to: int, failures: int = 0, came_from: int = NO_ROUTE) -> bool:
         """Hand a packet to neighbour `to`, more than once if need be. The routes learn from it.
 
-        `failures`: how often that was tried in vain before.
+        `failures`: how often that was tried in vain before; `came_from`: who hears of it first if
+        the neighbour turns out to be lost.
         """
         for _attempt in range(failures, self._attempts):
             if self._antenna.send_message_to(payload):
                 self._sent(to)
                 return True
-        self._neighbour_lost(to)
+        self._neighbour_lost(to, came_from)
         return False
 
     def send_own(self, kind: int, other: int, body: bytes = b"") -> bool:
@@ -102,11 +103,16 @@ class Delivery:
             self.tell_missing(node, told_by=told_by)
 
     def drop_routes_to(self, node: int) -> None:
-        """Forget every way to `node`, one after the other."""
+        """Forget every way to `node`, one after the other.
+
+        A technique that keeps a way nevertheless is not asked again.
+        """
+        tried: list[int] = []
         while True:
             to = self._routing.get_direction_to_node(node)
-            if to == NO_ROUTE:
+            if to == NO_ROUTE or to in tried:
                 return
+            tried.append(to)
             if to == node:
                 self.heard_s.pop(node, None)
                 self._routing.cant_communicate_with_node(node)
@@ -134,10 +140,10 @@ class Delivery:
         finally:
             self._telling = False
 
-    def _neighbour_lost(self, node: int) -> None:
+    def _neighbour_lost(self, node: int, came_from: int) -> None:
         if self.heard_s.pop(node, None) is not None:
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)
         if self._routing.cant_communicate_with_node(node):
             self._report(MeshEventKind.NODE_MISSING, node)
-            self.tell_missing(node)
+            self.tell_missing(node, first=came_from)
         self._on_neighbour_lost(node)

@@ -41,25 +41,28 @@ class Forwarding:
             self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
             return
         if kind != MessageType.HEARTBEAT:
-            identity = payload[:1] + payload[2:3] + payload[4:]
+            identity = messages.identity(payload)
             first = self._circulation.came_round(identity, from_, now_s)
             if first is not None:
                 self._drop_circulating(payload, first.went_to, now_s)
                 return
+        lost = NO_ROUTE
         for _attempt in range(2):
             to = routing.get_direction_to_node(forward)
             if to in (NO_ROUTE, from_):
                 self._stranded(kind, forward, now_s)
-                self._delivery.tell_missing(forward, first=from_)
+                if to == from_ or lost != forward:  # else all were told when it was lost
+                    self._delivery.tell_missing(forward, first=from_)
                 return
             sent_on = messages.next_hop(payload, self._node_id, to)
             if sent_on is None:
                 self._complaints.dropped("a heartbeat with too many hops", payload, now_s)
                 return
-            if self._delivery.send(sent_on, to):
+            if self._delivery.send(sent_on, to, came_from=from_):
                 if identity:
                     self._circulation.passed(identity, from_, to, now_s)
                 return
+            lost = to
         self._stranded(kind, forward, now_s)
 
     def _drop_circulating(self, payload: bytes, used: int, now_s: float) -> None:

@@ -66,10 +66,12 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if not 0 <= node_id <= MAX_NODE_ID:
             raise GoalRefused(f"drone {node_id}: ids are 0..{MAX_NODE_ID}")
         check_goal(latitude, longitude, height)
+        if height != int(height):
+            raise GoalRefused(f"height {height} m: an order gives whole metres")
         if node_id == self._node_id:
-            self._fly_to(Location(latitude, longitude, height))
+            self._take_order(node_id, Location(latitude, longitude, height))
             return True
-        body = messages.GoToLocationMessage.BODY.pack(latitude, longitude, height)
+        body = messages.GoToLocationMessage.BODY.pack(latitude, longitude, int(height))
         if self._delivery.send_own(MessageType.MOVE_TO_LOCATION, node_id, body):
             return True
         _log.warning("gateway %d: no route to drone %d, it stays", self._node_id, node_id)

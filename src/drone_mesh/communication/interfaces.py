@@ -166,6 +166,9 @@ class IRoutingTechnique(abc.ABC):
     """Which neighbour leads to which node (SDD 2.2.9, reference section 8).
 
     A node in direct reach is a "child"; nodes behind it are its "grandchildren".
+
+    Called by one thread at a time, but for `get_direction_to_node` and `get_table_size`: whoever
+    reports on the node may call these meanwhile. If they raise then, that one report is an old one.
     """
 
     @abc.abstractmethod

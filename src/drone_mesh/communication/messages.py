@@ -269,6 +269,11 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
     return bytes(sent_on)
 
 
+def identity(payload: bytes) -> bytes:
+    """What stays the same while a packet that is no heartbeat is sent on."""
+    return payload[:FROM] + payload[TYPE:TO] + payload[FORWARD:]
+
+
 def is_finite(payload: bytes) -> bool:
     """Whether the numbers of a packet are numbers; True for types without any."""
     numbers = _NUMBERS.get(payload[TYPE])

@@ -128,8 +128,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
         gateway = self._preferred_gateway
         body = self._heartbeat_body()
         self._was_connected = self._knows_gateway()
+        self._awaiting_answer = True  # first: others may look in between
         self._connected = False
-        self._awaiting_answer = True
         self._deadlines.set(Due.ANSWER, now_s + HEARTBEAT_ANSWER_S)
         self._heartbeat_sent_s = now_s
         shortcut, self._shortcut = self._shortcut, None

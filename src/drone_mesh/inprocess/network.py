@@ -173,15 +173,19 @@ class Network:
             node.plan()
 
     def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> bool:
-        """Order a drone to (x, y, height) metres through a gateway; as IGatewayCommands."""
+        """Order a drone to (x, y, height) metres through a gateway; as IGatewayCommands.
+
+        Raises ValueError if `gateway` is none, and GoalRefused as IGatewayCommands does.
+        """
         node = self.nodes[gateway]
-        assert isinstance(node.component, MeshnetworkGateway)
+        if not isinstance(node.component, MeshnetworkGateway):
+            raise ValueError(f"node {gateway} is a router: orders go through a gateway")
         taken = node.component.send_goal_request_to_drone(node_id, y, x, height, self.clock.now_s)
         node.plan()
         return taken
 
     def inject(self, node_id: int, payload: bytes) -> None:
-        """Let a node hear a packet from nowhere."""
+        """Let a node hear a packet from nowhere, also one whose antenna has no power."""
         self.nodes[node_id].hear(payload)
 
     def run_for(self, seconds: float) -> None:

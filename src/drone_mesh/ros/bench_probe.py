@@ -40,7 +40,7 @@ class Probe:
         self._watching: rospy.Subscriber | None = None
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event)
         rospy.Subscriber(names.DIAGNOSTICS_TOPIC, DiagnosticArray, self._diagnostics)
-        self._tell(Figures(PROBE))
+        self._tell(Figures(PROBE, time.monotonic()))
 
     def obey(self, order: str) -> None:
         """Watch the state from now on, or rest."""
@@ -76,7 +76,7 @@ class Probe:
                     values[pair.key] = float(pair.value)
                 except ValueError:
                     continue  # words, for people
-            self._tell(Figures(status.name, values))
+            self._tell(Figures(status.name, time.monotonic(), values))
 
     def _tell(self, sight: Sight) -> None:
         with self._lock:

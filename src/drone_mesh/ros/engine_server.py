@@ -32,21 +32,26 @@ class PositionReporter(rospy.SubscribeListener):
     def __init__(self, drones: tuple[VirtualDrone, ...]) -> None:
         self._drones = drones
         self._publisher = rospy.Publisher(
-            names.SIGNAL_TOPIC,
-            DroneInfo,
-            subscriber_listener=self,
-            tcp_nodelay=True,
-            queue_size=names.SIGNAL_QUEUE,
+            names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
         )
+        # Listens only once there is a publisher to speak with; who came before is told here.
+        self._publisher.impl.add_subscriber_listener(self)
+        self._report_all()
 
     def report(self, info: DroneInfo) -> None:
         """To everybody who listens now."""
         self._publisher.publish(info)
 
-    def peer_subscribe(self, _topic: str, _publish: object, peer_publish: rospy.Publisher) -> None:
-        """Somebody new, perhaps a simulator that was restarted: tell it where everybody is."""
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """Somebody new, perhaps a simulator that was restarted: tell where everybody is.
+
+        Tell everybody: what rospy offers for the new one alone is not safe beside other threads.
+        """
+        self._report_all()
+
+    def _report_all(self) -> None:
         for drone in self._drones:
-            peer_publish(engine_info(drone.node_id, drone.engine.state.position))
+            self.report(engine_info(drone.node_id, drone.engine.state.position))
 
 
 class EngineServer:

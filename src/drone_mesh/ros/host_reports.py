@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from typing import Callable
 
@@ -13,12 +14,15 @@ from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.msg import MeshEvent as MeshEventMsg
 from drone_mesh.ros import names
+from drone_mesh.ros.logs import ThrottledLog
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.observation import describe_component
 
 REPORT_PERIOD_S = 0.5  # wall time; our choice: an event is seen soon
 REPORT_PERIOD_PER_NODE_S = 0.004  # our choice: 254 nodes with 200 neighbours each, once a second
 NEVER_MIND_QUEUE = 4  # reports that may wait for a slow reader; each one is complete in itself
+
+_log = logging.getLogger(__name__)
 
 
 class HostReports:
@@ -33,6 +37,7 @@ class HostReports:
     def __init__(self) -> None:
         self._hosted: list[tuple[NodeState, MeshnetworkComponent, Callable[[], bool]]] = []
         self._batcher = EventBatcher()
+        self._complaints = ThrottledLog(_log)
         self._publisher = rospy.Publisher(
             names.REPORTS_TOPIC, HostReport, queue_size=NEVER_MIND_QUEUE
         )
@@ -74,7 +79,12 @@ class HostReports:
         report = HostReport(host=rospy.get_name())
         report.header.stamp = rospy.Time.from_sec(now_s)
         for state, component, antenna_on in list(self._hosted):
-            describe_component(state, component, antenna_on(), now_s)
+            try:
+                describe_component(state, component, antenna_on(), now_s)
+            except Exception as error:  # of a routing technique whose tables change meanwhile
+                self._complaints.warning(
+                    "a node could not be described", f"node {state.id}: {error!r}"
+                )
             report.nodes.append(state)
         report.events = [
             MeshEventMsg(

@@ -27,7 +27,7 @@ from drone_mesh.ros.virtual_raspberry_pi import (
 )
 
 SIMULATOR_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
-_LOOK_PERIOD_S = 0.02
+_LOOK_PERIOD_S = 0.02  # wall; our choice
 
 _log = logging.getLogger(__name__)
 
@@ -95,6 +95,8 @@ class MeshHost:
         """Start these nodes, one after the other."""
         begun_s = time.monotonic()
         ids = list(node_ids)
+        if not ids:
+            return
         left = threading.Semaphore(len(ids) - 1)  # with emulated radios they start side by side
 
         def tell() -> None:

@@ -23,7 +23,7 @@ from drone_mesh.ros.parameters import or_stop
 from drone_mesh.ros.persistent_service import PersistentService, ServiceGone
 from drone_mesh.srv import PowerSwitch
 
-LOOK_PERIOD_S = 0.1
+LOOK_PERIOD_S = 0.1  # wall; our choice
 TELL_PERIOD_S = 5.0  # wall; while there is nothing to do but wait
 PROGRESS_PERIOD_S = 0.5  # wall; the world gives up a host that is silent for two seconds
 
@@ -104,6 +104,8 @@ def ids_to_serve(fleet: FactoryConfiguration) -> range:
     count = fleet.gateways + fleet.routers
     if rospy.has_param("~hosts"):
         hosts, index = _whole_parameter("hosts"), _whole_parameter("index")
+        if not 1 <= index <= hosts:
+            raise ConfigurationError(f"index is {index}, want 1..hosts, and hosts is {hosts}")
         ids = range(count * (index - 1) // hosts, count * index // hosts)
     else:
         ids = range(_whole_parameter("first"), _whole_parameter("last") + 1)
@@ -139,11 +141,13 @@ def main() -> None:
         host = MeshHost(or_stop(lambda: mesh_settings(fleet)), lambda: clock.now_s)
         clock.drive(host.executor)
         host.start()
-        host.wait_for_simulator(stop.requested)
-        # Or time would go on while the nodes are started, and their timers would be late.
-        _wait_for("/DroneFactory to listen", clock.is_followed, stop.requested)
-        clock.tell_progress()
-        host.serve(ids)
-        while not stop.wait(PROGRESS_PERIOD_S):
+        try:
+            host.wait_for_simulator(stop.requested)
+            # Or time would go on while the nodes are started, and their timers would be late.
+            _wait_for("/DroneFactory to listen", clock.is_followed, stop.requested)
             clock.tell_progress()
-        host.stop()
+            host.serve(ids)
+            while not stop.wait(PROGRESS_PERIOD_S):
+                clock.tell_progress()
+        finally:
+            host.stop()

@@ -9,8 +9,7 @@ from typing import Callable, NamedTuple, Protocol, Sequence
 
 import rospy
 
-from drone_mesh.communication.interfaces import PAYLOAD_BYTES
-from drone_mesh.communication.messages import FROM, TO
+from drone_mesh.communication.messages import FROM, TO, MessageType, packet
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros import names
@@ -43,6 +42,15 @@ class _Services(NamedTuple):
     messages: PersistentService
     broadcast: PersistentService
 
+    def close(self) -> None:
+        for service in self:
+            service.close()
+
+
+def probe_of(node_id: int) -> bytes:
+    """The packet that an antenna sends to itself, to see whether a simulator knows it."""
+    return packet(MessageType.NOTDEFINED, node_id, node_id, node_id, node_id)
+
 
 def _hand_over(services: _Services, payload: bytes) -> bool:
     """Call `message`: the fields of its request and response, which are bytes all of them."""
@@ -55,8 +63,8 @@ class SimulatorLink(rospy.SubscribeListener):
 
     Three threads meet here. The executor's worker sends. The link's own thread connects, for that
     may take long: while nobody is there, a send fails at once. Threads of rospy tell of new
-    subscribers. `_services` is replaced as a whole; `_lock` guards the antennas and which of them
-    the simulator does not have yet; it is not held while something is sent.
+    subscribers. `_services` is replaced as a whole; `_lock` guards that, the antennas, and which of
+    them the simulator does not have yet. It is not held while something is sent.
     """
 
     def __init__(self, executor: MeshExecutor) -> None:
@@ -126,15 +134,14 @@ class SimulatorLink(rospy.SubscribeListener):
         topic = names.node_topic(antenna.node_id)
         self._publisher.publish(DroneInfo(antenna.node_id, _NO_PLACE, topic, antenna.on()))
 
-    def probe_returned(self, node_id: int) -> bool:
-        """An antenna received its own packet. True: that was our probe, no more to do with it."""
+    def probe_returned(self, node_id: int) -> None:
+        """An antenna received its own probe: the simulator knows it. Again: nothing changes."""
         with self._lock:
             if node_id not in self._unregistered:
-                return False
+                return
             self._unregistered.discard(node_id)
             on_registered = self._on_registered[node_id]
         on_registered()
-        return True
 
     # Packets, the executor's worker ----------------------------------------------------------
 
@@ -191,12 +198,15 @@ class SimulatorLink(rospy.SubscribeListener):
             self._lost(services, error)
 
     def _lost(self, services: _Services, error: ServiceGone) -> None:
-        if self._services is services and not rospy.is_shutdown():
+        if rospy.is_shutdown():
+            return
+        with self._lock:
+            if self._services is not services:
+                return
             self._services = None
-            for service in services:
-                service.close()
-            _log.error("the simulator is gone: %s", error)
-            self._look.set()
+        self._executor.submit(lambda _now_s: services.close())  # not while the worker is in a call
+        _log.error("the simulator is gone: %s", error)
+        self._look.set()
 
     def _probe(self, _now_s: float) -> None:
         """Let each antenna that the simulator may not have yet send a packet to itself."""
@@ -208,12 +218,10 @@ class SimulatorLink(rospy.SubscribeListener):
             antennas = [self._antennas[node_id] for node_id in self._unregistered]
         for antenna in antennas:
             if antenna.on():
-                node_id = antenna.node_id
-                header = bytes((node_id, node_id, 0, node_id, node_id))
                 try:
-                    _hand_over(services, header.ljust(PAYLOAD_BYTES, b"\0"))
+                    _hand_over(services, probe_of(antenna.node_id))
                 except (ServiceGone, ServiceRefused) as error:
-                    _log.debug("probe of node %d: %s", node_id, error)
+                    _log.debug("probe of node %d: %s", antenna.node_id, error)
                     return
 
     # Connecting, the link's own thread -------------------------------------------------------
@@ -252,7 +260,7 @@ class SimulatorLink(rospy.SubscribeListener):
             return
         with self._lock:
             self._unregistered.update(self._on_registered)
-        self._services = services
+            self._services = services
         self._announce(unregistered_only=False)
         _log.info("connected to the simulator; %d antennas announced", len(self._antennas))
 

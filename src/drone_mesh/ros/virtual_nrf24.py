@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Sequence
 
 import rospy
@@ -11,12 +12,11 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import FROM
 from drone_mesh.execution import Seat
 from drone_mesh.msg import NRF24
 from drone_mesh.ros import names
 from drone_mesh.ros.antenna_panel import AntennaPanel
-from drone_mesh.ros.simulator_link import SimulatorLink
+from drone_mesh.ros.simulator_link import SimulatorLink, probe_of
 
 
 class VirtualNRF24(IWirelessCommunication):
@@ -28,15 +28,18 @@ class VirtualNRF24(IWirelessCommunication):
     Services:   /Nodes/<id>/powerSwitch (PowerSwitch)
 
     The functions of the interface are for the executor's worker. The handlers run in threads of
-    rospy, and hand everything over to the worker; of theirs is only `_on`, a single flag.
+    rospy, and hand everything over to the worker; of theirs is only `_on`, a single flag, which
+    `_switching` keeps in step with what the simulator and the worker are told of it.
     """
 
     def __init__(self, node_id: int, link: SimulatorLink, seat: Seat) -> None:
         """`seat` is where the mesh component of this node is driven."""
         self.node_id = node_id
+        self._probe = probe_of(node_id)
         self._link = link
         self._seat = seat
         self._on = False
+        self._switching = threading.Lock()
         self._mesh: IMeshNetwork | None = None
         self._subscriber: rospy.Subscriber | None = None
         self._panel = AntennaPanel(node_id, seat, self.on, self._switch_power)
@@ -87,9 +90,9 @@ class VirtualNRF24(IWirelessCommunication):
 
     def _heard(self, message: NRF24) -> None:
         payload = message.payload
-        if payload[FROM] == self.node_id and self._link.probe_returned(self.node_id):
-            return
-        if self._on:
+        if payload == self._probe:
+            self._link.probe_returned(self.node_id)
+        elif self._on:
             self._seat.submit(lambda now_s: self._receive(payload, now_s))
 
     def _receive(self, payload: bytes, now_s: float) -> None:
@@ -99,6 +102,7 @@ class VirtualNRF24(IWirelessCommunication):
     def _switch_power(self, on: bool) -> None:
         mesh = self._mesh
         if mesh is not None:
-            self._on = on
-            self._link.announce(self)
-            self._seat.submit(lambda now_s: mesh.on_antenna_power(on, now_s))
+            with self._switching:  # announcing only puts into a queue
+                self._on = on
+                self._link.announce(self)
+                self._seat.submit(lambda now_s: mesh.on_antenna_power(on, now_s))

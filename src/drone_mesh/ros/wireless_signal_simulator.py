@@ -12,6 +12,7 @@ import rospy
 from rospy.impl.transport import Transport
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.messages import TO
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros import names
 from drone_mesh.ros.figures import Figures
@@ -30,7 +31,6 @@ from drone_mesh.srv import (
 )
 
 STUCK_RECEIVER_S = 0.2  # our choice: who does not empty its socket for so long is cut off
-_TO = 3  # byte of the packet that names the receiver of this hop, reference, section 5
 
 _log = logging.getLogger(__name__)
 
@@ -167,7 +167,7 @@ class WirelessSignalSimulator:
             )
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:
-            topics = [self._register.link(request.from_, packet[_TO]) for packet in packets]
+            topics = [self._register.link(request.from_, packet[TO]) for packet in packets]
         return WirelessMessagesResponse(
             [
                 topic is not None and self._carry(topic, NRF24(packet))
@@ -180,7 +180,7 @@ class WirelessSignalSimulator:
             nodes = self._in_range(request.from_)
             topics = [self._register.link(request.from_, node) for node in nodes]
         packet = request.message.payload
-        before, after = packet[:_TO], packet[_TO + 1 :]
+        before, after = packet[:TO], packet[TO + 1 :]
         return BroadcastResponse(
             [
                 node

@@ -7,9 +7,9 @@ import re
 from dataclasses import dataclass
 from typing import Sequence, Tuple
 
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
 
-MAX_NODE_ID = 253  # reference, section 3
 MAX_TOPIC_LENGTH = 200  # our choice; ROS itself sets no limit
 # wiki.ros.org/Names; relative and private names would mean something else in each node.
 _TOPIC = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)

@@ -6,8 +6,8 @@ from typing import Sequence
 
 import numpy as np
 
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.signal.node import (
-    MAX_NODE_ID,
     Node,
     Position,
     SignalError,

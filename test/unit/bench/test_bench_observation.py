@@ -29,7 +29,7 @@ def watch_of(drones, *sights):
 
 @pytest.mark.parametrize(
     "sight",
-    [look(1.5, 3, 2), Happening(0.25, 7, CONNECTED), Figures("air", {"delivered": 12.0})],
+    [look(1.5, 3, 2), Happening(0.25, 7, CONNECTED), Figures("air", 1.0, {"delivered": 12.0})],
 )
 def test_what_the_probe_says_arrives_as_it_was_meant(sight):
     assert from_line(to_line(sight)) == sight
@@ -104,10 +104,12 @@ def test_a_router_that_lost_its_connection_again_is_waited_for():
 def test_figures_add_up_over_those_who_tell_them_and_the_worst_is_remembered():
     watch = watch_of(
         2,
-        Figures("host a", {"lag": 0.5, "sent": 1.0}),
-        Figures("host b", {"lag": 0.1, "sent": 10.0}),
-        Figures("host a", {"lag": 0.2, "sent": 3.0}),
+        Figures("host a", 1.0, {"lag": 0.5, "sent": 1.0}),
+        Figures("host b", 3.0, {"lag": 0.1, "sent": 10.0}),
+        Figures("host a", 2.0, {"lag": 0.2, "sent": 3.0}),
     )
     assert watch.total("sent") == 13.0
     assert watch.worst["lag"] == 0.5
+    assert watch.told_s("sent") == 3.0
     assert watch.total("unheard of") is None
+    assert watch.told_s("unheard of") == 0.0

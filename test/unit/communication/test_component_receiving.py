@@ -205,13 +205,71 @@ def test_after_two_routes_that_do_not_take_it_it_is_dropped():
     assert bench.routing.get_direction_to_node(9) == 6
 
 
-def test_when_the_only_next_hop_does_not_take_it_the_neighbours_are_told():
+def test_when_the_only_next_hop_does_not_take_it_the_neighbours_are_told_once_the_sender_first():
     bench = Bench()
     bench.know_neighbour(2, 3, 9)
     bench.antenna.dead = {9}
     bench.hear("05 03 80 01 09")
-    assert set(bench.sent()) == {packet("01 01 05 02 02 09"), packet("01 01 05 03 03 09")}
+    assert bench.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 02 02 09")]
     assert bench.routing.get_direction_to_node(9) == NO_ROUTE
+
+
+def test_when_the_next_hop_and_with_it_the_addressee_are_lost_the_neighbours_are_told_of_both():
+    bench = Bench()
+    bench.know_neighbour(2, 3, 4)
+    bench.routing.other_can_communicate_with_node(4, 9)
+    bench.antenna.dead = {4}
+    bench.hear("05 03 80 01 09")
+    assert bench.sent() == [
+        packet("01 01 05 03 03 04"),
+        packet("01 01 05 02 02 04"),
+        packet("01 01 05 03 03 09"),
+        packet("01 01 05 02 02 09"),
+    ]
+
+
+def test_when_a_lost_addressee_could_be_reached_over_the_sender_alone_the_neighbours_are_told():
+    bench = Bench()
+    bench.know_neighbour(2, 3, 9)
+    bench.routing.other_can_communicate_with_node(3, 9)
+    bench.antenna.dead = {9}
+    bench.hear("05 03 80 01 09")
+    assert bench.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 02 02 09")]
+
+
+# Orders that go no further -------------------------------------------------------------------
+
+
+def stranded(bench):
+    """Whether the bench told, once, of an order for drone 9 that ends here."""
+    told = [event.peer for event in bench.events if event.kind.name == "NO_ROUTE"]
+    assert bench.mesh.complaints.counts["no route to drone 9"] == len(told)
+    return told == [9]
+
+
+def test_an_order_without_a_route_ends_here_and_that_is_told():
+    bench = Bench()
+    bench.know_neighbour(3)
+    bench.hear("00 03 06 01 09")
+    assert stranded(bench)
+
+
+def test_an_order_that_comes_round_ends_here_and_that_is_told():
+    bench = Bench()
+    bench.know_neighbour(9)
+    bench.hear("00 02 06 01 09")
+    assert not stranded(bench)
+    bench.hear("00 04 06 01 09")
+    assert stranded(bench)
+
+
+def test_an_order_that_two_next_hops_do_not_take_ends_here_and_that_is_told():
+    bench = Bench()
+    for child in (4, 6, 7):
+        bench.routing.other_can_communicate_with_node(child, 9)
+    bench.antenna.gets_lost = lambda payload: payload[2] == 6
+    bench.hear("00 03 06 01 09")
+    assert stranded(bench)
 
 
 # Packets that go round in circles (14.10) ----------------------------------------------------

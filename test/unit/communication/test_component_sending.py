@@ -112,6 +112,48 @@ def test_maintaining_introduces_the_node_and_sends_each_child_a_heartbeat():
 # Sending -------------------------------------------------------------------------------------
 
 
+def test_a_round_of_heartbeats_tries_three_times_and_then_another_way():
+    bench = Bench()
+    bench.know_neighbour(2, 3)
+    bench.routing.other_can_communicate_with_node(3, 2)
+    bench.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] == 2
+    bench.mesh.send_heartbeats([2, 3])
+    lost, other_way = packet("01 01 04 02 02 00 ff"), packet("01 01 04 03 02 00 ff")
+    heartbeats = bench.tried(4)
+    assert heartbeats.count(lost) == 3
+    assert heartbeats.count(other_way) == 1
+    assert heartbeats.count(packet("01 01 04 03 03 00 ff")) == 1
+    assert len(heartbeats) == 5
+
+
+def test_a_round_of_heartbeats_goes_to_those_behind_others_as_well():
+    bench = Bench()
+    bench.know_neighbour(3)
+    bench.routing.other_can_communicate_with_node(3, 9)
+    bench.mesh.send_heartbeats([9])
+    assert bench.sent(4) == [packet("01 01 04 03 09 00 ff")]
+
+
+class Obstinate(ChildTableTree):
+    """Does not believe others that they cannot reach a node."""
+
+    def other_cant_communicate_with_node(self, other, node):
+        return 0
+
+
+def test_a_technique_that_does_not_forget_a_route_does_not_stop_the_node():
+    antenna = RecordingAntenna()
+    router = MeshnetworkRouter(1, antenna, BenchEngine(), Obstinate(), AlwaysHalf())
+    router.start(0.0)
+    router.on_msg(packet("00 02 04 01 01 01 00 01"), 0.0)
+    router.on_msg(packet("02 02 00 01 fe"), 0.0)
+    router.send_heartbeat(0)
+    for now_s in (1.0, 5.0, 15.0):
+        router.tick(now_s)
+    assert not router.get_connected_to_gateway()
+    assert router.get_route_to_gateway() == 2
+
+
 def test_a_packet_that_is_taken_counts_as_sent_and_teaches():
     bench = Bench()
     bench.hear(ASK)
@@ -343,5 +385,10 @@ def test_a_node_that_is_switched_on_introduces_itself_soon_and_one_that_is_off_d
     assert bench.broadcasts() == [packet("01 01 03 fe fe ff")]
 
 
-def test_the_bench_has_no_chance_of_its_own():
-    assert AlwaysHalf().random() == 0.5
+def test_after_the_return_of_the_medium_each_node_waits_for_its_own_part_of_a_second():
+    bench = Bench()
+    bench.mesh.on_antenna_registered(bench.now_s)
+    bench.wait(0.69)
+    assert bench.broadcasts() == []
+    bench.wait(0.02)  # 0.2 s and half a second
+    assert bench.broadcasts() == [packet("01 01 03 fe fe ff")]

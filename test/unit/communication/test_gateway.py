@@ -142,6 +142,7 @@ def test_an_order_for_its_own_drone_is_flown_and_the_landing_told():
     bench.know_neighbour(2)
     assert bench.mesh.send_goal_request_to_drone(1, 3.0, 4.0, 5, bench.now_s)
     assert bench.engine.goals == [Location(3.0, 4.0, 5)]
+    assert bench.kinds()[-1] == "FLIGHT_ORDERED"
     assert bench.tried() == []
     assert bench.mesh.get_connected_to_gateway()
     bench.engine.place = Location(3.0, 4.0, 5.0)
@@ -163,6 +164,8 @@ def test_an_order_for_its_own_drone_is_flown_and_the_landing_told():
         ((5, 0.0, 0.0, 501), r"height 501 m is outside 0\.\.500 m"),
         ((5, 0.0, 0.0, -1), r"height -1 m is outside"),
         ((1, 0.0, 0.0, -1), r"height -1 m is outside"),
+        ((5, 0.0, 0.0, 2.5), r"height 2\.5 m: an order gives whole metres"),
+        ((1, 0.0, 0.0, 2.5), r"height 2\.5 m: an order gives whole metres"),
     ],
 )
 def test_what_is_no_order_is_refused_with_the_reason(order, why):

@@ -187,6 +187,12 @@ def test_the_same_order_during_the_flight_is_no_new_flight():
     assert bench.engine.goals == [Location(20.0, 0.0, 0)]
 
 
+def test_the_same_order_of_a_second_gateway_is_told_of_once():
+    bench = Bench()
+    bench.hear("00 02 06 01 01 00 00 a0 41", "07 02 06 01 01 00 00 a0 41")
+    assert bench.kinds().count("FLIGHT_ORDERED") == 1
+
+
 def test_another_order_during_the_flight_replaces_the_first():
     bench = Bench()
     bench.hear("00 02 06 01 01 00 00 a0 41", "00 02 06 01 01 00 00 80 3f")
@@ -211,12 +217,30 @@ def test_an_order_out_of_bounds_is_refused_and_counted(place):
     assert bench.mesh.complaints.counts["order refused"] == 1
 
 
+def test_a_drone_that_cannot_say_where_it_is_now_and_then_flies_on():
+    bench = Bench()
+    bench.hear("02 02 06 01 01 00 00 fa 43")
+    for second in range(30):
+        fly(bench, Location(2.0 * second, 0.0, 0.0) if second % 3 == 0 else None)
+    assert "LANDED" not in bench.kinds()
+
+
 def test_a_drone_that_cannot_say_where_it_is_does_not_fly_for_ever():
     bench = Bench()
     bench.hear("02 02 06 01 01 00 00 a0 41")
     bench.engine.place = None
     bench.wait(30.0)
     assert "LANDED" in bench.kinds()
+
+
+def test_a_heartbeat_that_is_answered_in_flight_counts_no_more_after_the_landing():
+    bench = Bench()
+    bench.connect_through(2)
+    bench.hear("00 02 06 01 01 00 00 a0 41", "00 02 04 01 01 01 00 01")
+    assert bench.mesh.get_connected_to_gateway()
+    fly(bench, Location(20.0, 0.0, 0.0))
+    assert "LANDED" in bench.kinds()
+    assert not bench.mesh.get_connected_to_gateway()
 
 
 # Lost connection -----------------------------------------------------------------------------
@@ -510,6 +534,16 @@ def test_a_connected_node_does_not_negotiate():
     bench.wait(1.0)
     assert bench.sent(BID) == []
     assert "NEGOTIATION_STARTED" not in bench.kinds()
+
+
+def test_switching_the_antenna_off_ends_a_negotiation():
+    bench = group_bench(3, 4)
+    bench.wait_until(EMERGENCY_S + 0.1)
+    bench.antenna.powered = False
+    bench.mesh.on_antenna_power(False, bench.now_s)
+    bench.wait(12.0)
+    assert bench.engine.goals == []
+    assert "NEGOTIATION_ENDED" not in bench.kinds()
 
 
 def test_becoming_connected_ends_a_negotiation():
