@@ -15,8 +15,6 @@ from typing import Sequence
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.inprocess import Network
-from drone_mesh.report.page import render_page
-from drone_mesh.report.story import tell_story
 from drone_mesh.state.model import MeshStatus
 
 
@@ -82,6 +80,10 @@ def main() -> None:
         share, healed_s, packets, busiest = map(statistics.median, zip(*found))
         print(f"{technique:26} {share:10.1%} {healed_s:12.0f} s {packets:9.0f} {busiest:20.0f}")
     if options.page:
+        # Here, because only pages need matplotlib and jinja2.
+        from drone_mesh.report.page import render_page
+        from drone_mesh.report.story import tell_story
+
         story = tell_story(states, network.event_records())
         options.page.write_text(render_page(story, technique), encoding="utf-8")
         print(f"wrote {options.page}")

@@ -33,7 +33,7 @@ def processes_of(port: int) -> list[str]:
 
 
 class CtrlCTest(unittest.TestCase):
-    def run_and_interrupt(self, ready: str) -> None:
+    def run_and_interrupt(self, ready: str, *arguments: str) -> None:
         port = free_port()
         environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
         with tempfile.TemporaryFile("w+") as output:
@@ -43,7 +43,7 @@ class CtrlCTest(unittest.TestCase):
                 return output.read()
 
             launch = subprocess.Popen(
-                ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", "routers:=30"],
+                ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", *arguments],
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 env=environment,
@@ -64,10 +64,13 @@ class CtrlCTest(unittest.TestCase):
             self.assertEqual(processes_of(port), [])
 
     def test_while_the_mesh_runs(self) -> None:
-        self.run_and_interrupt("31 nodes are on")
+        self.run_and_interrupt("31 nodes are on", "routers:=30")
 
     def test_while_the_nodes_are_being_started(self) -> None:
-        self.run_and_interrupt("1 gateways and 30 routers")
+        self.run_and_interrupt("1 gateways and 30 routers", "routers:=30")
+
+    def test_while_emulated_radios_are_in_each_others_way(self) -> None:
+        self.run_and_interrupt("18 nodes are on", "radio:=nrf24")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import LogWatch, MeshWatch
+from drone_mesh.msg import Location
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch
 
 PLACES = {  # longitude, latitude: data of the project plan's field case
     1: (-13, 24), 2: (-11, 20), 3: (-12, 14), 4: (-7, 16), 5: (-12, 7), 6: (-7, 12),
@@ -32,6 +33,11 @@ class LayoutTest(unittest.TestCase):
             )
         mesh.wait("all connected after the landing", 60, mesh.connected)
         self.assertEqual(log.failures(), [])
+
+    def test_who_comes_late_still_gets_the_goal(self) -> None:
+        """The engine's connection may take a second more than the order."""
+        goal = rospy.wait_for_message("/Drones/13/goal", Location, WALL_LIMIT_S)
+        self.assertEqual((goal.longitude, goal.latitude, goal.height), (9.0, 7.0, 0))
 
 
 if __name__ == "__main__":

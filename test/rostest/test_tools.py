@@ -19,6 +19,14 @@ from drone_mesh.srv import PowerSwitch
 from rostest_support import WALL_LIMIT_S, call, wait_for
 
 TOOLS = ("status", "snapshot", "report")
+NODES = (
+    "drone_factory",
+    "drone_manager",
+    "wireless_signal_simulator",
+    "mesh_host",
+    "mesh_markers",
+    "console",
+)
 TOOL_LIMIT_S = 60.0
 
 
@@ -63,6 +71,22 @@ class ToolsTest(unittest.TestCase):
             self.assertEqual(told.returncode, 0, told.stderr)
             self.assertIn(f"usage: rosrun drone_mesh {tool}", told.stdout)
             self.assertIn("Exit code", told.stdout)
+
+    def test_1_each_node_explains_itself_and_leaves_the_one_that_runs_alone(self) -> None:
+        for node in NODES:
+            told = run(node, "--help")
+            self.assertEqual(told.returncode, 0, told.stderr)
+            self.assertIn(f"usage: rosrun drone_mesh {node}", told.stdout)
+            refused = run(node, "--nonsense")
+            self.assertEqual(refused.returncode, 2)
+            self.assertIn("unrecognized arguments: --nonsense", refused.stderr)
+
+    def test_2_without_a_master_no_node_waits_for_one(self) -> None:
+        for node in NODES:
+            told = run(node, ROS_MASTER_URI="http://127.0.0.1:9")
+            self.assertEqual(told.returncode, 2)
+            self.assertIn(f"{node}: no ROS master at http://127.0.0.1:9", told.stderr)
+            self.assertNotIn("Traceback", told.stderr)
 
     def test_2_without_a_master_there_is_one_line_that_says_so(self) -> None:
         for arguments in (["status"], ["status", "--watch"], ["snapshot", "picture.png"]):

@@ -56,6 +56,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._ending = False  # the receiving thread shall end
         self._info: IMeshDebugInfo | None = None
         self._powered = False
+        self._silent = False  # set by any thread
         self._seen: dict[int, tuple[bytes, float]] = {}  # node -> its last payload, and when
         self._duplicates = 0
 
@@ -99,9 +100,16 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._powered = on
         self._submit(lambda now_s: mesh.on_antenna_power(on, now_s))
 
+    def fall_silent(self) -> None:
+        """Have every send fail at once from now on. Any thread.
+
+        For an end that comes soon: on a busy channel a node may have seconds of sends before it.
+        """
+        self._silent = True
+
     def send_message_to(self, payload: bytes) -> bool:
         """See the interface; what cannot be sent (not 32 bytes, no such node) is not sent."""
-        if not self._powered or len(payload) != PAYLOAD_BYTES:
+        if self._silent or not self._powered or len(payload) != PAYLOAD_BYTES:
             return False
         receiver = payload[TO]
         if receiver > MAX_NODE_ID or receiver == self._radio.node_id:
@@ -110,7 +118,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
 
     def broadcast_message(self, payload: bytes) -> None:
         """One frame for all; each receiver's antenna puts its own id into byte 3."""
-        if self._powered and len(payload) == PAYLOAD_BYTES:
+        if self._powered and not self._silent and len(payload) == PAYLOAD_BYTES:
             self._radio.broadcast(_with_receiver(payload, BROADCAST))
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import argparse
+import inspect
 import os
 import sys
+from pathlib import Path
 from typing import Callable
 
 import rosgraph
@@ -32,6 +35,26 @@ def join_graph(name: str) -> None:
     """Become an anonymous node that leaves Ctrl-C to the program. Raises NoMaster."""
     require_master()
     rospy.init_node(name, anonymous=True, disable_signals=True, disable_rosout=True)
+
+
+def prepare_node(about: str | None) -> None:
+    """Answer --help, refuse what is no remapping, and say so if there is no master; then it exits.
+
+    To be called before a node registers: that would end the one that runs under its name.
+    `about` describes the node.
+    """
+    program = Path(sys.argv[0]).name
+    argparse.ArgumentParser(
+        prog=f"rosrun drone_mesh {program}",
+        description=inspect.cleandoc(about or ""),
+        epilog="Private parameters are given as _name:=value, other names as old:=new.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    ).parse_args(rospy.myargv()[1:])
+    try:
+        require_master()
+    except NoMaster as error:
+        print(f"{program}: {error}", file=sys.stderr)
+        sys.exit(FAILED)
 
 
 def run_tool(name: str, work: Callable[[], int]) -> None:

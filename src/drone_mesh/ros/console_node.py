@@ -21,7 +21,7 @@ from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState
 from drone_mesh.ros import names
 from drone_mesh.ros.bag import event_record
-from drone_mesh.ros.command_line import require_master, run_tool
+from drone_mesh.ros.command_line import prepare_node, run_tool
 from drone_mesh.ros.console_controls import RosControls
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.mesh_state import mesh_status
@@ -104,17 +104,17 @@ def layout_names(layouts: Layouts) -> list[tuple[int, str]]:
 
 
 def main() -> None:
-    """Run the node.
+    """The web console: the mesh on a page of the browser, to look at and to touch.
 
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
     (str): who wants to use the console from elsewhere needs it; an address that others can reach
     gets a random one if none is given; /DroneManager/casus (str): the file of the layouts.
     """
+    prepare_node(main.__doc__)
     run_tool("console", _run)
 
 
 def _run() -> int:
-    require_master()
     rospy.init_node("mesh_console")
     show_library_logs_on_rosout()
     address = str(rospy.get_param("~address", "127.0.0.1"))

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import rospy
+
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.srv import RequestGPSResponse
 from drone_mesh.world.flight_path import Vector
+
+
+def ros_time(seconds: float) -> rospy.Time:
+    """The nearest nanosecond; rospy.Time.from_sec rounds down: 0.94 s become 0.939999999."""
+    return rospy.Time(0, round(seconds * 1e9))
 
 
 def whole_metres(height: float) -> int:

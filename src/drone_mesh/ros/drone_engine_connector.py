@@ -33,7 +33,10 @@ class RosDroneEngineConnector(IDroneEngine):
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
         self._gone_until_s = -math.inf  # monotonic
         self._complaints = ThrottledLog(_log)
-        self._goal = rospy.Publisher(names.goal_topic(node_id), LocationMsg, queue_size=10)
+        # Latched: an order may come before rospy has connected to the engine, and must not be lost.
+        self._goal = rospy.Publisher(
+            names.goal_topic(node_id), LocationMsg, queue_size=10, latch=True
+        )
 
     def connect(self) -> None:
         """Connect before it is needed, so that the number of connections stays what it is."""

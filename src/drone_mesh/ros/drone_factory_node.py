@@ -9,6 +9,7 @@ import rospy
 
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.ros.command_line import prepare_node
 from drone_mesh.ros.emulated_nrf24 import EmulatedRadios
 from drone_mesh.ros.engine_server import EngineServer, PositionReporter
 from drone_mesh.ros.fleet import mesh_settings, tell_hosts
@@ -54,12 +55,13 @@ def _read_parameters() -> tuple[FactoryConfiguration, MeshSettings, int]:
 
 
 def main() -> None:
-    """Run the node.
+    """The world, the drones in it, and by default their Raspberry Pis.
 
     Parameters (private): all keys of config/factory.yaml, each overruling the file; ~config, that
     file; ~hosts (int, 1): 1 = the nodes run in this process, otherwise they are left to others;
     /DroneManager/casus, which is looked at only.
     """
+    prepare_node(main.__doc__)
     rospy.init_node("DroneFactory", disable_signals=True)
     show_library_logs_on_rosout()
     configuration, settings, hosts = or_stop(_read_parameters)

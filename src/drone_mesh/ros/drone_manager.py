@@ -14,6 +14,7 @@ from drone_mesh.errors import GoalRefused
 from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.msg import RequestGatewayDroneFlight
 from drone_mesh.ros import names
+from drone_mesh.ros.command_line import prepare_node
 from drone_mesh.ros.conversions import whole_metres
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.parameters import file_parameter, or_stop
@@ -101,6 +102,7 @@ class DroneManager:
 
 def main() -> None:
     """Run the node."""
+    prepare_node(DroneManager.__doc__)
     rospy.init_node("DroneManager")
     show_library_logs_on_rosout()
     path = or_stop(lambda: file_parameter("casus", "casus.yaml"))

@@ -60,6 +60,10 @@ class EmulatedNRF24(IWirelessCommunication):
         self._panel.stop()
         self._antenna.stop_antenna()
 
+    def fall_silent(self) -> None:
+        """Have every send fail at once from now on. Any thread."""
+        self._antenna.fall_silent()
+
     def send_message_to(self, payload: bytes) -> bool:
         """To the node in byte 3. False: no acknowledgement after all retries."""
         return self._antenna.send_message_to(payload)
@@ -97,6 +101,7 @@ class EmulatedRadios:
         air = Air(self._clock, links, random.Random(f"{seed} air"))
         self._seed = seed
         self._chips: dict[int, EmulatedChip] = {}
+        self._antennas: list[EmulatedNRF24] = []
         for drone in drones:
             engine = drone.engine
             chip = EmulatedChip(air, f"node {drone.node_id}", engine.state.position)
@@ -120,7 +125,14 @@ class EmulatedRadios:
             runtime=self._clock.runtime,
             rng=random.Random(f"{self._seed} radio {node_id}"),
         )
-        return EmulatedNRF24(node_id, radio, seat)
+        antenna = EmulatedNRF24(node_id, radio, seat)
+        self._antennas.append(antenna)
+        return antenna
+
+    def fall_silent(self) -> None:
+        """Have every send of every node fail at once from now on. Any thread."""
+        for antenna in list(self._antennas):
+            antenna.fall_silent()
 
     def close(self) -> None:
         """End the air; returns when its thread has ended."""

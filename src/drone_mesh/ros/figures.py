@@ -9,6 +9,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from drone_mesh.ros import names
+from drone_mesh.ros.conversions import ros_time
 
 PERIOD_S = 1.0  # wall
 
@@ -42,7 +43,7 @@ class Figures:
         while not self._stopped.wait(PERIOD_S) and not rospy.is_shutdown():
             values = [KeyValue(name, repr(value)) for name, value in self._take().items()]
             array = DiagnosticArray()
-            array.header.stamp = rospy.Time.from_sec(rospy.get_time())
+            array.header.stamp = ros_time(rospy.get_time())
             array.status.append(
                 DiagnosticStatus(
                     level=DiagnosticStatus.OK,

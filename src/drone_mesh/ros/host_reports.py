@@ -14,6 +14,7 @@ from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.msg import MeshEvent as MeshEventMsg
 from drone_mesh.ros import names
+from drone_mesh.ros.conversions import ros_time
 from drone_mesh.ros.logs import ThrottledLog
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.observation import describe_component
@@ -77,7 +78,7 @@ class HostReports:
     def _report(self) -> None:
         now_s = rospy.get_time()
         report = HostReport(host=rospy.get_name())
-        report.header.stamp = rospy.Time.from_sec(now_s)
+        report.header.stamp = ros_time(now_s)
         for state, component, antenna_on in list(self._hosted):
             try:
                 describe_component(state, component, antenna_on(), now_s)
@@ -88,7 +89,7 @@ class HostReports:
             report.nodes.append(state)
         report.events = [
             MeshEventMsg(
-                stamp=rospy.Time.from_sec(event.stamp_s),
+                stamp=ros_time(event.stamp_s),
                 node=event.node,
                 kind=event.kind,
                 peers=bytes(event.peers),

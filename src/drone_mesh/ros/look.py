@@ -27,12 +27,16 @@ class NoState(MeshError):
         )
 
 
-def add_bag_options(parser: argparse.ArgumentParser) -> None:
-    """--bag and --at."""
+def parse_with_bag(parser: argparse.ArgumentParser) -> argparse.Namespace:
+    """The command line's options, with --bag and --at."""
     parser.add_argument("--bag", type=Path, help="the state in a bag instead of the live one")
     parser.add_argument(
         "--at", type=float, metavar="S", help="with --bag: at this simulated time (default: end)"
     )
+    options = parser.parse_args(rospy.myargv()[1:])
+    if options.at is not None and options.bag is None:
+        parser.error("--at is a time in a bag: name it with --bag")
+    return options
 
 
 def live_state() -> MeshStatus:

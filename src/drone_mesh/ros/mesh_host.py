@@ -112,6 +112,8 @@ class MeshHost:
         self._figures.stop()
         self._reports.stop()
         self._link.stop()
+        if self._radios is not None:
+            self._radios.fall_silent()
         for node in list(self.nodes.values()):
             if self._radios is not None or node.node_id < self._settings.gateways:
                 node.seat.submit(node.stop)  # these have threads of their own

@@ -15,6 +15,8 @@ from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros import names
+from drone_mesh.ros.command_line import prepare_node
+from drone_mesh.ros.conversions import ros_time
 from drone_mesh.ros.fleet import fleet_from_parameter, mesh_settings
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.ros.mesh_host import MeshHost
@@ -56,7 +58,7 @@ class FollowedClock:
         """Say how far the work is; also while one piece of it takes long, or time stands still."""
         assert self._executor is not None
         now_s = self.now_s
-        self._publish(rospy.Time.from_sec(now_s - self._executor.lag_s(now_s)))
+        self._publish(ros_time(now_s - self._executor.lag_s(now_s)))
 
     def _advance(self, clock: Clock) -> None:
         self.now_s = clock.clock.to_sec()
@@ -120,11 +122,12 @@ def ids_to_serve(fleet: FactoryConfiguration) -> range:
 
 
 def main() -> None:
-    """Run the node.
+    """Virtual Raspberry Pis apart from the world, perhaps on another machine.
 
     Parameters (private): ~first and ~last (int): the ids to serve; or ~index and ~hosts (int):
     share number ~index (from 1) of ~hosts equal shares of all drones.
     """
+    prepare_node(main.__doc__)
     rospy.init_node("mesh_host", disable_signals=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:

@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_mesh.msg import MeshState
 from drone_mesh.ros import names
-from drone_mesh.ros.command_line import require_master, run_tool
+from drone_mesh.ros.command_line import prepare_node
 from drone_mesh.ros.logs import show_library_logs_on_rosout
 from drone_mesh.state.links import Link, LostLinks, known_links, shortest, way_links
 from drone_mesh.state.model import NodeStatus, Role, position_is_known
@@ -217,13 +217,8 @@ def _transform(node: NodeStatus, stamp: rospy.Time) -> TransformStamped:
 
 def main() -> None:
     """Run the node."""
-    run_tool("mesh_markers", _run)
-
-
-def _run() -> int:
-    require_master()
+    prepare_node(MeshMarkers.__doc__)
     rospy.init_node("mesh_markers")
     show_library_logs_on_rosout()
     MeshMarkers()
     rospy.spin()
-    return 0

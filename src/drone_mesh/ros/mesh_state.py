@@ -13,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from drone_mesh.msg import HostReport, MeshEvent, MeshState, NodeState
 from drone_mesh.ros import names
+from drone_mesh.ros.conversions import ros_time
 from drone_mesh.state.model import MeshStatus, NodeStatus
 from drone_mesh.state.register import DroneView, MeshRegister
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
@@ -136,7 +137,7 @@ def state_message(mesh: MeshStatus) -> MeshState:
         paused=mesh.paused,
         nodes=[node if isinstance(node, NodeState) else _node_message(node) for node in mesh.nodes],
     )
-    message.header.stamp = rospy.Time.from_sec(mesh.stamp_s)
+    message.header.stamp = ros_time(mesh.stamp_s)
     message.header.frame_id = names.MAP_FRAME
     return message
 
@@ -159,7 +160,7 @@ def diagnostics_message(mesh: MeshStatus) -> DiagnosticArray:
     summary = summarise(mesh.nodes, troubles)
     by_id = {node.id: node for node in mesh.nodes}
     array = DiagnosticArray()
-    array.header.stamp = rospy.Time.from_sec(mesh.stamp_s)
+    array.header.stamp = ros_time(mesh.stamp_s)
     array.status.append(
         DiagnosticStatus(
             level=summary.severity,

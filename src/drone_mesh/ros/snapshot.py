@@ -6,11 +6,9 @@ import argparse
 import re
 from pathlib import Path
 
-import rospy
-
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.command_line import join_graph, run_tool
-from drone_mesh.ros.look import add_bag_options, live_state, state_in_bag
+from drone_mesh.ros.look import live_state, parse_with_bag, state_in_bag
 from drone_mesh.state.scene import scene_of
 from drone_mesh.world.snapshot import DEFAULT_SIZE, render
 
@@ -23,7 +21,7 @@ class CannotDraw(MeshError):
 
 def main() -> None:
     """Entry point of nodes/snapshot."""
-    options = _parser().parse_args(rospy.myargv()[1:])
+    options = parse_with_bag(_parser())
     run_tool("snapshot", lambda: _run(options))
 
 
@@ -41,7 +39,6 @@ def _parser() -> argparse.ArgumentParser:
         metavar="WxH",
         help=f"pixels (default: {DEFAULT_SIZE[0]}x{DEFAULT_SIZE[1]})",
     )
-    add_bag_options(parser)
     return parser
 
 

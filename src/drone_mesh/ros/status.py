@@ -13,7 +13,7 @@ import rospy
 from drone_mesh.msg import MeshState
 from drone_mesh.ros import names
 from drone_mesh.ros.command_line import join_graph, require_master, run_tool
-from drone_mesh.ros.look import WAIT_S, NoState, add_bag_options, live_state, state_in_bag
+from drone_mesh.ros.look import WAIT_S, NoState, live_state, parse_with_bag, state_in_bag
 from drone_mesh.ros.mesh_state import mesh_status
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.table import mesh_table
@@ -26,7 +26,7 @@ CLEAR_SCREEN = "\x1b[H\x1b[2J"
 
 def main() -> None:
     """Entry point of nodes/status."""
-    options = _parser().parse_args(rospy.myargv()[1:])
+    options = parse_with_bag(_parser())
     run_tool("status", lambda: _run(options))
 
 
@@ -38,7 +38,6 @@ def _parser() -> argparse.ArgumentParser:
         "2 no answer to that (no master, no mesh, no such bag).",
     )
     parser.add_argument("-w", "--watch", action="store_true", help="print it again each second")
-    add_bag_options(parser)
     parser.add_argument(
         "--colour",
         choices=("auto", "always", "never"),

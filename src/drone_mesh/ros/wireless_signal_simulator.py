@@ -15,6 +15,7 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.messages import TO
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros import names
+from drone_mesh.ros.command_line import prepare_node
 from drone_mesh.ros.figures import Figures
 from drone_mesh.ros.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.parameters import factory_configuration, or_stop
@@ -224,6 +225,7 @@ class WirelessSignalSimulator:
 
 def main() -> None:
     """Run the node."""
+    prepare_node(WirelessSignalSimulator.__doc__)
     rospy.init_node("WirelessSignalSimulator")
     max_distance_m = or_stop(lambda: factory_configuration("max_distance")).max_distance
     show_library_logs_on_rosout()

@@ -12,6 +12,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32, Header
 
 from drone_mesh.ros import names
+from drone_mesh.ros.conversions import ros_time
 from drone_mesh.ros.pace import Pace
 from drone_mesh.srv import SetSpeed, SetSpeedResponse
 from drone_mesh.world.interfaces import World
@@ -125,7 +126,7 @@ class WorldRunner:
 
     def _step(self) -> None:
         now_s = self._world.step()
-        self._clock.publish(Clock(rospy.Time(0, round(now_s * 1e9))))  # from_sec rounds down
+        self._clock.publish(Clock(ros_time(now_s)))
         self._hosts.time_advanced()
 
     def _measure(self, before_s: tuple[float, float]) -> tuple[float, float]:

@@ -87,6 +87,16 @@ def test_what_cannot_be_sent_is_not_sent(lab, nodes, bad):
     assert len(lab.trace.frames) == frames
 
 
+def test_an_antenna_that_fell_silent_sends_nothing_and_says_so_at_once(lab, nodes):
+    nodes[0].antenna.fall_silent()
+    began_ns = lab.clock.now_ns
+    assert not nodes[0].antenna.send_message_to(packet(1))
+    nodes[0].antenna.broadcast_message(packet(254))
+    assert lab.clock.now_ns == began_ns
+    lab.clock.sleep(0.1)
+    assert nodes[1].mesh.heard == nodes[2].mesh.heard == []
+
+
 def test_an_antenna_that_is_off_neither_sends_nor_hears_and_says_so_to_the_mesh(lab, nodes):
     off = nodes[1].antenna
     off.switch_power(False)
