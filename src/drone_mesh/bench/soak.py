@@ -18,6 +18,7 @@ WARM_UP_S = 600.0  # simulated; what grows before that is not held against anybo
 IDLE_CONNECTIONS_CLOSED_S = 90.0
 MEMORY_TOLERANCE = 0.02  # our choice: how far the memory of a program in Python breathes
 SAMPLE_WITHIN_S = 600.0  # wall
+FEWEST_SAMPLES = 3  # our choice; of one alone, all would be constant
 
 
 @dataclass(frozen=True)
@@ -77,12 +78,12 @@ class SoakResult:
 def judge(samples: Sequence[Sample]) -> Verdict | None:
     """What became more; None for a run that was too short.
 
-    Three samples after the warm-up, and one after idle connections were closed, are enough.
+    Three samples after the warm-up, and three after idle connections were closed, are enough.
     """
     late = [sample for sample in samples if sample.sim_s >= WARM_UP_S]
-    third = len(late) // 3
+    third = len(late) // FEWEST_SAMPLES
     settled = [s for s in late if s.wall_s - samples[0].wall_s >= IDLE_CONNECTIONS_CLOSED_S]
-    if third == 0 or not settled:
+    if third == 0 or len(settled) < FEWEST_SAMPLES:
         return None
     threads = [sample.threads for sample in settled]
     files = [sample.open_files for sample in settled]

@@ -59,3 +59,5 @@ def test_idle_connections_of_the_start_may_go_in_the_first_minute_and_a_half_of_
 def test_a_run_that_was_too_short_has_no_verdict():
     assert judge(samples(lambda minute: 100.0, minutes=11)) is None
     assert judge(samples(lambda minute: 100.0, minute_wall_s=1.0)) is None
+    assert judge(samples(lambda minute: 100.0, minute_wall_s=1.52)) is None  # one sample
+    assert judge(samples(lambda minute: 100.0, minute_wall_s=1.6)) is not None
