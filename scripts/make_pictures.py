@@ -18,7 +18,7 @@ from drone_mesh.msg import MeshState
 from PIL import ImageGrab
 from playwright.sync_api import Browser, sync_playwright
 
-from drone_mesh.ros.console_controls import RosControls
+from drone_mesh.ros.views.console_controls import RosControls
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 MASTER_PORT = "11651"

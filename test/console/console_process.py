@@ -10,10 +10,10 @@ import time
 
 from inprocess_mesh import InProcessMesh
 
-from drone_mesh.console.access import access_for
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import FRAME_PERIOD_S, ConsoleServer
+from drone_mesh.web.access import access_for
 
 LAYOUTS = [(0, "0: field case, 17 drones"), (100, "100: grid 10 x 10"), (999, "999: none such")]
 

@@ -6,12 +6,13 @@ import threading
 import time
 
 from drone_mesh.console.orders import OrderRefused
+from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.network import Network, Node
 from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.state.events import EventBatcher
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.observation import describe_component, way_ahead
-from drone_mesh.state.register import DroneView, MeshRegister
+from drone_mesh.state.roster import DroneView, MeshRoster
 
 STEP_S = 0.05  # wall time between two steps of the clock
 
@@ -23,7 +24,7 @@ class InProcessMesh:
         self._lock = threading.Lock()
         self._network = Network(seed=1, max_distance_m=max_distance)
         self._network.add_fleet(1, routers, gridsize, spacing)
-        self._register = MeshRegister()
+        self._roster = MeshRoster()
         self._max_distance = max_distance
         self._layouts = Layouts({})
         self._batcher = EventBatcher()
@@ -51,8 +52,8 @@ class InProcessMesh:
             now_s = self._network.clock.now_s
             statuses = [self._describe(n, node) for n, node in self._network.nodes.items()]
             views = [self._view(n, node) for n, node in self._network.nodes.items()]
-            self._register.merge_report("in process", statuses, now_s)
-            nodes = self._register.snapshot(views, now_s)
+            self._roster.merge_report("in process", statuses, now_s)
+            nodes = self._roster.snapshot(views, now_s)
             for event in self._network.events[self._told :]:
                 self._batcher.observe(event)
             self._told = len(self._network.events)

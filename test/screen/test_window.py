@@ -14,17 +14,18 @@ import numpy as np
 import pytest
 from PIL import ImageGrab
 
+from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.drones import DroneRole, GatewayDrone, RouterDrone
-from drone_mesh.world.picture import CONDITION_COLOURS, DroneCondition, DronePicture, Scene
-from drone_mesh.world.window_process import WindowProcess, require_screen
+from drone_mesh.view.picture import CONDITION_COLOURS, DroneCondition, DronePicture, Scene
+from drone_mesh.view.window_process import WindowProcess, require_screen
+from drone_mesh.world.drones import GatewayDrone, RouterDrone
 
 LONG_S = 60.0  # a deadline for software rendering on a busy machine
 SCENE = Scene(
     [
-        DronePicture(0, DroneRole.GATEWAY, (-1.0, 0.0, 0.0)),
-        DronePicture(1, DroneRole.ROUTER, (1.0, 0.0, 0.0)),
-        DronePicture(2, DroneRole.ROUTER, (1.0, 2.0, 0.0), DroneCondition.LOST),
+        DronePicture(0, Role.GATEWAY, (-1.0, 0.0, 0.0)),
+        DronePicture(1, Role.ROUTER, (1.0, 0.0, 0.0)),
+        DronePicture(2, Role.ROUTER, (1.0, 2.0, 0.0), DroneCondition.LOST),
     ],
     title="a title",
 )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.factory import plan_fleet
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,7 @@ class System:
             self._master = self._start("roscore", ["roscore", "-p", str(self._port)])
             self._await("ROS master", self._master_answers)
             self._probe = self._start(
-                "probe", [sys.executable, "-m", "drone_mesh.ros.bench_probe"], piped=True
+                "probe", [sys.executable, "-m", "drone_mesh.ros.views.bench_probe"], piped=True
             )
             self._reader = threading.Thread(target=self._read, args=(self._probe,), daemon=True)
             self._reader.start()

@@ -9,8 +9,8 @@ from typing import Callable
 
 import uvicorn
 
-from drone_mesh.console.listening import listen
 from drone_mesh.console.server import ConsoleServer
+from drone_mesh.web.listening import listen
 
 LARGEST_REQUEST_BYTES = 4096
 LARGEST_HEAD_BYTES = 8192

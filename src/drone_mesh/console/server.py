@@ -26,9 +26,9 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from drone_mesh.console.access import Access, AccessDenied
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import MeshControls, Order, OrderRefused, Watch, parse_request
+from drone_mesh.web.access import Access, AccessDenied
 
 log = logging.getLogger(__name__)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Callable
 
+from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.world.flight_path import FlightPath
 
 
 class InProcessDrone(IDroneEngine):

@@ -18,14 +18,14 @@ from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
 from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.state.model import EventRecord, MeshStatus
-from drone_mesh.world.drones import DroneRole
-from drone_mesh.world.factory import plan_fleet
 
 STEP_S = 0.1  # how closely run_until looks
 
@@ -141,7 +141,7 @@ class Network:
                 place.longitude,
                 place.latitude,
                 place.node_id * apart_s,
-                gateway=place.role is DroneRole.GATEWAY,
+                gateway=place.role is Role.GATEWAY,
             )
 
     def _add(self, node_id: int, x: float, y: float, start_s: float, gateway: bool) -> None:

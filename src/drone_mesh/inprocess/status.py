@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Iterable, Mapping
 
 from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.drone.roles import Role
 from drone_mesh.state.events import EventBatcher
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.observation import describe_component, way_ahead
 from drone_mesh.state.routes import route_to_gateway
 

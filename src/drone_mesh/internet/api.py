@@ -19,11 +19,11 @@ from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, IGatewayCommands, KnownNode
-from drone_mesh.console.access import Access
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.errors import GoalRefused
 from drone_mesh.internet.asking import AnswerLate, GatewayDesk, NotCarriedOut
 from drone_mesh.internet.request_guard import RequestGuard
+from drone_mesh.web.access import Access
 
 _log = logging.getLogger(__name__)
 

@@ -8,11 +8,11 @@ import threading
 import uvicorn
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
-from drone_mesh.console.access import access_for
-from drone_mesh.console.listening import listen
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk, Submit
 from drone_mesh.internet.request_guard import MOST_HEAD_BYTES
+from drone_mesh.web.access import access_for
+from drone_mesh.web.listening import listen
 
 DEFAULT_PORT = 9080  # reference, section 13
 ANSWER_WITHIN_S = 2.0  # our choice: over ten times what an order to a node that is gone takes

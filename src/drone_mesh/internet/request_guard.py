@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from starlette.datastructures import Headers
 from starlette.responses import JSONResponse
 
-from drone_mesh.console.access import Access, AccessDenied
+from drone_mesh.web.access import Access, AccessDenied
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Receive, Scope, Send

@@ -11,12 +11,12 @@ from typing import Callable, Mapping, Sequence
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.console.access import access_for
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
+from drone_mesh.web.access import access_for
 
 MOST_EMULATED = 17  # our choice: as many as in the field case, and what one machine carries
 TOKEN_VARIABLE = "DRONE_MESH_TOKEN"

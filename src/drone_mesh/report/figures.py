@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.drone.roles import Role
 from drone_mesh.report.story import RunStory
-from drone_mesh.state.model import MeshStatus, NodeStatus, Role, position_is_known
+from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.outages import Outage
 
 WIDTH_IN = 10.0  # the page scales it

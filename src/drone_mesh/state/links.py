@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Sequence, Tuple
 
-from drone_mesh.state.model import NodeStatus, Role, position_is_known
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import NodeStatus, position_is_known
 
 JUST_LOST_S = 6.0  # our choice: long enough to be seen
 

@@ -6,21 +6,14 @@ one of these is read: nothing has to be copied on the way from the wire to the r
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass
 from typing import Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.roles import Role
 
 UNKNOWN_POSITION = (math.nan, math.nan, math.nan)
-
-
-class Role(enum.IntEnum):
-    """What a node is; the values of NodeState.msg."""
-
-    ROUTER = 0
-    GATEWAY = 1
 
 
 @dataclass

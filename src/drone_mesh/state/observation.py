@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.state.model import NodeStatus, Role
-from drone_mesh.state.register import DroneView
-from drone_mesh.world.drones import DroneRole, VirtualDrone
-from drone_mesh.world.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
+from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
+from drone_mesh.state.model import NodeStatus
+from drone_mesh.state.roster import DroneView
+from drone_mesh.world.drones import VirtualDrone
 
 OLDEST_AGE_S = 255  # what one byte holds
 
@@ -42,9 +42,8 @@ def view_drone(drone: VirtualDrone, now_s: float) -> DroneView:
     x, y, z = drone.engine.state.position
     path = drone.engine.state.path
     half_height_m = drone.SIZE_M[2] / 2
-    role = Role.GATEWAY if drone.ROLE is DroneRole.GATEWAY else Role.ROUTER
     ahead = way_ahead(path, now_s, half_height_m) if path else ()
-    return DroneView(drone.node_id, role, (x, y, z - half_height_m), ahead)
+    return DroneView(drone.node_id, drone.ROLE, (x, y, z - half_height_m), ahead)
 
 
 def way_ahead(path: FlightPath, now_s: float, lower_by_m: float = 0.0) -> tuple[float, ...]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Iterable, Sequence
 
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.state.model import EventRecord, MeshStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import EventRecord, MeshStatus
 
 _CONNECTED = MeshEventKind.CONNECTED.value
 _DISCONNECTED = MeshEventKind.DISCONNECTED.value

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Mapping, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.state.model import NodeStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import NodeStatus
 
 
 def route_to_gateway(start: int, nodes: Mapping[int, NodeStatus]) -> bytes:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.state.model import MeshStatus, NodeStatus, Role, position_is_known
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.trouble import Severity, Trouble, find_trouble, summarise
 
 _COLOUR = {

@@ -6,7 +6,8 @@ import enum
 from dataclasses import dataclass
 from typing import Sequence
 
-from drone_mesh.state.model import NodeStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.routes import reaches_gateway
 
 SILENT_AFTER_S = 5.0  # our choice: a host reports twice a second, ten reports are missing then

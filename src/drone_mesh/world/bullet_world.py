@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pybullet
 
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.flight_path import Vector
 from drone_mesh.world.interfaces import Colour, World
 
 GRAVITY_M_S2 = -9.81  # along z

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import enum
 from typing import ClassVar
 
+from drone_mesh.drone.flight_path import Vector
+from drone_mesh.drone.roles import Role
 from drone_mesh.world.engine import DroneEngine
-from drone_mesh.world.flight_path import Vector
 from drone_mesh.world.interfaces import Colour, World
-
-
-class DroneRole(enum.Enum):
-    """What a drone does in the mesh. The value is the word that people see."""
-
-    GATEWAY = "gateway"
-    ROUTER = "router"
 
 
 class VirtualDrone:
     """A box in a world that its engine flies. Only DroneFactory makes them: it alone gives ids."""
 
-    ROLE: ClassVar[DroneRole]
+    ROLE: ClassVar[Role]
     SIZE_M: ClassVar[Vector]  # edges along x, y, z
     COLOUR: ClassVar[Colour]
 
@@ -36,7 +29,7 @@ class VirtualDrone:
 class GatewayDrone(VirtualDrone):
     """Carries a gateway."""
 
-    ROLE = DroneRole.GATEWAY
+    ROLE = Role.GATEWAY
     SIZE_M = (0.2, 0.1, 0.2)
     COLOUR = (0.56, 0.20, 0.75, 1.0)  # purple
 
@@ -44,6 +37,6 @@ class GatewayDrone(VirtualDrone):
 class RouterDrone(VirtualDrone):
     """Carries a router."""
 
-    ROLE = DroneRole.ROUTER
+    ROLE = Role.ROUTER
     SIZE_M = (0.2, 0.2, 0.1)
     COLOUR = (0.16, 0.65, 0.27, 1.0)  # green

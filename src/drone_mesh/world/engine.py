@@ -6,9 +6,9 @@ import logging
 from collections import deque
 from typing import Callable, NamedTuple
 
+from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
-from drone_mesh.world.flight_path import FlightPath, Vector
 from drone_mesh.world.interfaces import World
 
 ARRIVED_M = 0.01  # on each axis, reference, section 11

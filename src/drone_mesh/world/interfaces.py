@@ -6,7 +6,7 @@ import abc
 from collections import deque
 from typing import Protocol, Tuple, TypeVar
 
-from drone_mesh.world.flight_path import Vector
+from drone_mesh.drone.flight_path import Vector
 
 Colour = Tuple[float, float, float, float]  # red, green, blue, opacity: 0..1
 

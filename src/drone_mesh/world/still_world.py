@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.world.flight_path import Vector
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.world.interfaces import Colour, World
 
 

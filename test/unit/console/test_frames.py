@@ -6,7 +6,8 @@ import json
 from dataclasses import replace
 
 from drone_mesh.console.frames import EVENTS_PER_FRAME, FrameStore
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 
 def mesh(stamp_s: float = 1.0, **router: object) -> MeshStatus:

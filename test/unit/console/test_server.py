@@ -9,11 +9,11 @@ from typing import Any, Awaitable, Callable
 import pytest
 
 from drone_mesh.console import server as server_module
-from drone_mesh.console.access import Access
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import OrderRefused
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
 from drone_mesh.state.model import MeshStatus, NodeStatus
+from drone_mesh.web.access import Access
 
 LIMIT_S = 5.0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from hypothesis import HealthCheck, settings
 
-from drone_mesh.console.access import Access
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk
+from drone_mesh.web.access import Access
 
 schemathesis = pytest.importorskip("schemathesis")
 ignored_auth = schemathesis.checks.ignored_auth

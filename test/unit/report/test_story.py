@@ -7,11 +7,12 @@ import re
 
 import pytest
 
+from drone_mesh.drone.roles import Role
 from drone_mesh.report.figures import phases_of
 from drone_mesh.report.page import render_page
 from drone_mesh.report.story import NothingRecorded, tell_story
 from drone_mesh.report.tables import key_numbers, repair_rows, write_csv
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 
 def state(stamp_s: float, on: bool = True, lost: bool = False, x: float = 12.0) -> MeshStatus:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import JUST_LOST_S, LostLinks, known_links, shortest, way_links
-from drone_mesh.state.model import NodeStatus, Role
+from drone_mesh.state.model import NodeStatus
 
 
 def line(*xs: float) -> list[NodeStatus]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess import Network
-from drone_mesh.state.model import NodeStatus, Role
+from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.observation import describe_component, view_drone, way_ahead
 from drone_mesh.world.factory import DroneFactory
-from drone_mesh.world.flight_path import FlightPath
 from drone_mesh.world.still_world import StillWorld
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.outages import find_outages, take_sample
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.state.model import NodeStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.routes import reaches_gateway, route_to_gateway
 
 

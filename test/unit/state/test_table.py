@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from drone_mesh.state.model import MeshStatus, NodeStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import MeshStatus, NodeStatus
 from drone_mesh.state.table import mesh_table
 
 MESH = MeshStatus(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from drone_mesh.state.model import NodeStatus, Role
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.trouble import (
     Severity,
     everybody_is_connected,

@@ -1,0 +1,50 @@
+"""Node: what the simulated air knows of one antenna, and what it takes for one."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Sequence, Tuple
+
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.errors import MeshError
+
+MAX_TOPIC_LENGTH = 200  # our choice; ROS itself sets no limit
+# wiki.ros.org/Names; relative and private names would mean something else in each node.
+_TOPIC = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
+
+Position = Tuple[float, float, float]  # longitude (x), latitude (y), height (z), metres
+
+
+class AirError(MeshError):
+    """What somebody told or asked the simulated air makes no sense. Drop it, or say so to them."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """One registered antenna."""
+
+    node_id: int
+    topic: str  # where it listens
+    on: bool
+
+
+def check_node_id(node_id: int) -> None:
+    """Raise AirError unless a node can have this id."""
+    if not 0 <= node_id <= MAX_NODE_ID:
+        raise AirError(f"id {node_id}: node ids are 0..{MAX_NODE_ID}")
+
+
+def check_position(node_id: int, position: Sequence[float]) -> Position:
+    """The position, or AirError if it is not three finite numbers."""
+    if len(position) != 3 or not all(map(math.isfinite, position)):
+        raise AirError(f"node {node_id}: position {tuple(position)} is not three finite numbers")
+    x, y, z = position
+    return (float(x), float(y), float(z))
+
+
+def check_topic(node_id: int, topic: str) -> None:
+    """Raise AirError unless this is a global name of a ROS topic."""
+    if len(topic) > MAX_TOPIC_LENGTH or not _TOPIC.fullmatch(topic):
+        raise AirError(f"node {node_id}: {topic[:60]!r} is not the name of a topic")

@@ -1,0 +1,120 @@
+"""NodeTable: id -> position, listening topic, on or off; and who is in range of whom."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+import numpy as np
+
+from drone_mesh.air.node import (
+    AirError,
+    Node,
+    Position,
+    check_node_id,
+    check_position,
+    check_topic,
+)
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+
+MAX_DISTANCE_M = 9.0  # reference, section 6: in range means nearer than this
+_UNKNOWN: Position = (0.0, 0.0, 0.0)
+
+
+class NodeTable:
+    """The rules of the simulated air (reference, sections 6 and 14.1). Not safe for threads."""
+
+    def __init__(self, max_distance_m: float = MAX_DISTANCE_M) -> None:
+        """Raises AirError unless the distance is a positive number."""
+        if not max_distance_m > 0:
+            raise AirError(f"max_distance {max_distance_m}: must be above 0 metres")
+        self._reach_m2 = max_distance_m * max_distance_m
+        self._nodes: dict[int, Node] = {}
+        self._positions: dict[int, Position] = {}  # also of nodes that are not registered yet
+        self._places: np.ndarray = np.zeros((MAX_NODE_ID + 1, 3))  # (id, xyz), metres
+        self._hears: np.ndarray = np.zeros(MAX_NODE_ID + 1, dtype=bool)  # registered, and on
+        # The answers of in_range, for as long as nobody moves or is switched.
+        self._in_range: dict[int, tuple[int, ...]] = {}
+
+    # What DroneInfo tells --------------------------------------------------------------------
+
+    def drone_info(self, node_id: int, position: Sequence[float], sub: str, on: bool) -> None:
+        """Take in one DroneInfo: `sub` set means an antenna speaks, else an engine (14.1).
+
+        Raises AirError, and changes nothing, for an id that no node has, a position that is
+        none or a topic that cannot be one.
+        """
+        check_node_id(node_id)
+        place = check_position(node_id, position)
+        if sub:
+            check_topic(node_id, sub)
+            self._antenna_speaks(node_id, place, sub, on)
+        else:
+            self._engine_speaks(node_id, place, on)
+
+    def _antenna_speaks(self, node_id: int, position: Position, topic: str, on: bool) -> None:
+        known = self._nodes.get(node_id)
+        if known is None:
+            self._positions.setdefault(node_id, position)
+            self._places[node_id] = self._positions[node_id]
+        if known != Node(node_id, topic, on):
+            self._set(Node(node_id, topic, on))
+
+    def _engine_speaks(self, node_id: int, position: Position, on: bool) -> None:
+        node = self._nodes.get(node_id)
+        if not on:
+            if node is not None and node.on:
+                self._set(Node(node_id, node.topic, False))
+        elif node is not None and not node.on and position == _UNKNOWN:
+            self._set(Node(node_id, node.topic, True))
+        elif self._positions.get(node_id) != position:
+            self._positions[node_id] = position
+            self._places[node_id] = position
+            self._in_range.clear()
+
+    def _set(self, node: Node) -> None:
+        self._nodes[node.node_id] = node
+        self._hears[node.node_id] = node.on
+        self._in_range.clear()
+
+    # What is asked ---------------------------------------------------------------------------
+
+    def node(self, node_id: int) -> Node | None:
+        """The node with this id, if it is registered."""
+        return self._nodes.get(node_id)
+
+    def position(self, node_id: int) -> Position | None:
+        """Where a node is, registered or not; metres."""
+        return self._positions.get(node_id)
+
+    def link(self, sender: int, receiver: int) -> str | None:
+        """The topic that reaches `receiver` from `sender`; None if nothing does.
+
+        Both have to be registered, on, and nearer to each other than the maximum distance.
+        """
+        source, destination = self._nodes.get(sender), self._nodes.get(receiver)
+        if source is None or destination is None or not (source.on and destination.on):
+            return None
+        here, there = self._positions[sender], self._positions[receiver]
+        distance_m2 = sum((a - b) * (a - b) for a, b in zip(here, there))
+        return destination.topic if distance_m2 < self._reach_m2 else None
+
+    def in_range(self, node_id: int) -> tuple[int, ...]:
+        """Ids of the nodes that could be sent to, ascending, without `node_id` itself.
+
+        Raises AirError for a node that is not registered; a node that is off reaches nobody.
+        """
+        answer = self._in_range.get(node_id)
+        if answer is None:
+            answer = self._in_range[node_id] = self._find_in_range(node_id)
+        return answer
+
+    def _find_in_range(self, node_id: int) -> tuple[int, ...]:
+        node = self._nodes.get(node_id)
+        if node is None:
+            raise AirError(f"node {node_id} is not registered")
+        if not node.on:
+            return ()
+        apart = self._places - self._places[node_id]  # (id, xyz), metres
+        near = (np.square(apart).sum(axis=1) < self._reach_m2) & self._hears
+        near[node_id] = False
+        return tuple(int(other) for other in np.flatnonzero(near))

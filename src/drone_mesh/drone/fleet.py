@@ -1,0 +1,54 @@
+"""A fleet: ids, roles and start places of its drones (reference, sections 3 and 11)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from drone_mesh.drone.roles import Role
+from drone_mesh.errors import ConfigurationError
+
+MAX_DRONES = 254  # ids 0..253, reference, section 3
+GATEWAY_COLUMN_M = -1.0  # x of all gateways; they stand 1 m apart along y
+
+
+class StartPlace(NamedTuple):
+    """Who starts where."""
+
+    node_id: int
+    role: Role
+    longitude: float  # x, metres
+    latitude: float  # y, metres
+
+
+def plan_fleet(
+    gateways: int, routers: int, gridsize: int, spacing: float
+) -> tuple[StartPlace, ...]:
+    """Ids, roles and start places of a fleet, by id: gateways first, from 0.
+
+    `gridsize` is the number of routers in a row along x, `spacing` their distance in metres.
+    Raises ConfigurationError, which names the parameter, for what cannot be flown.
+    """
+    if gateways < 0:
+        raise ConfigurationError(f"gateways: {gateways} is less than 0")
+    if routers < 0:
+        raise ConfigurationError(f"routers: {routers} is less than 0")
+    if gateways + routers > MAX_DRONES:
+        raise ConfigurationError(
+            f"gateways + routers: {gateways} + {routers} = {gateways + routers} drones, "
+            f"but node ids allow at most {MAX_DRONES}"
+        )
+    if gridsize < 1:
+        raise ConfigurationError(f"gridsize: {gridsize} is less than 1 router in a row")
+    if not (math.isfinite(spacing) and spacing > 0):
+        raise ConfigurationError(f"spacing: {spacing} is not a distance above 0 m")
+    gateway_places = [
+        StartPlace(i, Role.GATEWAY, GATEWAY_COLUMN_M, float(i)) for i in range(gateways)
+    ]
+    router_places = [
+        StartPlace(
+            gateways + k, Role.ROUTER, spacing * (k % gridsize), spacing * (k // gridsize)
+        )
+        for k in range(routers)
+    ]
+    return tuple(gateway_places + router_places)

@@ -1,0 +1,137 @@
+"""How fast the emulator is: `python3 -m drone_mesh.inprocess.emulated_benchmark --help`."""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import time
+from pathlib import Path
+
+from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
+from drone_mesh.nrf24.emulator.measured import measured_curve
+from drone_mesh.nrf24.emulator.trace import FrameTrace
+from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
+from drone_mesh.nrf24.emulator.wall_clock import WallClock
+
+RANGE_M = 9.0  # reference, section 6
+PROGRESS_S = 5.0  # of the wall
+
+
+def _arguments(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="drone_mesh.inprocess.emulated_benchmark",
+        description="Runs a mesh of real drivers on emulated chips, one gateway and routers on a "
+        "grid, and says how fast that goes.",
+    )
+    parser.add_argument("--nodes", type=int, default=17, help="in all, 2..254 (default 17)")
+    parser.add_argument("--spacing", type=float, default=6.0, help="of the grid, m (default 6)")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of the mesh (default 60)")
+    parser.add_argument("--seed", type=int, default=1, help="of everything random (default 1)")
+    parser.add_argument(
+        "--links",
+        choices=("disc", "distance", "measured"),
+        default="disc",
+        help="loss: none within 9 m, by distance with its edge at 9 m, or as measured in 2019, "
+        "shrunk to 9 m (default disc)",
+    )
+    parser.add_argument(
+        "--wall", action="store_true", help="in real time; shows how late the emulator is"
+    )
+    parser.add_argument(
+        "--skew", action="store_true", help="give each node a retransmit delay of its own"
+    )
+    parser.add_argument("--trace", type=Path, help="write the last 100000 frames as pcapng")
+    arguments = parser.parse_args(argv)
+    if not 2 <= arguments.nodes <= 254:
+        parser.error("--nodes must be 2 to 254")
+    for name in ("spacing", "seconds"):
+        if not getattr(arguments, name) > 0:
+            parser.error(f"--{name} must be above 0")
+    return arguments
+
+
+def _links(name: str, rng: random.Random) -> LinkModel:
+    if name == "distance":
+        return LogDistance.with_edge_at(RANGE_M, rng)
+    if name == "measured":
+        return measured_curve(rng, range_m=RANGE_M)
+    return IdealDisc(RANGE_M)
+
+
+def _grid(mesh: EmulatedMesh, nodes: int, spacing_m: float) -> None:
+    columns = max(1, round((nodes - 1) ** 0.5))
+    mesh.add_gateway(0, (-1.0, 0.0, 0.1))
+    for index in range(nodes - 1):
+        row, column = divmod(index, columns)
+        mesh.add_router(index + 1, (spacing_m * column, spacing_m * row, 0.05))
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run it and print the result."""
+    arguments = _arguments(argv)
+    clock = WallClock() if arguments.wall else VirtualClock()
+    links = _links(arguments.links, random.Random(f"{arguments.seed} links"))
+    mesh = EmulatedMesh(clock, links, arguments.seed, skew=arguments.skew)
+    trace = FrameTrace()
+    if arguments.trace:
+        mesh.air.observe(trace.see)
+    started, cpu_started = time.perf_counter(), time.process_time()
+    begin_s = mesh.now_s()
+    connected_s = None
+    shown = started
+    _grid(mesh, arguments.nodes, arguments.spacing)
+    try:
+        while mesh.now_s() - begin_s < arguments.seconds:
+            mesh.run_for(0.1)
+            if connected_s is None and mesh.all_connected():
+                connected_s = mesh.now_s() - begin_s
+            if time.perf_counter() - shown > PROGRESS_S:
+                shown = time.perf_counter()
+                print(f"{mesh.now_s() - begin_s:.0f} of {arguments.seconds:g} s", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("broken off", file=sys.stderr)
+    simulated_s = mesh.now_s() - begin_s
+    wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
+    _report(mesh, simulated_s, wall_s, cpu_s, connected_s)
+    if isinstance(clock, WallClock):
+        print(f"events were late by at most   {clock.latest_ns / 1e6:.1f} ms")
+    mesh.stop()
+    if isinstance(clock, WallClock):
+        clock.close()
+    if arguments.trace:
+        try:
+            written = trace.write(arguments.trace)
+        except OSError as error:
+            print(f"cannot write {arguments.trace}: {error.strerror}", file=sys.stderr)
+            return 1
+        print(f"{written} frames written to {arguments.trace}")
+    return 0
+
+
+def _report(
+    mesh: EmulatedMesh, simulated_s: float, wall_s: float, cpu_s: float, connected_s: float | None
+) -> None:
+    radios = [node.antenna.statistics() for node in mesh.nodes.values()]
+    sent = sum(radio.sent for radio in radios)
+    lost = sum(radio.lost for radio in radios)
+    packets = sent + sum(radio.broadcasts for radio in radios)
+    misuses = sum(len(node.chip.warnings) for node in mesh.nodes.values())
+    when = "never" if connected_s is None else f"{connected_s:.1f} s"
+    print(f"nodes                         {len(mesh.nodes)}")
+    print(f"all connected after           {when}")
+    print(f"simulated                     {simulated_s:.1f} s")
+    print(f"took                          {wall_s:.2f} s, {cpu_s:.2f} s of one core")
+    print(f"simulated s per wall s        {simulated_s / wall_s:.1f}")
+    print(f"simulated s per core s        {simulated_s / max(cpu_s, 1e-9):.1f}")
+    print(f"packets (sent and broadcast)  {packets}, {packets / simulated_s:.1f} per s")
+    print(f"of these sent and lost        {lost} of {sent}")
+    print(f"frames, collisions            {mesh.air.frames}, {mesh.air.collisions}")
+    print(f"cost per packet               {cpu_s / max(packets, 1) * 1e6:.0f} us")
+    print(f"cost per frame                {cpu_s / max(mesh.air.frames, 1) * 1e6:.0f} us")
+    print(f"misuse of chips               {misuses}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""What every ROS node of the package shares: names, conversions, parameters, logs, orderly stop."""

@@ -1,0 +1,91 @@
+"""AntennaPanel: the power switch of an antenna, and the debug topic of its node."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import Callable
+
+import rospy
+
+from drone_mesh.communication.interfaces import IMeshDebugInfo
+from drone_mesh.execution import Seat
+from drone_mesh.msg import NodeDebugInfo
+from drone_mesh.ros.graph import names
+from drone_mesh.srv import PowerSwitch, PowerSwitchResponse
+
+DEBUG_PERIOD_S = 1.0  # reference, section 4: 1 Hz
+SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers at the latest after this (wall) time
+_MAX_UINT16 = 0xFFFF
+
+_log = logging.getLogger(__name__)
+
+
+class AntennaPanel:
+    """What people can see and touch of one antenna, whatever kind of radio it is.
+
+    Publishes: /Nodes/<id>/debug (NodeDebugInfo), 1 Hz of simulated time with debugging on
+    Services:  /Nodes/<id>/powerSwitch (PowerSwitch)
+
+    The switch is worked in a thread of rospy; everything else is for the executor's worker.
+    """
+
+    def __init__(
+        self, node_id: int, seat: Seat, is_on: Callable[[], bool], switch: Callable[[bool], None]
+    ) -> None:
+        """`switch` is called in a thread of rospy, and hands what the node has to do to `seat`."""
+        self._node_id = node_id
+        self._seat = seat
+        self._is_on = is_on
+        self._switch = switch
+        self._service: rospy.Service | None = None
+        self._publisher: rospy.Publisher | None = None
+        self._stop_debugging: Callable[[], None] | None = None
+
+    def start(self) -> None:
+        """Offer the switch."""
+        self._service = rospy.Service(
+            names.power_switch(self._node_id), PowerSwitch, self._power_switched
+        )
+
+    def stop(self) -> None:
+        """Leave the ROS graph. Called twice, nothing changes."""
+        if self._service is not None:
+            self._service.shutdown()
+            self._service = None
+
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        """Start or stop to publish NodeDebugInfo."""
+        if self._stop_debugging is not None and self._publisher is not None:
+            self._stop_debugging()
+            self._publisher.unregister()
+            self._stop_debugging = self._publisher = None
+        if on:
+            publisher = rospy.Publisher(
+                names.debug_topic(self._node_id), NodeDebugInfo, queue_size=2
+            )
+            self._publisher = publisher
+            self._stop_debugging = self._seat.call_every(
+                DEBUG_PERIOD_S, lambda _now_s: publisher.publish(self._debug_info(info))
+            )
+
+    def _debug_info(self, info: IMeshDebugInfo) -> NodeDebugInfo:
+        return NodeDebugInfo(
+            nodeID=self._node_id,
+            ConnectedWithGateway=info.get_connected_to_gateway(),
+            familySize=min(info.get_router_tech_table_size(), _MAX_UINT16),
+            totalMessages=info.get_total_message_sent(),
+            prefferedGateWay=info.get_preferred_gateway(),
+            on=self._is_on(),
+            hops=info.get_hops_from_gateway_away(),
+            prefLoc=info.get_last_good_known_location_id(),
+        )
+
+    def _power_switched(self, request: PowerSwitch) -> PowerSwitchResponse:
+        if request.power != self._is_on():
+            self._switch(request.power)
+            done = threading.Event()
+            self._seat.submit(lambda _now_s: done.set())
+            if not done.wait(SWITCH_TIMEOUT_S):
+                _log.warning("node %d: switched, but the node has not noticed yet", self._node_id)
+        return PowerSwitchResponse()

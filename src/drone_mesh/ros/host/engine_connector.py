@@ -1,0 +1,74 @@
+"""RosDroneEngineConnector: a mesh component's way to the engine of its drone."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+
+import rospy
+
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import LocationUnknown
+from drone_mesh.msg import Location as LocationMsg
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import location_msg
+from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
+from drone_mesh.srv import RequestGPS, RequestGPSRequest
+
+CONNECT_AGAIN_AFTER_S = 1.0  # our choice: wall seconds; asking costs the worker's time
+
+_log = logging.getLogger(__name__)
+
+
+class RosDroneEngineConnector(IDroneEngine):
+    """Publishes /Drones/<id>/goal (Location), calls /Drones/<id>/gps (RequestGPS).
+
+    Belongs to the executor's worker. The connection is kept, and made anew when it is needed.
+    """
+
+    def __init__(self, node_id: int) -> None:
+        self._node_id = node_id
+        self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
+        self._gone_until_s = -math.inf  # monotonic
+        self._complaints = ThrottledLog(_log)
+        # Latched: an order may come before rospy has connected to the engine, and must not be lost.
+        self._goal = rospy.Publisher(
+            names.goal_topic(node_id), LocationMsg, queue_size=10, latch=True
+        )
+
+    def connect(self) -> None:
+        """Connect before it is needed, so that the number of connections stays what it is."""
+        try:
+            self._gps.connect()
+        except ServiceGone as error:
+            _log.debug("drone %d: %s", self._node_id, error)
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly there (metres); the height is rounded to whole metres, as its field is."""
+        self._goal.publish(location_msg(latitude, longitude, height))
+
+    def get_location(self) -> Location:
+        """Where the engine says that it is. Raises LocationUnknown when nobody answers."""
+        try:
+            answer = self._ask()
+        except (ServiceGone, ServiceRefused) as error:
+            self._complaints.warning(f"drone {self._node_id} has no position", str(error))
+            raise LocationUnknown(str(error)) from error
+        return Location(answer.latitude, answer.longitude, float(answer.height))
+
+    def _ask(self) -> Location:
+        if not self._gps.is_connected():
+            if time.monotonic() < self._gone_until_s:
+                raise ServiceGone(f"{self._gps.name}: nobody answered a moment ago")
+            try:
+                self._gps.connect()
+            except ServiceGone:
+                self._gone_until_s = time.monotonic() + CONNECT_AGAIN_AFTER_S
+                raise
+        try:
+            return self._gps.call(RequestGPSRequest())
+        except ServiceGone:
+            self._gone_until_s = time.monotonic() + CONNECT_AGAIN_AFTER_S
+            raise

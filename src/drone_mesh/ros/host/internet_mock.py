@@ -1,0 +1,57 @@
+"""RosInternetMock: what a gateway has instead of the internet."""
+
+from __future__ import annotations
+
+import logging
+
+import rospy
+
+from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
+from drone_mesh.errors import GoalRefused
+from drone_mesh.execution import Seat
+from drone_mesh.msg import RequestGatewayDroneFlight
+from drone_mesh.ros.graph import names
+
+_log = logging.getLogger(__name__)
+
+
+class RosInternetMock(IInternetConnection):
+    """Subscribes /gateway (RequestGatewayDroneFlight), and hands each order to its gateway.
+
+    `connect` and `disconnect` are for the executor's worker, to which orders are handed over.
+    """
+
+    def __init__(self, node_id: int, seat: Seat) -> None:
+        """`node_id` is the gateway's."""
+        self._node_id = node_id
+        self._seat = seat
+        self._subscriber: rospy.Subscriber | None = None
+
+    def connect(self, commands: IGatewayCommands) -> None:
+        """Subscribe; what arrives goes to `commands`."""
+
+        def order(request: RequestGatewayDroneFlight) -> None:
+            self._seat.submit(lambda now_s: self._order(commands, request, now_s))
+
+        self.disconnect()
+        self._subscriber = rospy.Subscriber(
+            names.GATEWAY_TOPIC, RequestGatewayDroneFlight, order, tcp_nodelay=True
+        )
+
+    def disconnect(self) -> None:
+        """Unsubscribe. A second call changes nothing."""
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber = None
+
+    def _order(
+        self, commands: IGatewayCommands, request: RequestGatewayDroneFlight, now_s: float
+    ) -> None:
+        place = (request.latitude, request.longitude, request.height)
+        try:
+            taken = commands.send_goal_request_to_drone(request.ID, *place, now_s)
+        except GoalRefused as error:
+            _log.warning("gateway %d: order for drone %d: %s", self._node_id, request.ID, error)
+            return
+        if taken:
+            _log.info("gateway %d: drone %d is sent to %s", self._node_id, request.ID, place)

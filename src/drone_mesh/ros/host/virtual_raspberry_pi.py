@@ -1,0 +1,108 @@
+"""VirtualRaspberryPi: the computer that a simulated drone carries (reference, section 11)."""
+
+from __future__ import annotations
+
+import abc
+import random
+from dataclasses import dataclass
+
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.observer import MeshObserver
+from drone_mesh.communication.router import MeshnetworkRouter
+from drone_mesh.communication.routing import create_routing_technique
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.execution import Seat
+from drone_mesh.internet.http_internet import DEFAULT_PORT, HttpInternet
+from drone_mesh.internet.several import SeveralInternets
+from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
+from drone_mesh.ros.host.internet_mock import RosInternetMock
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """What the mesh software of all nodes has in common."""
+
+    gateways: int  # ids below are gateways, the others routers
+    routing: str  # name of the routing technique
+    timing: MeshTiming
+    seed: int
+    debug: bool
+    observer: MeshObserver
+    internet: str  # "mock" or "http"
+
+
+class VirtualRaspberryPi(abc.ABC):
+    """Routing technique, engine connector, antenna and the mesh component that they make up.
+
+    Belongs to the executor's worker: make it, start it and stop it there.
+    """
+
+    def __init__(
+        self, node_id: int, settings: MeshSettings, antenna: IWirelessCommunication, seat: Seat
+    ) -> None:
+        """Raises ConfigurationError for a routing technique that does not exist."""
+        self.node_id = node_id
+        self.settings = settings
+        self.routing = create_routing_technique(settings.routing)
+        self.engine = RosDroneEngineConnector(node_id)
+        self.antenna = antenna
+        self.rng = random.Random(f"{settings.seed}/{node_id}")
+        self.seat = seat
+        self.component = self._make_component()
+
+    def start(self, now_s: float) -> None:
+        """Switch on."""
+        self.engine.connect()
+        self.component.start(now_s)
+        self.seat.take(self.component)
+
+    def stop(self, _now_s: float) -> None:
+        """Switch off."""
+        self.component.stop()
+
+    @abc.abstractmethod
+    def _make_component(self) -> MeshnetworkComponent:
+        """The mesh software."""
+
+
+class VirtualRaspberryPiRouter(VirtualRaspberryPi):
+    """Runs a router."""
+
+    def _make_component(self) -> MeshnetworkComponent:
+        return MeshnetworkRouter(
+            self.node_id,
+            self.antenna,
+            self.engine,
+            self.routing,
+            rng=self.rng,
+            timing=self.settings.timing,
+            observer=self.settings.observer,
+            debug=self.settings.debug,
+        )
+
+
+class VirtualRaspberryPiGateway(VirtualRaspberryPi):
+    """Runs a gateway."""
+
+    def _make_component(self) -> MeshnetworkComponent:
+        return MeshnetworkGateway(
+            self.node_id,
+            self.antenna,
+            self.engine,
+            self.routing,
+            self._make_internet(),
+            rng=self.rng,
+            timing=self.settings.timing,
+            observer=self.settings.observer,
+            debug=self.settings.debug,
+        )
+
+    def _make_internet(self) -> IInternetConnection:
+        mock = RosInternetMock(self.node_id, self.seat)
+        if self.settings.internet == "mock":
+            return mock
+        return SeveralInternets(
+            mock, HttpInternet(self.seat.submit, port=DEFAULT_PORT + self.node_id)
+        )

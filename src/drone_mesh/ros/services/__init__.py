@@ -1,0 +1,1 @@
+"""The nodes /WirelessSignalSimulator and /DroneManager."""

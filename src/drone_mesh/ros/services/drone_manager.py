@@ -1,0 +1,112 @@
+"""DroneManager: orders from people to drones, by way of the gateways (reference, section 12)."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+import rospy
+
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import GoalRefused
+from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.msg import RequestGatewayDroneFlight
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.conversions import whole_metres
+from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.parameters import file_parameter, or_stop
+from drone_mesh.srv import (
+    Casus,
+    CasusResponse,
+    RequestDroneFlight,
+    RequestDroneFlightResponse,
+)
+
+WAIT_FOR_GATEWAY_S = 3.0  # reference, section 12; wall seconds, for people wait
+LOOK_PERIOD_S = 0.05
+ORDERS_IN_QUEUE = 512  # two whole fleets
+
+_log = logging.getLogger(__name__)
+
+
+class DroneManager:
+    """Sends drones to places.
+
+    Parameters (private): ~casus (a YAML file with layouts; config/casus.yaml by default)
+    Publishes:  /gateway (RequestGatewayDroneFlight)
+    Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
+                (Casus)
+
+    It has no state but the layouts, which never change: the handlers may run side by side.
+    """
+
+    def __init__(self, layouts: Layouts) -> None:
+        self._layouts = layouts
+        self._gateways = rospy.Publisher(
+            names.GATEWAY_TOPIC,
+            RequestGatewayDroneFlight,
+            tcp_nodelay=True,
+            queue_size=ORDERS_IN_QUEUE,
+        )
+        rospy.Service(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, self._request_movement)
+        rospy.Service(names.SET_TO_CASUS_SERVICE, Casus, self._set_to_casus)
+
+    def _request_movement(self, request: RequestDroneFlight) -> RequestDroneFlightResponse:
+        """Status 1: at least one gateway got the order; 0: there is none."""
+        goal = Location(request.latitude, request.longitude, request.height)
+        try:
+            check_goal(*goal)
+        except GoalRefused as error:
+            raise rospy.ServiceException(str(error)) from None
+        if request.ID > MAX_NODE_ID:
+            raise rospy.ServiceException(f"drone {request.ID}: ids are 0..{MAX_NODE_ID}")
+        if not self._gateway_is_there():
+            _log.warning("drone %d is not sent anywhere: there is no gateway", request.ID)
+            return RequestDroneFlightResponse(status=0)
+        self._order(request.ID, goal)
+        return RequestDroneFlightResponse(status=1)
+
+    def _set_to_casus(self, request: Casus) -> CasusResponse:
+        try:
+            orders = self._layouts.orders(request.caseID)
+        except UnknownCase as error:
+            raise rospy.ServiceException(str(error)) from None
+        if not self._gateway_is_there():
+            raise rospy.ServiceException("there is no gateway to pass the orders on")
+        _log.info("case %d: %d drones are sent to their places", request.caseID, len(orders))
+        for node_id, goal in orders:
+            self._order(node_id, goal)
+        return CasusResponse()
+
+    def _order(self, node_id: int, goal: Location) -> None:
+        height = whole_metres(goal.height)
+        self._gateways.publish(
+            RequestGatewayDroneFlight(node_id, goal.latitude, goal.longitude, height)
+        )
+
+    def _gateway_is_there(self) -> bool:
+        """Whether a gateway subscribes; waits a moment for one, since we may have just started."""
+        deadline_s = time.monotonic() + WAIT_FOR_GATEWAY_S
+        while not rospy.is_shutdown():
+            self._gateways.impl.check()  # a killed gateway leaves its connection behind
+            if self._gateways.get_num_connections() > 0:
+                return True
+            if time.monotonic() >= deadline_s:
+                return False
+            time.sleep(LOOK_PERIOD_S)
+        return False
+
+
+def main() -> None:
+    """Run the node."""
+    prepare_node(DroneManager.__doc__)
+    rospy.init_node("DroneManager")
+    show_library_logs_on_rosout()
+    path = or_stop(lambda: file_parameter("casus", "casus.yaml"))
+    layouts = or_stop(lambda: Layouts.load(path))
+    DroneManager(layouts)
+    _log.info("%d cases, from %s and built in", len(layouts.cases), path)
+    rospy.spin()

@@ -1,0 +1,235 @@
+"""WirelessSignalSimulator: the simulated air as a ROS node (reference, sections 6 and 14.1)."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import struct
+import threading
+import warnings
+
+import rospy
+from rospy.impl.transport import Transport
+
+from drone_mesh.air.node import AirError
+from drone_mesh.air.node_table import NodeTable
+from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.messages import TO
+from drone_mesh.msg import NRF24, DroneInfo
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.figures import Figures
+from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
+from drone_mesh.ros.graph.parameters import factory_configuration, or_stop
+from drone_mesh.srv import (
+    AreaScan,
+    AreaScanResponse,
+    Broadcast,
+    BroadcastResponse,
+    WirelessMessage,
+    WirelessMessageResponse,
+    WirelessMessages,
+    WirelessMessagesResponse,
+)
+
+STUCK_RECEIVER_S = 0.2  # our choice: who does not empty its socket for so long is cut off
+
+_log = logging.getLogger(__name__)
+
+
+class _Listener(rospy.SubscribeListener):
+    """The topic of one antenna. `deliver` tells the truth about whether somebody is there."""
+
+    def __init__(self, topic: str) -> None:
+        self.has_listened = False  # set by rospy's thread: the first receiver has connected
+        with warnings.catch_warnings():
+            # Synchronous on purpose: a queue costs a thread and two switches per packet, and hides
+            # that the receiver is gone. What it protects from is seen to in peer_subscribe.
+            warnings.simplefilter("ignore", SyntaxWarning)
+            self._publisher = rospy.Publisher(
+                topic, NRF24, subscriber_listener=self, tcp_nodelay=True, queue_size=None
+            )
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """A receiver that is stuck may hold up a sender for a moment only, then it is cut off."""
+        self.has_listened = True
+        timeval = struct.pack("@ll", 0, int(STUCK_RECEIVER_S * 1e6))
+        for connection in self._connections():
+            if connection.socket is not None:
+                connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
+
+    def deliver(self, message: NRF24) -> bool:
+        """Publish; False if nobody is there to take it."""
+        if not self.has_receiver():
+            return False
+        try:
+            self._publisher.publish(message)
+        except rospy.ROSException:  # the topic was closed meanwhile
+            return False
+        return bool(self._connections())
+
+    def has_receiver(self) -> bool:
+        """Whether somebody subscribes to the topic, and is still there."""
+        implementation = self._publisher.impl  # None once it is closed
+        if implementation is None or not implementation.has_connections():
+            return False
+        # A killed process leaves its connection behind; rospy notices at the second write only.
+        implementation.check()
+        return bool(implementation.has_connections())
+
+    def close(self) -> None:
+        self._publisher.unregister()
+
+    def _connections(self) -> list[Transport]:
+        implementation = self._publisher.impl
+        return [] if implementation is None else implementation.connections
+
+
+class WirelessSignalSimulator:
+    """Knows where each antenna is, and hands packets to those in range.
+
+    Parameters (private): ~max_distance (float, metres), ~config (the YAML file to take it from
+                otherwise; config/factory.yaml by default)
+    Subscribes: /WirelessSignalSimulator (DroneInfo)
+    Publishes:  the topic that each antenna asked for, usually /Node/<id> (NRF24)
+    Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
+                (AreaScan), /SignalSimulator/messages (WirelessMessages),
+                /SignalSimulator/broadcast (Broadcast)
+    Figures:    delivered, lost in range, on /diagnostics
+
+    The handlers run in the threads of rospy's connections. `_lock` guards the register and the
+    counts, and is never held while something is sent; `_opening` guards the set of topics.
+    """
+
+    def __init__(self, max_distance_m: float) -> None:
+        """Raises AirError for a distance that is none."""
+        self._nodes = NodeTable(max_distance_m)
+        self._lock = threading.Lock()
+        self._opening = threading.Lock()
+        self._listeners: dict[str, _Listener] = {}
+        self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
+        self._complaints = ThrottledLog(_log)
+        self._delivered = self._lost = 0
+        # The services first: who sees that we subscribe may call at once.
+        rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
+        rospy.Service(names.MESSAGES_SERVICE, WirelessMessages, self._messages)
+        rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
+        rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
+        rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
+        Figures("air", self._figures).start()
+
+    def _drone_info(self, info: DroneInfo) -> None:
+        try:
+            if info.sub:
+                self._check_topic_type(info)
+            with self._lock:
+                known = self._nodes.node(info.nodeID)
+                self._nodes.drone_info(info.nodeID, info.position, info.sub, info.on)
+        except AirError as error:
+            self._complaints.warning("DroneInfo dropped", str(error))
+            return
+        if info.sub and (known is None or known.topic != info.sub):
+            self._listen_on(info.nodeID, info.sub)
+
+    def _listen_on(self, node_id: int, topic: str) -> None:
+        with self._opening:
+            old_topic = self._topics.get(node_id)
+            self._topics[node_id] = topic
+            if topic not in self._listeners:
+                self._listeners[topic] = _Listener(topic)
+            if old_topic is not None and old_topic not in self._topics.values():
+                self._listeners.pop(old_topic).close()
+        _log.debug("node %d listens on %s", node_id, topic)
+
+    def _check_topic_type(self, info: DroneInfo) -> None:
+        """Nobody may have packets sent to a topic of another kind, such as /clock."""
+        if info.sub in self._listeners or info.sub == names.node_topic(info.nodeID):
+            return
+        for topic, kind in rospy.get_published_topics():
+            if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
+                raise AirError(f"node {info.nodeID}: {info.sub[:60]} is a topic of {kind}")
+
+    def _message(self, request: WirelessMessage) -> WirelessMessageResponse:
+        with self._lock:
+            topic = self._nodes.link(request.from_, request.to)
+        if topic is None:
+            return WirelessMessageResponse(False)
+        if request.from_ == request.to:  # an antenna asks whether it is known yet
+            listener = self._listeners.get(topic)
+            return WirelessMessageResponse(
+                listener is not None and listener.deliver(request.message)
+            )
+        return WirelessMessageResponse(self._carry(topic, request.message))
+
+    def _messages(self, request: WirelessMessages) -> WirelessMessagesResponse:
+        joined = request.packets
+        if len(joined) % PAYLOAD_BYTES:
+            raise rospy.ServiceException(
+                f"packets: {len(joined)} bytes, want {PAYLOAD_BYTES} for each of them"
+            )
+        packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
+        with self._lock:
+            topics = [self._nodes.link(request.from_, packet[TO]) for packet in packets]
+        return WirelessMessagesResponse(
+            [
+                topic is not None and self._carry(topic, NRF24(packet))
+                for packet, topic in zip(packets, topics)
+            ]
+        )
+
+    def _broadcast(self, request: Broadcast) -> BroadcastResponse:
+        with self._lock:
+            nodes = self._in_range(request.from_)
+            topics = [self._nodes.link(request.from_, node) for node in nodes]
+        packet = request.message.payload
+        before, after = packet[:TO], packet[TO + 1 :]
+        return BroadcastResponse(
+            [
+                node
+                for node, topic in zip(nodes, topics)
+                if topic is not None and self._carry(topic, NRF24(before + bytes((node,)) + after))
+            ]
+        )
+
+    def _others_in_range(self, request: AreaScan) -> AreaScanResponse:
+        with self._lock:
+            nodes = self._in_range(request.id)
+            topics = [self._nodes.link(request.id, node) for node in nodes]
+        return AreaScanResponse(
+            [node for node, topic in zip(nodes, topics) if self._is_heard(topic)]
+        )
+
+    def _in_range(self, node_id: int) -> tuple[int, ...]:
+        try:
+            return self._nodes.in_range(node_id)
+        except AirError as error:
+            raise rospy.ServiceException(str(error)) from None
+
+    def _is_heard(self, topic: str | None) -> bool:
+        listener = None if topic is None else self._listeners.get(topic)
+        return listener is not None and listener.has_receiver()
+
+    def _carry(self, topic: str, message: NRF24) -> bool:
+        listener = self._listeners.get(topic)
+        delivered = listener is not None and listener.deliver(message)
+        with self._lock:
+            if delivered:
+                self._delivered += 1
+            elif listener is not None and listener.has_listened:
+                self._lost += 1  # before that it is on its way into the air, and misses nothing
+        return delivered
+
+    def _figures(self) -> dict[str, float]:
+        with self._lock:
+            return {names.DELIVERED: self._delivered, names.LOST_IN_RANGE: self._lost}
+
+
+def main() -> None:
+    """Run the node."""
+    prepare_node(WirelessSignalSimulator.__doc__)
+    rospy.init_node("WirelessSignalSimulator")
+    max_distance_m = or_stop(lambda: factory_configuration("max_distance")).max_distance
+    show_library_logs_on_rosout()
+    WirelessSignalSimulator(max_distance_m)
+    _log.info("in range means nearer than %g m", max_distance_m)
+    rospy.spin()

@@ -1,0 +1,1 @@
+"""What shows the mesh to people, or watches it: console, rviz, status, report, bags."""

@@ -1,0 +1,52 @@
+"""Reads what a rosbag tells about a mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Iterator
+
+import rosbag
+
+from drone_mesh.errors import MeshError
+from drone_mesh.msg import MeshEvent
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.world.mesh_state import mesh_status
+from drone_mesh.state.model import EventRecord, MeshStatus
+
+
+class BagUnusable(MeshError):
+    """A bag is missing, broken, or has nothing about a mesh in it; the message says which."""
+
+
+def read_states(path: Path) -> Iterator[MeshStatus]:
+    """Every state in the bag, oldest first. Raises BagUnusable."""
+    with _open(path) as bag:
+        for _topic, message, _time in bag.read_messages([names.STATE_TOPIC]):
+            yield mesh_status(message)
+
+
+def read_events(path: Path) -> Iterator[EventRecord]:
+    """Every event in the bag, oldest first. Raises BagUnusable."""
+    with _open(path) as bag:
+        for _topic, message, _time in bag.read_messages([names.EVENTS_TOPIC]):
+            yield event_record(message)
+
+
+def event_record(message: MeshEvent) -> EventRecord:
+    """The message without ROS."""
+    return EventRecord(
+        message.stamp.to_sec(), message.node, message.kind, tuple(message.peers), message.detail
+    )
+
+
+def _open(path: Path) -> rosbag.Bag:
+    try:
+        return rosbag.Bag(str(path))
+    except FileNotFoundError as error:
+        raise BagUnusable(f"{path}: there is no such file") from error
+    except rosbag.ROSBagUnindexedException as error:
+        raise BagUnusable(
+            f"{path}: was not closed in the end; 'rosbag reindex {path}' repairs it"
+        ) from error
+    except (rosbag.ROSBagException, OSError, ValueError) as error:  # of any bytes whatever
+        raise BagUnusable(f"{path}: is not a bag that can be read ({error})") from error

@@ -1,0 +1,96 @@
+"""The benchmark's eyes: a ROS node that tells on standard output what it sees, line by line."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+
+from drone_mesh.bench.observation import (
+    CONNECTED,
+    DISCONNECTED,
+    PROBE,
+    REST,
+    STARTED,
+    WATCH,
+    Figures,
+    Happening,
+    Look,
+    Sight,
+    to_line,
+)
+from drone_mesh.msg import MeshEvent, MeshState, NodeState
+from drone_mesh.ros.graph import names
+
+_KINDS = (STARTED, CONNECTED, DISCONNECTED)
+
+
+class Probe:
+    """Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent), /diagnostics (DiagnosticArray)
+
+    The state is watched only when asked for: making it five times a second is work, too. Runs on
+    wall time. Handlers are called by threads of rospy; `_lock` keeps their lines whole.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._watching: rospy.Subscriber | None = None
+        rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event)
+        rospy.Subscriber(names.DIAGNOSTICS_TOPIC, DiagnosticArray, self._diagnostics)
+        self._tell(Figures(PROBE, time.monotonic()))
+
+    def obey(self, order: str) -> None:
+        """Watch the state from now on, or rest."""
+        if order == WATCH and self._watching is None:
+            self._watching = rospy.Subscriber(names.STATE_TOPIC, MeshState, self._state)
+        elif order == REST and self._watching is not None:
+            self._watching.unregister()
+            self._watching = None
+
+    def _state(self, mesh: MeshState) -> None:
+        on = [node for node in mesh.nodes if node.on]
+        routers = [node for node in on if node.role == NodeState.ROUTER]
+        self._tell(
+            Look(
+                wall_s=time.monotonic(),
+                sim_s=mesh.header.stamp.to_sec(),
+                on=len(on),
+                connected=sum(node.connected for node in routers),
+                messages=sum(node.total_messages for node in mesh.nodes),
+                links=sum(len(node.neighbours) for node in on) // 2,
+            )
+        )
+
+    def _event(self, event: MeshEvent) -> None:
+        if event.kind in _KINDS:
+            self._tell(Happening(event.stamp.to_sec(), event.node, event.kind))
+
+    def _diagnostics(self, array: DiagnosticArray) -> None:
+        for status in array.status:
+            values = {}
+            for pair in status.values:
+                try:
+                    values[pair.key] = float(pair.value)
+                except ValueError:
+                    continue  # words, for people
+            self._tell(Figures(status.name, time.monotonic(), values))
+
+    def _tell(self, sight: Sight) -> None:
+        with self._lock:
+            print(to_line(sight), flush=True)
+
+
+def main() -> None:
+    """Run until the orders on standard input end."""
+    rospy.init_node(PROBE, disable_signals=True)
+    probe = Probe()
+    for line in sys.stdin:
+        probe.obey(line.strip())
+    rospy.signal_shutdown("the benchmark is done")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""RosControls: carries out the console's orders over the ordinary services."""
+
+from __future__ import annotations
+
+import logging
+
+from genpy import Message
+
+from drone_mesh.console.orders import OrderRefused
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
+from drone_mesh.srv import (
+    Casus,
+    CasusRequest,
+    PowerSwitch,
+    PowerSwitchRequest,
+    RequestDroneFlight,
+    RequestDroneFlightRequest,
+    SetSpeed,
+    SetSpeedRequest,
+)
+
+log = logging.getLogger(__name__)
+
+ORDER_TIMEOUT_S = 10  # wall time; longer than the DroneManager waits for a gateway
+
+
+class RosControls:
+    """A MeshControls. Any thread; each call makes a connection of its own and closes it."""
+
+    def power(self, node: int, on: bool) -> str:
+        """Switch the antenna of a node."""
+        _call(names.power_switch(node), PowerSwitch, PowerSwitchRequest(power=on))
+        return f"node {node} is {'on' if on else 'off'}"
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:
+        """Order a drone to a place, through the mesh as everybody's orders."""
+        request = RequestDroneFlightRequest(ID=node, latitude=y, longitude=x, height=round(z))
+        answer = _call(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request)
+        if not answer.status:
+            raise OrderRefused("there is no gateway that could take the order")
+        return f"drone {node} is ordered to ({x:g}, {y:g}, {round(z)}) m"
+
+    def layout(self, case: int) -> str:
+        """Order all drones of a layout to their places."""
+        _call(names.SET_TO_CASUS_SERVICE, Casus, CasusRequest(caseID=case))
+        return f"layout {case} is ordered"
+
+    def speed(self, paused: bool, factor: float) -> str:
+        """Pause, go on, or change how fast time runs."""
+        request = SetSpeedRequest(paused=paused, real_time_factor=factor)
+        answer = _call(names.SPEED_SERVICE, SetSpeed, request)
+        if not answer.success:
+            raise OrderRefused(answer.message)
+        if paused:
+            return "paused"
+        return f"time runs {factor:g} times as fast as on the wall" if factor else "time goes on"
+
+
+def _call(name: str, service_class: type, request: Message) -> Message:
+    service = PersistentService(name, service_class, ORDER_TIMEOUT_S)
+    try:
+        service.connect()
+        return service.call(request)
+    except ServiceGone as error:
+        log.warning("an order of the console was not carried out: %s", error)
+        raise OrderRefused(f"nobody answers at {name}: is the simulation running?") from error
+    except ServiceRefused as error:
+        said = str(error).partition(" responded with an error: ")[2]
+        raise OrderRefused(said or str(error)) from error
+    finally:
+        service.close()

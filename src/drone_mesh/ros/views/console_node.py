@@ -1,0 +1,150 @@
+"""The node /mesh_console: the web console beside a running system."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+import socket
+import threading
+import time
+from functools import partial
+
+import rosgraph
+import rospy
+
+from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.runner import ConsoleRunner
+from drone_mesh.console.server import ConsoleServer
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
+from drone_mesh.msg import MeshEvent, MeshState
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import prepare_node, run_tool
+from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.parameters import manager_layouts
+from drone_mesh.ros.views.bag import event_record
+from drone_mesh.ros.views.console_controls import RosControls
+from drone_mesh.ros.world.mesh_state import mesh_status
+from drone_mesh.web.access import access_for, is_loopback
+
+LOOK_PERIOD_S = 1.0  # wall time between two looks at the master
+OLD_NEWS_S = 3.0  # wall time without a state after which the page says so
+TOKEN_BYTES = 18
+EVERYWHERE = ("0.0.0.0", "::")  # addresses that stand for all of this machine's
+
+log = logging.getLogger(__name__)
+
+
+class MeshFeed:
+    """Brings what the ROS graph tells into the store, whose owner is the runner's loop.
+
+    Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent)
+
+    A master that was started anew does not know our subscriptions: they are made again. `_latest`
+    is handed from the subscriber's thread to the loop; a loop that lags behind skips states.
+    """
+
+    def __init__(self, store: FrameStore, runner: ConsoleRunner) -> None:
+        self._store = store
+        self._runner = runner
+        self._latest: MeshState | None = None
+        self._heard_s = float("-inf")
+        self._run_id: str | None = None
+        self._subscribers: list[rospy.Subscriber] = []
+
+    def watch_master(self, stopped: threading.Event) -> None:
+        """Keep the subscriptions alive until `stopped`; for the main thread."""
+        while not stopped.wait(LOOK_PERIOD_S) and not rospy.is_shutdown():
+            try:
+                run_id = rosgraph.Master(rospy.get_name()).getParam("/run_id")
+            except (OSError, rosgraph.MasterException):
+                self._tell("no ROS master: waiting for the simulation to be started")
+                continue
+            if run_id != self._run_id:
+                self._run_id = run_id
+                self._subscribe()
+            elif time.monotonic() - self._heard_s > OLD_NEWS_S:
+                self._tell("no news from the simulation")
+
+    def _subscribe(self) -> None:
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        self._subscribers = [
+            rospy.Subscriber(names.STATE_TOPIC, MeshState, self._on_state, queue_size=1),
+            rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._on_event),
+        ]
+
+    def _tell(self, text: str) -> None:
+        self._runner.in_loop(partial(self._store.set_link, text))
+
+    def _on_state(self, message: MeshState) -> None:
+        self._heard_s = time.monotonic()
+        is_waiting, self._latest = self._latest is not None, message
+        if not is_waiting:
+            self._runner.in_loop(self._take_latest)
+
+    def _take_latest(self) -> None:
+        message, self._latest = self._latest, None
+        if message is not None:
+            self._store.update_mesh(mesh_status(message), time.monotonic())
+
+    def _on_event(self, message: MeshEvent) -> None:
+        self._runner.in_loop(partial(self._store.add_events, [event_record(message)]))
+
+
+def layout_names(layouts: Layouts) -> list[tuple[int, str]]:
+    """(case, name) of each layout: whole fleets first, then those that move one drone."""
+    known = {FIELD_CASE: "field case", GRID_CASE: "10 x 10 grid"}
+    named = []
+    for case in layouts.cases:
+        drones = len(layouts.orders(case))
+        what = known.get(case, f"{drones} drones") if drones > 1 else f"drone {case} of case 0"
+        named.append((drones == 1, case, f"{case}: {what}"))
+    return [(case, name) for _single, case, name in sorted(named)]
+
+
+def main() -> None:
+    """The web console: the mesh on a page of the browser, to look at and to touch.
+
+    Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
+    (str): who wants to use the console from elsewhere needs it; an address that others can reach
+    gets a random one if none is given; /DroneManager/casus (str): the file of the layouts.
+    """
+    prepare_node(main.__doc__)
+    run_tool("console", _run)
+
+
+def _run() -> int:
+    rospy.init_node("mesh_console")
+    show_library_logs_on_rosout()
+    address = str(rospy.get_param("~address", "127.0.0.1"))
+    port = _port(rospy.get_param("~port", 8080))
+    token = str(rospy.get_param("~token", ""))
+    if not token and not is_loopback(address):
+        token = secrets.token_urlsafe(TOKEN_BYTES)
+    store = FrameStore()
+    layouts = layout_names(manager_layouts())
+    server = ConsoleServer(store, RosControls(), access_for(address, token), layouts)
+    runner = ConsoleRunner(server, address, port)
+    stopped = threading.Event()
+    rospy.on_shutdown(stopped.set)
+    runner.start()
+    name = socket.gethostname() if address in EVERYWHERE else address
+    name = f"[{name}]" if ":" in name else name
+    # Not to the log: it is public on /rosout, and the token is not.
+    print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
+    try:
+        MeshFeed(store, runner).watch_master(stopped)
+    finally:
+        runner.stop()
+    return 0
+
+
+def _port(value: object) -> int:
+    try:
+        port = int(str(value))
+    except ValueError:
+        port = -1
+    if not 0 <= port <= 65535:
+        raise ConfigurationError(f"port: {value!r} is not a whole number from 0 to 65535")
+    return port

@@ -1,0 +1,60 @@
+"""One look at a mesh, live or in a bag: for the command line tools."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import rospy
+
+from drone_mesh.errors import MeshError
+from drone_mesh.msg import MeshState
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.views.bag import BagUnusable, read_states
+from drone_mesh.ros.world.mesh_state import mesh_status
+from drone_mesh.state.model import MeshStatus
+
+WAIT_S = 5.0  # wall time for a live state; it is latched, so it comes at once or not at all
+
+
+class NoState(MeshError):
+    """A master is there, but nobody publishes the state of a mesh."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            f"nobody publishes {names.STATE_TOPIC}: is a simulation running "
+            "(roslaunch drone_mesh factory.launch)?"
+        )
+
+
+def parse_with_bag(parser: argparse.ArgumentParser) -> argparse.Namespace:
+    """The command line's options, with --bag and --at."""
+    parser.add_argument("--bag", type=Path, help="the state in a bag instead of the live one")
+    parser.add_argument(
+        "--at", type=float, metavar="S", help="with --bag: at this simulated time (default: end)"
+    )
+    options = parser.parse_args(rospy.myargv()[1:])
+    if options.at is not None and options.bag is None:
+        parser.error("--at is a time in a bag: name it with --bag")
+    return options
+
+
+def live_state() -> MeshStatus:
+    """The latest state. Raises NoState."""
+    try:
+        return mesh_status(rospy.wait_for_message(names.STATE_TOPIC, MeshState, timeout=WAIT_S))
+    except rospy.ROSException as error:
+        raise NoState from error
+
+
+def state_in_bag(path: Path, at_s: float | None) -> MeshStatus:
+    """The last state in a bag, or the last one up to `at_s`. Raises BagUnusable."""
+    found = None
+    for mesh in read_states(path):
+        if at_s is not None and mesh.stamp_s > at_s:
+            break
+        found = mesh
+    if found is None:
+        when = "" if at_s is None else f" up to {at_s:g} s"
+        raise BagUnusable(f"{path}: has no {names.STATE_TOPIC} in it{when}")
+    return found

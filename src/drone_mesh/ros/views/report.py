@@ -1,0 +1,62 @@
+"""rosrun drone_mesh report: a page about a recorded run."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import rospy
+
+from drone_mesh.errors import MeshError
+from drone_mesh.report.page import render_page
+from drone_mesh.report.story import NothingRecorded, tell_story
+from drone_mesh.report.tables import write_csv
+from drone_mesh.ros.graph.command_line import run_tool
+from drone_mesh.ros.views.bag import BagUnusable, read_events, read_states
+
+
+class CannotWrite(MeshError):
+    """A file of the report could not be written; the message says which and why."""
+
+
+def main() -> None:
+    """Entry point of nodes/report."""
+    options = _parser().parse_args(rospy.myargv()[1:])
+    run_tool("report", lambda: _run(options))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rosrun drone_mesh report",
+        description="Make one HTML file from a bag that launch/record.launch recorded: the "
+        "connected share over time, who was lost when and how the mesh repaired itself, messages "
+        "per node, the map before and after. Needs no running simulation.",
+        epilog="Exit code: 0 the page is written, 2 it is not.",
+    )
+    parser.add_argument("bag", type=Path, help="the recorded run")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="HTML", help="the page (default: beside the bag)"
+    )
+    parser.add_argument("--csv", type=Path, metavar="FOLDER", help="also write the numbers there")
+    parser.add_argument("--title", help="heading of the page (default: the bag's name)")
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    page = options.output or options.bag.with_suffix(".html")
+    print(f"reading {options.bag} ...", file=sys.stderr)
+    try:
+        story = tell_story(read_states(options.bag), read_events(options.bag))
+    except NothingRecorded as error:
+        raise BagUnusable(f"{options.bag}: {error}") from error
+    print("drawing ...", file=sys.stderr)
+    html = render_page(story, options.title or options.bag.stem)
+    try:
+        page.write_text(html, encoding="utf-8")
+        written = [page] + (write_csv(story, options.csv) if options.csv else [])
+    except OSError as error:
+        raise CannotWrite(f"{error.filename}: {error.strerror}") from error
+    for path in written:
+        print(path)
+    return 0

@@ -1,0 +1,66 @@
+"""rosrun drone_mesh snapshot: a picture of the world, without any screen."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+from drone_mesh.errors import MeshError
+from drone_mesh.ros.graph.command_line import join_graph, run_tool
+from drone_mesh.ros.views.look import live_state, parse_with_bag, state_in_bag
+from drone_mesh.view.scene import scene_of
+from drone_mesh.view.snapshot import DEFAULT_SIZE, render
+
+SMALLEST, LARGEST = 200, 8000  # pixels
+
+
+class CannotDraw(MeshError):
+    """The picture could not be written; the message says why."""
+
+
+def main() -> None:
+    """Entry point of nodes/snapshot."""
+    options = parse_with_bag(_parser())
+    run_tool("snapshot", lambda: _run(options))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rosrun drone_mesh snapshot",
+        description="Draw the world with its drones, links and flights. Needs no screen.",
+        epilog="Exit code: 0 the picture is written, 2 it is not.",
+    )
+    parser.add_argument("picture", type=Path, help="where to write it, a PNG file")
+    parser.add_argument(
+        "--size",
+        type=_size,
+        default=DEFAULT_SIZE,
+        metavar="WxH",
+        help=f"pixels (default: {DEFAULT_SIZE[0]}x{DEFAULT_SIZE[1]})",
+    )
+    return parser
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    size = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not all(SMALLEST <= pixels <= LARGEST for pixels in size):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: want WIDTHxHEIGHT, each {SMALLEST}..{LARGEST} pixels"
+        )
+    return size
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.bag is None:
+        join_graph("mesh_snapshot")
+        mesh = live_state()
+    else:
+        mesh = state_in_bag(options.bag, options.at)
+    try:
+        render(scene_of(mesh), options.picture, options.size)
+    except (OSError, ValueError) as error:
+        raise CannotDraw(f"{options.picture}: {error}") from error
+    print(options.picture)
+    return 0

@@ -1,0 +1,90 @@
+"""rosrun drone_mesh status: the state of the mesh as a table."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import threading
+import time
+
+import rospy
+
+from drone_mesh.msg import MeshState
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import join_graph, require_master, run_tool
+from drone_mesh.ros.views.look import WAIT_S, NoState, live_state, parse_with_bag, state_in_bag
+from drone_mesh.ros.world.mesh_state import mesh_status
+from drone_mesh.state.model import MeshStatus
+from drone_mesh.state.table import mesh_table
+from drone_mesh.state.trouble import everybody_is_connected, find_trouble
+
+WATCH_PERIOD_S = 1.0
+OLD_NEWS_S = 3.0  # wall time without a state after which --watch says so
+CLEAR_SCREEN = "\x1b[H\x1b[2J"
+
+
+def main() -> None:
+    """Entry point of nodes/status."""
+    options = parse_with_bag(_parser())
+    run_tool("status", lambda: _run(options))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rosrun drone_mesh status",
+        description="Print the state of the mesh as a table.",
+        epilog="Exit code: 0 everybody who is switched on is connected, 1 somebody is not, "
+        "2 no answer to that (no master, no mesh, no such bag).",
+    )
+    parser.add_argument("-w", "--watch", action="store_true", help="print it again each second")
+    parser.add_argument(
+        "--colour",
+        choices=("auto", "always", "never"),
+        default="auto",
+        help="auto: on a terminal, unless NO_COLOR is set",
+    )
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    colours = options.colour == "always" or (
+        options.colour == "auto" and sys.stdout.isatty() and "NO_COLOR" not in os.environ
+    )
+    if options.bag is not None:
+        return _show(state_in_bag(options.bag, options.at), colours)
+    join_graph("mesh_status")
+    if options.watch:
+        return _watch(colours)
+    return _show(live_state(), colours)
+
+
+def _show(mesh: MeshStatus, colours: bool) -> int:
+    print(mesh_table(mesh, colours))
+    return 0 if everybody_is_connected(find_trouble(mesh.nodes)) else 1
+
+
+def _watch(colours: bool) -> int:
+    """Until Ctrl-C. The subscriber's thread only replaces `latest`."""
+    latest: list[tuple[MeshStatus, float]] = []
+    came = threading.Event()
+
+    def take(message: MeshState) -> None:
+        latest[:] = [(mesh_status(message), time.monotonic())]
+        came.set()
+
+    rospy.Subscriber(names.STATE_TOPIC, MeshState, take, queue_size=1)
+    if not came.wait(WAIT_S):
+        raise NoState
+    try:
+        while True:
+            mesh, came_s = latest[0]
+            text = mesh_table(mesh, colours)
+            age_s = time.monotonic() - came_s
+            if age_s > OLD_NEWS_S:
+                require_master()
+                text += f"\nno news for {age_s:.0f} s"
+            print(f"{CLEAR_SCREEN if colours else ''}{text}", flush=True)
+            time.sleep(WATCH_PERIOD_S)
+    except KeyboardInterrupt:
+        return 0 if everybody_is_connected(find_trouble(latest[0][0].nodes)) else 1

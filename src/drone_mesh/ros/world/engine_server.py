@@ -1,0 +1,87 @@
+"""EngineServer: the ROS side of a drone's engine (reference, section 11)."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import rospy
+
+from drone_mesh.errors import GoalRefused
+from drone_mesh.msg import DroneInfo
+from drone_mesh.msg import Location as LocationMsg
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import engine_info, gps_response
+from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.srv import RequestGPS, RequestGPSResponse
+from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.world.engine import DroneState
+
+INFO_PERIOD_S = 0.05  # at most 20 DroneInfo per simulated second, reference, section 11
+_ROUNDING_S = 1e-6  # simulated time comes in hundredths, which floats do not hold exactly
+
+_log = logging.getLogger(__name__)
+
+
+class PositionReporter(rospy.SubscribeListener):
+    """Tells every simulator where the drones are: one DroneInfo publisher for all of them.
+
+    Publishes /WirelessSignalSimulator (DroneInfo). Any thread.
+    """
+
+    def __init__(self, drones: tuple[VirtualDrone, ...]) -> None:
+        self._drones = drones
+        self._publisher = rospy.Publisher(
+            names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
+        )
+        # Listens only once there is a publisher to speak with; who came before is told here.
+        self._publisher.impl.add_subscriber_listener(self)
+        self._report_all()
+
+    def report(self, info: DroneInfo) -> None:
+        """To everybody who listens now."""
+        self._publisher.publish(info)
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """Somebody new, perhaps a simulator that was restarted: tell where everybody is.
+
+        Tell everybody: what rospy offers for the new one alone is not safe beside other threads.
+        """
+        self._report_all()
+
+    def _report_all(self) -> None:
+        for drone in self._drones:
+            self.report(engine_info(drone.node_id, drone.engine.state.position))
+
+
+class EngineServer:
+    """Offers one drone's engine to others.
+
+    Subscribes: /Drones/<id>/goal (Location). Services: /Drones/<id>/gps (RequestGPS).
+    Goals and questions come in threads of rospy; `_moved` runs in the world's thread.
+    """
+
+    def __init__(self, drone: VirtualDrone, reporter: PositionReporter) -> None:
+        self._node_id = drone.node_id
+        self._engine = drone.engine
+        self._reporter = reporter
+        self._reported_s = -math.inf  # the world's thread
+        self._complaints = ThrottledLog(_log)
+        self._engine.add_listener(self._moved)
+        rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
+        rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps)
+
+    def _goal(self, goal: LocationMsg) -> None:
+        try:
+            self._engine.set_goal(goal.latitude, goal.longitude, goal.height)
+        except GoalRefused as error:
+            self._complaints.warning(f"drone {self._node_id} refuses a goal", str(error))
+
+    def _gps(self, _request: RequestGPS) -> RequestGPSResponse:
+        return gps_response(self._engine.get_location())
+
+    def _moved(self, state: DroneState) -> None:
+        landed = not state.is_flying
+        if landed or state.now_s - self._reported_s >= INFO_PERIOD_S - _ROUNDING_S:
+            self._reported_s = state.now_s
+            self._reporter.report(engine_info(self._node_id, state.position))

@@ -1,0 +1,66 @@
+"""MeshRoster: puts together what the hosts report and what the world sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Iterable, Sequence
+
+from drone_mesh.state.model import UNKNOWN_POSITION, NodeStatus
+from drone_mesh.state.routes import route_to_gateway
+
+
+@dataclass(frozen=True)
+class DroneView:
+    """What the world knows about a drone."""
+
+    id: int
+    role: int
+    position: Sequence[float]  # (3,) m, map frame, of the underside
+    path: Sequence[float] = ()  # (3 * waypoints,) m, the rest of its flight; empty: it stands
+
+
+class MeshRoster:
+    """Belongs to one thread. Wall seconds come in as `wall_s`.
+
+    A node that its host no longer reports while the host still speaks is gone, and leaves the
+    roster. A host that falls silent keeps its nodes: their report_age grows.
+    """
+
+    def __init__(self) -> None:
+        self._nodes: dict[int, NodeStatus] = {}
+        self._heard_at_s: dict[int, float] = {}
+        self._ids_of_host: dict[str, set[int]] = {}
+
+    def merge_report(self, host: str, nodes: Iterable[NodeStatus], wall_s: float) -> None:
+        """Take over what `host` tells. A node that moved to another host belongs to that one."""
+        reported = {node.id: node for node in nodes}
+        for gone in self._ids_of_host.get(host, set()) - reported.keys():
+            del self._nodes[gone]
+            del self._heard_at_s[gone]
+        for other, ids in self._ids_of_host.items():
+            if other != host:
+                ids.difference_update(reported)
+        self._ids_of_host[host] = set(reported)
+        self._nodes.update(reported)
+        for node in reported:
+            self._heard_at_s[node] = wall_s
+
+    def snapshot(self, drones: Iterable[DroneView], wall_s: float) -> list[NodeStatus]:
+        """All nodes by id, with routes, positions and ages filled in.
+
+        A drone that no host has reported yet is listed as switched off. The objects are those that
+        were merged; they change at the next call.
+        """
+        views = {drone.id: drone for drone in drones}
+        for node in self._nodes.values():
+            view = views.get(node.id)
+            node.position = view.position if view else UNKNOWN_POSITION
+            node.path = view.path if view else ()
+            node.route = route_to_gateway(node.id, self._nodes)
+            node.report_age = wall_s - self._heard_at_s[node.id]
+        unreported = [
+            NodeStatus(view.id, view.role, on=False, position=view.position, path=view.path)
+            for view in views.values()
+            if view.id not in self._nodes
+        ]
+        return sorted([*self._nodes.values(), *unreported], key=lambda node: node.id)

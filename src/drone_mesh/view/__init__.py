@@ -1,0 +1,1 @@
+"""Pictures of the mesh in its world: window, snapshots, palette. No ROS."""

@@ -1,0 +1,38 @@
+"""The ground of the world's window: tiles with an edge that can be counted."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import pybullet
+from PIL import Image, ImageDraw
+
+from drone_mesh.view.sketch import rgb
+from drone_mesh.world.interfaces import Colour
+
+TILE: Colour = (0.955, 0.960, 0.945, 1.0)
+TILE_EDGE: Colour = (0.80, 0.82, 0.80, 1.0)
+TILE_PIXELS = 256
+
+
+def lay_ground(client: int) -> None:
+    """A plane of tiles; pybullet makes them 2 m wide."""
+    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+    ground = pybullet.createMultiBody(0.0, plane, physicsClientId=client)
+    tile = Image.new("RGB", (TILE_PIXELS, TILE_PIXELS), rgb(TILE))
+    last = TILE_PIXELS - 1
+    ImageDraw.Draw(tile).rectangle((0, 0, last, last), None, rgb(TILE_EDGE), 3)
+    with tempfile.TemporaryDirectory() as folder:  # pybullet takes textures from files only
+        path = Path(folder) / "tile.png"
+        tile.save(path)
+        texture = pybullet.loadTexture(os.fspath(path), physicsClientId=client)
+    pybullet.changeVisualShape(
+        ground,
+        -1,
+        rgbaColor=(1, 1, 1, 1),
+        specularColor=(0, 0, 0),
+        textureUniqueId=texture,
+        physicsClientId=client,
+    )

@@ -1,0 +1,31 @@
+"""The program in the window's process: python -m drone_mesh.view.show_window PIPE."""
+
+from __future__ import annotations
+
+import sys
+from multiprocessing.connection import Connection
+
+from drone_mesh.view.window import WorldWindow
+
+REACT_PERIOD_S = 0.03  # wall; between two looks at keys and mouse
+
+
+def show_scenes(scenes: Connection) -> None:
+    """Show what comes through the pipe, until that ends or somebody closes the window."""
+    window = WorldWindow()
+    try:
+        while window.is_open():
+            if scenes.poll(REACT_PERIOD_S):
+                scene = scenes.recv()
+                while scenes.poll():
+                    scene = scenes.recv()
+                window.show(scene)
+            window.react()
+    except EOFError:
+        pass
+    finally:
+        window.close()
+
+
+if __name__ == "__main__":
+    show_scenes(Connection(int(sys.argv[1])))

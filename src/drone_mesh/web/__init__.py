@@ -1,0 +1,1 @@
+"""What all HTTP servers share: access, the port, the server thread. No ROS."""

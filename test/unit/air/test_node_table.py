@@ -1,0 +1,161 @@
+"""The rules of the simulated air: reference, sections 6 and 14.1."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+
+import pytest
+
+from drone_mesh.air.node import AirError, Node
+from drone_mesh.air.node_table import NodeTable
+
+NOWHERE = (0.0, 0.0, 0.0)  # what an antenna gives as its position
+
+
+def register_of(*places, max_distance_m=9.0):
+    """Nodes 0, 1, ... at these places, as antenna and engine announce them."""
+    table = NodeTable(max_distance_m)
+    for node_id, place in enumerate(places):
+        table.drone_info(node_id, place, "", True)
+        table.drone_info(node_id, NOWHERE, f"/Node/{node_id}", True)
+    return table
+
+
+def test_a_stranger_is_registered_where_it_says_it_is():
+    table = NodeTable()
+    table.drone_info(7, (1.0, 2.0, 3.0), "/stranger", True)
+    assert table.node(7) == Node(7, "/stranger", True)
+    assert table.position(7) == (1.0, 2.0, 3.0)
+
+
+def test_an_unknown_node_without_sub_is_not_registered_but_its_position_is_kept():
+    table = NodeTable()
+    table.drone_info(7, (1.0, 2.0, 3.0), "", True)
+    assert table.node(7) is None
+    table.drone_info(7, (50.0, 0.0, 0.0), "/Node/7", True)
+    assert table.position(7) == (1.0, 2.0, 3.0)
+
+
+def test_an_antenna_never_moves_a_known_node():
+    table = register_of((1.0, 2.0, 0.05))
+    table.drone_info(0, (8.0, 8.0, 8.0), "/Node/0", True)
+    assert table.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_an_engine_moves_its_node():
+    table = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    assert table.in_range(0) == (1,)
+    table.drone_info(1, (20.0, 0.0, 0.05), "", True)
+    assert table.in_range(0) == ()
+    assert table.link(0, 1) is None
+
+
+def test_a_flying_drone_does_not_switch_its_antenna_back_on():
+    table = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    table.drone_info(1, NOWHERE, "/Node/1", False)
+    table.drone_info(1, (6.0, 0.0, 0.05), "", True)
+    assert table.node(1) == Node(1, "/Node/1", False)
+    assert table.position(1) == (6.0, 0.0, 0.05)
+
+
+def test_power_off_without_sub_leaves_the_position_alone():
+    table = register_of((1.0, 2.0, 0.05))
+    table.drone_info(0, (9.0, 9.0, 9.0), "", False)
+    assert table.node(0) == Node(0, "/Node/0", False)
+    assert table.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_exactly_the_origin_without_sub_switches_on_a_node_that_is_off():
+    table = register_of((1.0, 2.0, 0.05))
+    table.drone_info(0, NOWHERE, "", False)
+    table.drone_info(0, NOWHERE, "", True)
+    assert table.node(0) == Node(0, "/Node/0", True)
+    assert table.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_exactly_the_origin_is_a_position_for_a_node_that_is_on():
+    table = register_of((1.0, 2.0, 0.05))
+    table.drone_info(0, NOWHERE, "", True)
+    assert table.position(0) == NOWHERE
+
+
+def test_a_new_sub_replaces_the_topic():
+    table = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    table.drone_info(1, NOWHERE, "/elsewhere", True)
+    assert table.link(0, 1) == "/elsewhere"
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "heard"), [(8.999, True), (9.0, False), (9.001, False), (0.0, True)]
+)
+def test_in_range_means_nearer_than_the_maximum(distance_m, heard):
+    table = register_of((1.0, 1.0, 1.0), (1.0, 1.0, 1.0 + distance_m))
+    assert (table.link(0, 1) == "/Node/1") is heard
+    assert (table.in_range(0) == (1,)) is heard
+
+
+def test_the_distance_is_euclidean_in_three_dimensions():
+    assert register_of((0, 0, 0.1), (3, 4, 0.1), max_distance_m=5.01).in_range(0) == (1,)
+    assert register_of((0, 0, 0.1), (3, 4, 1.0), max_distance_m=5.01).in_range(0) == ()
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_a_node_that_is_off_neither_sends_nor_receives(off):
+    table = register_of((0.0, 0.0, 0.05), (5.0, 0.0, 0.05))
+    table.drone_info(off, NOWHERE, f"/Node/{off}", False)
+    assert table.link(0, 1) is None
+    assert table.in_range(0) == ()
+
+
+def test_unknown_nodes_are_not_linked_and_may_not_ask_who_is_near():
+    table = register_of((0.0, 0.0, 0.05))
+    assert table.link(0, 9) is None
+    assert table.link(9, 0) is None
+    with pytest.raises(AirError, match="node 9 is not registered"):
+        table.in_range(9)
+
+
+@pytest.mark.parametrize(
+    ("node_id", "position", "sub", "why"),
+    [
+        (254, (1.0, 1.0, 1.0), "/Node/254", "id 254: node ids are 0..253"),
+        (255, (1.0, 1.0, 1.0), "", "id 255: node ids are 0..253"),
+        (3, (math.nan, 1.0, 1.0), "", "not three finite numbers"),
+        (3, (1.0, math.inf, 1.0), "/Node/3", "not three finite numbers"),
+        (3, (1.0, 1.0), "", "not three finite numbers"),
+        (3, NOWHERE, "/", "'/' is not the name of a topic"),
+        (3, NOWHERE, "a b", "is not the name of a topic"),
+        (3, NOWHERE, "~private", "is not the name of a topic"),
+        (3, NOWHERE, "/Node/3\n", "is not the name of a topic"),
+        (3, NOWHERE, "/" + "x" * 300, "is not the name of a topic"),
+    ],
+)
+def test_bad_information_is_refused_and_changes_nothing(node_id, position, sub, why):
+    table = register_of((1.0, 1.0, 1.0))
+    with pytest.raises(AirError, match=why):
+        table.drone_info(node_id, position, sub, True)
+    assert table.node(node_id) is None
+    assert table.position(node_id) is None
+
+
+@pytest.mark.parametrize("distance_m", [0.0, -1.0, math.nan])
+def test_a_maximum_distance_that_is_none_is_refused(distance_m):
+    with pytest.raises(AirError, match="must be above 0"):
+        NodeTable(distance_m)
+
+
+def test_both_questions_agree_whatever_is_moved_and_switched():
+    rng = random.Random(4)
+    table = register_of(*[(rng.uniform(0, 30), rng.uniform(0, 30), 0.05) for _ in range(40)])
+    for _ in range(200):
+        node_id = rng.randrange(40)
+        if rng.random() < 0.5:
+            place = (rng.uniform(0, 30), rng.uniform(0, 30), rng.uniform(0, 9))
+            table.drone_info(node_id, place, "", True)
+        else:
+            table.drone_info(node_id, NOWHERE, f"/Node/{node_id}", rng.random() < 0.7)
+    links = {pair for pair in itertools.permutations(range(40), 2) if table.link(*pair)}
+    assert links == {(a, b) for a in range(40) for b in table.in_range(a)}
+    assert 100 < len(links) < 40 * 39

@@ -1,0 +1,84 @@
+"""The real mesh core on real drivers on emulated chips."""
+
+from __future__ import annotations
+
+import random
+import threading
+
+import pytest
+
+from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
+from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
+
+# casus.yaml, layout 101: three rows of two behind a gateway
+GATEWAY = (-1.0, 0.0, 0.1)
+LAYOUT_101 = {1: (-3, 4), 2: (3, 4), 3: (-3, 10), 4: (3, 10), 5: (-3, 16), 6: (3, 16)}
+# The chip hears further than 9 m, as it does in reality: at this scale the same links exist.
+METRES_OF_THE_FIELD = 10.0
+
+
+def layout_101(links: LinkModel, scale: float = 1.0, seed: int = 1) -> EmulatedMesh:
+    mesh = EmulatedMesh(VirtualClock(), links, seed)
+    mesh.add_gateway(0, (GATEWAY[0] * scale, GATEWAY[1] * scale, GATEWAY[2]))
+    for node, (x_m, y_m) in LAYOUT_101.items():
+        mesh.add_router(node, (x_m * scale, y_m * scale, 0.05))
+    return mesh
+
+
+@pytest.fixture(params=["disc", "log-distance"])
+def mesh(request):
+    if request.param == "disc":
+        mesh = layout_101(IdealDisc(9.0))
+    else:
+        # Links of 6 m (and 6.3 and 4.5 m to the gateway) lie inside, those of 8.5 m outside.
+        edge_m = 7.5 * METRES_OF_THE_FIELD
+        links = LogDistance.with_edge_at(edge_m, random.Random("links"))
+        mesh = layout_101(links, METRES_OF_THE_FIELD)
+    yield mesh
+    mesh.stop()
+
+
+def hops(mesh):
+    return [mesh.hops(node) for node in LAYOUT_101]
+
+
+def test_layout_101_connects_with_the_hops_of_2019_and_detours_when_router_3_is_off(mesh):
+    assert mesh.run_until(mesh.all_connected, within_s=60.0), hops(mesh)
+    assert mesh.run_until(lambda: hops(mesh) == [1, 1, 2, 2, 3, 3], within_s=120.0), hops(mesh)
+    mesh.power(3, False)
+    mesh.run_for(1.0)
+    node_5 = mesh.nodes[5].component
+    assert mesh.run_until(
+        lambda: node_5.get_connected_to_gateway() and node_5.get_route_to_gateway() in (4, 6),
+        within_s=120.0,
+    ), f"node 5 found no way round node 3; hops {hops(mesh)}"
+    assert mesh.run_until(mesh.all_connected, within_s=60.0), hops(mesh)
+    for node in mesh.nodes.values():
+        assert node.chip.warnings == []
+        statistics = node.antenna.statistics()
+        assert statistics.sent == statistics.acknowledged + statistics.lost
+
+
+def test_a_mesh_ends_all_its_threads_when_it_stops():
+    before = threading.active_count()
+    mesh = layout_101(IdealDisc(9.0))
+    mesh.run_for(5.0)
+    assert threading.active_count() > before
+    mesh.stop()
+    for thread in threading.enumerate():
+        if thread.name.startswith(("mesh ", "nRF24 ")):
+            thread.join(timeout=10.0)
+            assert not thread.is_alive(), thread.name
+    assert threading.active_count() == before
+
+
+def test_the_same_seed_gives_the_same_mesh():
+    def run(seed):
+        mesh = layout_101(IdealDisc(9.0), seed=seed)
+        mesh.run_for(20.0)
+        mesh.stop()
+        return mesh.air.frames, mesh.air.collisions, hops(mesh)
+
+    assert run(3) == run(3)
+    assert run(3) != run(4)

@@ -1,0 +1,37 @@
+"""The state of a mesh as a scene."""
+
+from __future__ import annotations
+
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import MeshStatus, NodeStatus
+from drone_mesh.view.picture import DroneCondition, LinkUse
+from drone_mesh.view.scene import scene_of
+
+
+def test_a_scene_shows_whose_place_is_known_with_conditions_links_and_flights():
+    mesh = MeshStatus(
+        3.0,
+        [
+            NodeStatus(0, Role.GATEWAY, connected=True, position=(0.0, 0.0, 0.0)),
+            NodeStatus(1, connected=True, next_hop=0, neighbours=b"\x00\x02",
+                       position=(1.0, 0.0, 0.0), route=b"\x01\x00"),
+            NodeStatus(2, position=(2.0, 0.0, 1.0), path=(2.0, 0.0, 2.0, 5.0, 0.0, 0.0)),
+            NodeStatus(3, on=False, position=(3.0, 0.0, 0.0)),
+            NodeStatus(4, report_age=99.0, position=(4.0, 0.0, 0.0)),
+            NodeStatus(5),
+        ],
+    )  # fmt: skip
+    scene = scene_of(mesh)
+    assert {drone.node_id: drone.condition for drone in scene.drones} == {
+        0: DroneCondition.CONNECTED,
+        1: DroneCondition.CONNECTED,
+        2: DroneCondition.LOST,
+        3: DroneCondition.OFF,
+        4: DroneCondition.UNKNOWN,
+    }
+    assert list(scene.drones[2].path) == [(2.0, 0.0, 2.0), (5.0, 0.0, 0.0)]
+    assert {(link.start, link.end): link.use for link in scene.links} == {
+        (0, 1): LinkUse.ROUTE,
+        (1, 2): LinkUse.KNOWN,
+    }
+    assert scene.title.startswith("3.0 s: 1 of 3 routers connected, 1 switched off, 1 silent")

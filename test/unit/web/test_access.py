@@ -1,0 +1,69 @@
+"""Who may use the console."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.web.access import Access, AccessDenied, access_for
+
+TOKEN = "0123456789abcdef"
+
+
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1:8080", "localhost:8080", "LOCALHOST", "[::1]:8080", "127.0.0.2:1"]
+)
+def test_without_a_token_the_machine_s_own_names_are_answered(host):
+    Access().check_host(host)
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example:8080", "192.168.1.5:8080", "", "127.0.0.1.evil.example", "[::1", "a@b"]
+)
+def test_without_a_token_any_other_name_is_turned_away(host):
+    with pytest.raises(AccessDenied, match="is not a name of this machine"):
+        Access().check_host(host)
+
+
+def test_with_a_token_any_name_will_do():
+    Access(TOKEN).check_host("drones.example:8080")
+
+
+@pytest.mark.parametrize("token", [None, "", "0123456789abcdeX", TOKEN + "0", "größer"])
+def test_a_wrong_token_is_refused(token):
+    with pytest.raises(AccessDenied, match="token"):
+        Access(TOKEN).check_token(token)
+
+
+def test_the_right_token_is_accepted():
+    Access(TOKEN).check_token(TOKEN)
+
+
+def test_the_own_page_may_connect():
+    Access().check_origin("http://127.0.0.1:8080", "127.0.0.1:8080")
+    Access().check_origin("https://Drones.example", "drones.example")
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [None, "null", "", "http://evil.example", "http://127.0.0.1:9999", "http://127.0.0.1"],
+)
+def test_another_page_may_not_connect(origin):
+    with pytest.raises(AccessDenied, match="is not of this console"):
+        Access().check_origin(origin, "127.0.0.1:8080")
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0", "192.168.1.5", "::", "drones.example"])
+def test_an_address_that_others_can_reach_needs_a_token(address):
+    with pytest.raises(ConfigurationError, match="give a token"):
+        access_for(address, "")
+    assert access_for(address, TOKEN).token == TOKEN
+
+
+def test_a_token_that_can_be_guessed_is_refused():
+    with pytest.raises(ConfigurationError, match="at least 16 characters"):
+        access_for("127.0.0.1", "secret")
+
+
+def test_the_machine_itself_needs_no_token():
+    assert access_for("127.0.0.1", "").token is None

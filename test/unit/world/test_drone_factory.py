@@ -1,0 +1,108 @@
+"""DroneFactory: ids, roles, start places, sizes and colours (reference, sections 3 and 11)."""
+
+from __future__ import annotations
+
+import math
+
+import pybullet
+import pytest
+
+from drone_mesh.drone.fleet import plan_fleet
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.drones import GatewayDrone, RouterDrone
+from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.still_world import StillWorld
+
+
+def make(**changes):
+    parameters = {"gateways": 1, "routers": 17, "gridsize": 6, "spacing": 1.0, "debug": True}
+    return DroneFactory(StillWorld(), **{**parameters, **changes})
+
+
+def test_ids_count_gateways_first_and_then_routers():
+    drones = make(gateways=2, routers=3).drones
+    assert [drone.node_id for drone in drones] == [0, 1, 2, 3, 4]
+    assert [type(drone) for drone in drones] == [GatewayDrone] * 2 + [RouterDrone] * 3
+    assert [drone.ROLE for drone in drones] == [Role.GATEWAY] * 2 + [Role.ROUTER] * 3
+
+
+def test_gateways_stand_in_a_column_and_routers_in_rows():
+    centres = [
+        drone.engine.state.position
+        for drone in make(gateways=2, routers=5, gridsize=3, spacing=6.0).drones
+    ]
+    assert centres == [
+        (-1.0, 0.0, 0.1),
+        (-1.0, 1.0, 0.1),
+        (0.0, 0.0, 0.05),
+        (6.0, 0.0, 0.05),
+        (12.0, 0.0, 0.05),
+        (0.0, 6.0, 0.05),
+        (6.0, 6.0, 0.05),
+    ]
+
+
+def test_everybody_starts_with_the_underside_on_the_ground():
+    assert [drone.engine.get_location() for drone in make(routers=2).drones] == [
+        Location(latitude=0.0, longitude=-1.0, height=0.0),
+        Location(latitude=0.0, longitude=0.0, height=0.0),
+        Location(latitude=0.0, longitude=1.0, height=0.0),
+    ]
+
+
+def test_a_router_is_a_green_and_a_gateway_a_purple_box():
+    with BulletWorld() as world:
+        gateway, router = DroneFactory(world, 1, 1, gridsize=1, spacing=1.0, debug=False).drones
+        for drone, size in ((gateway, (0.2, 0.1, 0.2)), (router, (0.2, 0.2, 0.1))):
+            (visual,) = pybullet.getVisualShapeData(drone.box, physicsClientId=world.client)
+            assert visual[2] == pybullet.GEOM_BOX
+            assert visual[3] == pytest.approx(size)
+            assert visual[7] == pytest.approx(drone.COLOUR)
+            low, high = pybullet.getAABB(drone.box, physicsClientId=world.client)
+            assert [b - a for a, b in zip(low, high)] == pytest.approx(size, abs=0.01)
+    red, green, blue, _ = RouterDrone.COLOUR
+    assert green > 2 * max(red, blue)
+    red, green, blue, _ = GatewayDrone.COLOUR
+    assert min(red, blue) > 2 * green
+
+
+def test_an_empty_world_and_a_full_one_are_allowed():
+    assert make(gateways=0, routers=0).drones == ()
+    assert make(gateways=1, routers=253).drones[-1].node_id == 253
+    assert len(make(gateways=0, routers=254).drones) == 254
+
+
+def test_each_drone_starts_at_a_place_of_its_own():
+    places = [
+        (place.longitude, place.latitude) for place in plan_fleet(4, 250, gridsize=16, spacing=1.0)
+    ]
+    assert len(set(places)) == 254
+
+
+def test_debug_is_handed_on():
+    assert make(debug=True).debug is True
+    assert make(debug=False).debug is False
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"gateways": -1}, "gateways: -1 is less than 0"),
+        ({"routers": -1}, "routers: -1 is less than 0"),
+        (
+            {"gateways": 1, "routers": 254},
+            r"gateways \+ routers: 1 \+ 254 = 255 drones, .* at most 254",
+        ),
+        ({"gridsize": 0}, "gridsize: 0"),
+        ({"spacing": 0.0}, "spacing: 0.0"),
+        ({"spacing": -1.0}, "spacing: -1.0"),
+        ({"spacing": math.nan}, "spacing: nan"),
+        ({"spacing": math.inf}, "spacing: inf"),
+    ],
+)
+def test_a_parameter_that_makes_no_fleet_is_named(changes, why):
+    with pytest.raises(ConfigurationError, match=why):
+        make(**changes)
