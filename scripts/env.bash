@@ -5,6 +5,7 @@
 drone_mesh_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 if [ -e "$drone_mesh_root/build/devel/setup.bash" ]; then
+  # shellcheck source=/dev/null
   . "$drone_mesh_root/build/devel/setup.bash"
   case ":$PATH:" in
     *":$drone_mesh_root/.venv/bin:"*) ;;

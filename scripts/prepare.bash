@@ -1,5 +1,6 @@
-# Sourced by run, test and bench: installs what is missing and builds. Nothing outside the
-# checkout changes, but for system packages.
+# Sourced by the other scripts: installs what is missing and builds. Apart from system packages,
+# nothing outside the checkout changes.
+# shellcheck disable=SC2034  # some variables are for the scripts that source this
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$root/.venv"

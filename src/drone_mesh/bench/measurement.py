@@ -10,7 +10,7 @@ from drone_mesh.bench.observation import REST, WATCH, Look, Watch
 from drone_mesh.bench.processes import Use, cores_between
 from drone_mesh.bench.progress import Progress
 from drone_mesh.bench.system import BenchmarkError, System
-from drone_mesh.ros.graph.names import DELIVERED, LOST_IN_RANGE, WORST_LAG
+from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE, WORST_LAG
 
 ON_WITHIN_S = 180.0  # wall; our choice: six times what 254 drones may take
 CONNECTED_WITHIN_S = 120.0  # wall; as long as the original was given

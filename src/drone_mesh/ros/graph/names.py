@@ -23,10 +23,6 @@ REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> 
 STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> people
 EVENTS_TOPIC = "/mesh/events"  # MeshEvent: DroneFactory -> people
 DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> people
-# Names of figures there.
-DELIVERED = "delivered"  # packets handed to a node, each receiver of a broadcast counted
-LOST_IN_RANGE = "lost in range"  # packets for a node that is on, in range and has listened before
-WORST_LAG = "worst timer lag"  # s, simulated: how late the latest timer was since last told
 
 MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz
 MAP_FRAME = "map"

@@ -13,7 +13,6 @@ import rospy
 from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import MeshExecutor, Seat
-from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.figures import Figures
 from drone_mesh.ros.host.emulated_nrf24 import EmulatedRadios
 from drone_mesh.ros.host.host_reports import HostReports
@@ -25,6 +24,7 @@ from drone_mesh.ros.host.virtual_raspberry_pi import (
     VirtualRaspberryPiGateway,
     VirtualRaspberryPiRouter,
 )
+from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 SIMULATOR_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
 _LOOK_PERIOD_S = 0.02  # wall; our choice
@@ -123,8 +123,8 @@ class MeshHost:
 
     def _take_figures(self) -> dict[str, float]:
         return {
-            names.WORST_LAG: self.executor.take_worst_lag_s(),
-            names.LOST_IN_RANGE: self._link.never_handed_over,
+            WORST_LAG: self.executor.take_worst_lag_s(),
+            LOST_IN_RANGE: self._link.never_handed_over,
         }
 
     def _submit_start(self, node_id: int, tell: Callable[[], None]) -> None:

@@ -31,6 +31,7 @@ from drone_mesh.srv import (
     WirelessMessages,
     WirelessMessagesResponse,
 )
+from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
 STUCK_RECEIVER_S = 0.2  # our choice: who does not empty its socket for so long is cut off
 
@@ -221,7 +222,7 @@ class WirelessSignalSimulator:
 
     def _figures(self) -> dict[str, float]:
         with self._lock:
-            return {names.DELIVERED: self._delivered, names.LOST_IN_RANGE: self._lost}
+            return {DELIVERED: self._delivered, LOST_IN_RANGE: self._lost}
 
 
 def main() -> None:
