@@ -1,4 +1,4 @@
-"""Names of the figures in /diagnostics that add up over processes: published there, read by bench."""
+"""Names of the figures in /diagnostics that add up over processes: the bench reads them."""
 
 from __future__ import annotations
 
