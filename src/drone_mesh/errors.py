@@ -12,7 +12,7 @@ class PacketError(MeshError):
 
 
 class LocationUnknown(MeshError):
-    """The drone engine cannot say where the drone is (reference 14.6). Go on without a position."""
+    """The drone engine does not know where the drone is. Continue without a position."""
 
 
 class ConfigurationError(MeshError):
@@ -20,4 +20,4 @@ class ConfigurationError(MeshError):
 
 
 class GoalRefused(MeshError):
-    """A goal is no number or out of bounds (reference 11). Nothing moves; tell who sent it."""
+    """A goal is not a number or out of bounds. Nothing moves; report it to the sender."""

@@ -1,8 +1,8 @@
 """MeshExecutor: the one thread that works in all mesh components of a process.
 
-The core has no threads of its own (reference, section 2). Here packets, orders and time meet: what
-arrives from other threads waits in one first-in-first-out queue, what is due at a time waits in a
-heap of deadlines, and one worker takes whichever has waited longest.
+The core has no threads (docs/protocol.md, "Driven from outside"). Packets, orders and time meet
+here: work from other threads waits in one first-in-first-out queue, timers wait in a heap of
+deadlines, and one worker takes whichever has waited longest.
 """
 
 from __future__ import annotations

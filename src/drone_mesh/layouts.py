@@ -1,4 +1,4 @@
-"""Layouts of the DroneManager: which drone belongs where in which case (reference, section 12)."""
+"""Layouts of the DroneManager: places of drones per case (docs/protocol.md, "Drone manager")."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drone_mesh.yaml_file import read_mapping
 FIELD_CASE = 0
 GRID_CASE = 100
 MAX_CASE = 2**32 - 1  # Casus.srv: uint32 caseID
-MAX_NODE_ID = 253  # reference, section 3
+MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
 
 _FIELD_PLACES = {  # node id -> longitude, latitude: the field case of the project plan
     1: (-13, 24),

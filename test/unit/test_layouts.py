@@ -1,4 +1,4 @@
-"""Layouts: the shipped cases, the built-in ones, and what is refused (reference, section 12)."""
+"""Layouts: shipped cases, built-in cases, refused files (docs/protocol.md, "Drone manager")."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def places(layouts, case):
     ]
 
 
-def test_the_shipped_file_has_the_cases_of_the_reference(shipped):
+def test_the_shipped_file_has_the_documented_cases(shipped):
     assert shipped.cases == [*range(18), 100, 101, 102, 201, 202]
 
 

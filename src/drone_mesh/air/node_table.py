@@ -16,12 +16,15 @@ from drone_mesh.air.node import (
 )
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 
-MAX_DISTANCE_M = 9.0  # reference, section 6: in range means nearer than this
+MAX_DISTANCE_M = 9.0  # docs/protocol.md, "Wireless signal simulator": in range is nearer than this
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
 
 
 class NodeTable:
-    """The rules of the simulated air (reference, sections 6 and 14.1). Not safe for threads."""
+    """The rules of the simulated air. Not thread-safe.
+
+    docs/protocol.md, "Wireless signal simulator" and "Who speaks in DroneInfo".
+    """
 
     def __init__(self, max_distance_m: float = MAX_DISTANCE_M) -> None:
         """Raises AirError unless the distance is a positive number."""

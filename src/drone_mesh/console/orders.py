@@ -10,7 +10,7 @@ from typing import Any, Callable, Mapping, Protocol
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
 
-FURTHEST_M = 5000.0  # reference, section 11: goals beyond are refused
+FURTHEST_M = 5000.0  # docs/protocol.md, "Goals"
 HIGHEST_M = 500.0
 FASTEST = 100.0  # simulated seconds per wall second; our choice
 

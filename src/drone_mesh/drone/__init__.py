@@ -1,4 +1,4 @@
-"""What the mesh software knows of the drone that carries it (SDD 2.2.8)."""
+"""What the mesh software knows of the drone that carries it."""
 
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 

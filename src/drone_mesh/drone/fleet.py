@@ -1,4 +1,4 @@
-"""A fleet: ids, roles and start places of its drones (reference, sections 3 and 11)."""
+"""A fleet: ids, roles and start places of its drones (docs/protocol.md, "Identity", "Fleet")."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 
-MAX_DRONES = 254  # ids 0..253, reference, section 3
+MAX_DRONES = 254  # ids 0..253
 GATEWAY_COLUMN_M = -1.0  # x of all gateways; they stand 1 m apart along y
 
 

@@ -1,4 +1,4 @@
-"""The way a drone flies from place to place (reference, section 11): geometry and time."""
+"""Geometry and time of a flight (docs/protocol.md, "World and flights")."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Tuple
 
 Vector = Tuple[float, float, float]  # x (longitude), y (latitude), z (up): metres, world frame
 
-SPEED_M_S = 2.0  # reference, section 11
-CLIMB_ENDS_AT = 0.1  # share of the flight's duration, reference, section 11
-DESCENT_STARTS_AT = 0.9  # share of the flight's duration, reference, section 11
+SPEED_M_S = 2.0
+CLIMB_ENDS_AT = 0.1  # share of the flight's duration
+DESCENT_STARTS_AT = 0.9  # share of the flight's duration
 
 
 def _between(start: Vector, end: Vector, share: float) -> Vector:

@@ -1,4 +1,4 @@
-"""Which goals a drone takes (reference, section 11): one answer for all who pass orders on."""
+"""Which goals a drone accepts (docs/protocol.md, "Goals"); used wherever orders pass."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 from drone_mesh.errors import GoalRefused
 
-MAX_COORDINATE_M = 5000.0  # latitude and longitude: -5000..5000 m, reference, section 11
-MAX_HEIGHT_M = 500.0  # height of the underside: 0..500 m, reference, section 11
+MAX_COORDINATE_M = 5000.0  # latitude and longitude: -5000..5000 m
+MAX_HEIGHT_M = 500.0  # height of the underside: 0..500 m
 
 
 def check_goal(latitude: float, longitude: float, height: float) -> None:

@@ -1,4 +1,4 @@
-"""IDroneEngine: the mesh's view of a drone (SDD 2.2.8)."""
+"""IDroneEngine: the mesh's view of a drone (docs/protocol.md, "Interfaces")."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 
 class Location(NamedTuple):
-    """A place in the world frame, in metres; z is up (reference, section 4)."""
+    """A place in the world frame, in metres; z is up (docs/protocol.md, "Terms")."""
 
     latitude: float  # y
     longitude: float  # x
     height: float  # z of the drone's underside
 
     def distance_m(self, other: Location) -> float:
-        """Straight 3D distance to `other` (SDD formula 3.1)."""
+        """Straight 3D distance to `other`."""
         return math.sqrt(
             (self.latitude - other.latitude) ** 2
             + (self.longitude - other.longitude) ** 2

@@ -11,7 +11,7 @@ from drone_mesh.inprocess.clock import VirtualClock
 
 
 class InProcessDrone(IDroneEngine):
-    """Where one drone is. Flies as those of the world do (reference, section 11)."""
+    """Where one drone is. It flies like the drones of the world."""
 
     def __init__(
         self, clock: VirtualClock, start: Location, on_flight: Callable[[bool], None]

@@ -15,7 +15,7 @@ from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 
-RANGE_M = 9.0  # reference, section 6
+RANGE_M = 9.0  # docs/protocol.md, "Wireless signal simulator"
 PROGRESS_S = 5.0  # of the wall
 
 

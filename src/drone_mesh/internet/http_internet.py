@@ -14,7 +14,7 @@ from drone_mesh.internet.request_guard import MOST_HEAD_BYTES
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import listen
 
-DEFAULT_PORT = 9080  # reference, section 13
+DEFAULT_PORT = 9080  # docs/raspberry-pi.md, "HTTP"
 ANSWER_WITHIN_S = 2.0  # our choice: over ten times what an order to a node that is gone takes
 MOST_CONNECTIONS = 64  # our choice; more are answered 503
 LAST_ANSWERS_WITHIN_S = 1  # our choice: for requests that are under way when it disconnects

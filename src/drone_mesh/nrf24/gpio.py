@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from drone_mesh.nrf24.errors import HardwareUnavailable
 
-CE_GPIO = 25  # pin 22 of the header (reference, section 13)
+CE_GPIO = 25  # pin 22 of the header (docs/radio.md, "Wiring and settings")
 IRQ_GPIO = 24  # pin 18
 HEADER_LABELS = ("pinctrl-bcm2835", "pinctrl-bcm2711", "pinctrl-rp1")  # up to Pi 3, Pi 4, Pi 5
 _CONSUMER = "drone_mesh nRF24L01+"

@@ -1,4 +1,4 @@
-"""The antenna of the mesh on a real radio (SDD: NRF24HighLevelInterface)."""
+"""NRF24HighLevelInterface: the antenna of the mesh on a real radio (docs/radio.md)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from drone_mesh.nrf24.transceiver import Received
 logger = logging.getLogger(__name__)
 
 RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices that it shall end
-DUPLICATE_S = 0.5  # our choice, as in reference 14.10: the same bytes again so soon are a duplicate
+DUPLICATE_S = 0.5  # our choice: the same bytes again within this time are a duplicate
 
 Submit = Callable[[Callable[[float], None]], None]
 """Run a function, with now_s, on the thread that owns the node."""

@@ -1,4 +1,4 @@
-"""The driver of the nRF24L01+ (SDD: NRF24LowLevelInterface), written from the datasheet."""
+"""NRF24LowLevelInterface: the driver of the nRF24L01+ (docs/radio.md, "Driver rules")."""
 
 from __future__ import annotations
 

@@ -57,7 +57,9 @@ class BroadcastMode(enum.Enum):
 
 @dataclass(frozen=True)
 class RadioSettings:
-    """Reference, section 13; `crc_bytes` is 1 for nodes of 2019. All nodes of a mesh alike.
+    """docs/radio.md, "Wiring and settings". All nodes of a mesh use the same values.
+
+    `crc_bytes` is 1 for nodes of 2019 (docs/radio.md, "CRC length").
 
     Raises ConfigurationError for values that the chip does not have.
     """

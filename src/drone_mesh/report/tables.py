@@ -105,7 +105,7 @@ def _seconds(start_s: float | None, stop_s: float | None) -> str:
 
 
 def _on_ground(outage: Outage) -> str:
-    """From the cause to the connection, the time in flight taken off (reference, section 15)."""
+    """From the cause to the connection, without flight time (docs/protocol.md, "Requirements")."""
     if outage.connected_s is None:
         return "–"
     flown_s = 0.0

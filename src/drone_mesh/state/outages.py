@@ -16,7 +16,7 @@ _EMERGENCY = MeshEventKind.EMERGENCY.value
 _FLIGHT_DECIDED = MeshEventKind.FLIGHT_DECIDED.value
 _LANDED = MeshEventKind.LANDED.value
 
-CAUSE_WITHIN_S = 60.0  # our choice: a loss is noticed within 30 s (reference, section 15)
+CAUSE_WITHIN_S = 60.0  # our choice; noticed within 30 s (docs/protocol.md, "Requirements")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""VirtualDrone and its two kinds: size, colour and engine (reference, section 11)."""
+"""VirtualDrone, its two kinds: size, colour, engine (docs/protocol.md, "World and flights")."""
 
 from __future__ import annotations
 

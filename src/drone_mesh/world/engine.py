@@ -1,4 +1,4 @@
-"""DroneEngine: where one simulated drone is and how it flies (reference, section 11)."""
+"""DroneEngine: position and flight of one drone (docs/protocol.md, "World and flights")."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.world.interfaces import World
 
-ARRIVED_M = 0.01  # on each axis, reference, section 11
+ARRIVED_M = 0.01  # on each axis
 
 _log = logging.getLogger(__name__)
 

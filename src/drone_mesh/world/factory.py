@@ -1,4 +1,4 @@
-"""DroneFactory: puts a fleet into a world (reference, section 11)."""
+"""DroneFactory: puts a fleet into a world (docs/protocol.md, "Fleet")."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ Colour = Tuple[float, float, float, float]  # red, green, blue, opacity: 0..1
 
 _AnyWorld = TypeVar("_AnyWorld", bound="World")
 
-TICKS_PER_S = 100  # steps and /clock at 100 Hz of simulated time, reference, section 11
+TICKS_PER_S = 100  # steps and /clock per second of simulated time
 
 
 class Mover(Protocol):

@@ -1,4 +1,4 @@
-"""The rules of the simulated air: reference, sections 6 and 14.1."""
+"""The rules of the simulated air (docs/protocol.md, "Wireless signal simulator")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FlightPath against the corners of the reference, section 11."""
+"""FlightPath against the corners of a flight (docs/protocol.md, "World and flights")."""
 
 from __future__ import annotations
 

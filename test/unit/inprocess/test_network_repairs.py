@@ -1,4 +1,7 @@
-"""Whole networks that lose nodes, links, gateways or the medium, and heal (reference 9, 14.15)."""
+"""Whole networks that lose nodes, links, gateways or the medium, and heal.
+
+docs/protocol.md, "What the rules achieve".
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checklist A: SPI and registers of the emulated chip (rows 1 to 9)."""
+"""SPI and registers of the emulated chip (docs/radio.md, "Checklist A: SPI and registers")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checklist B: states and timing of the emulated chip (rows 10 to 18)."""
+"""States and timing of the emulated chip (docs/radio.md, "Checklist B: states and timing")."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import Register
 
 # 5 address bytes, 32 bytes of payload, SETUP_RETR 5F: T_data, T_ack, CE -> TX_DS, the same for a
-# NO_ACK packet, and CE -> MAX_RT (nrf24.md 1.7), all in us
+# NO_ACK packet, and CE -> MAX_RT (docs/radio.md, "Airtime"), all in us
 AIR_TIMES = [
     ("250k", 1, 1284, 260, 1804, 1414, 46_624),
     ("250k", 2, 1316, 292, 1868, 1446, 47_136),

@@ -1,4 +1,4 @@
-"""Checklist C: the transmitting chip, and our driver as a sender (rows 19 to 30)."""
+"""The transmitting chip, and our driver as a sender (docs/radio.md, "Checklist C: transmitter")."""
 
 from __future__ import annotations
 

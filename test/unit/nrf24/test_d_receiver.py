@@ -1,4 +1,4 @@
-"""Checklist D: the receiving chip, and our driver as a receiver (rows 31 to 40)."""
+"""The receiving chip, and our driver as a receiver (docs/radio.md, "Checklist D: receiver")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checklist E: packets without acknowledgement, dynamic lengths, ack payloads (rows 41 to 46)."""
+"""NO_ACK packets, dynamic lengths, ack payloads (docs/radio.md, "Checklist E: features")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checklist F: several radios on one air (rows 47 to 50)."""
+"""Several radios on one air (docs/radio.md, "Checklist F: air")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Checklist G: our driver in this project (rows 51 to 57; 58 to 60 are in modules of their own)."""
+"""Rows 51 to 57 for our driver (docs/radio.md, "Checklist G: driver in this project").
+
+Rows 58 to 60 have modules of their own.
+"""
 
 from __future__ import annotations
 

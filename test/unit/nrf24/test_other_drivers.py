@@ -1,4 +1,7 @@
-"""Checklist row 60: somebody else's driver and ours on one air."""
+"""Row 60: another driver and ours on one air.
+
+docs/radio.md, "Checklist G: driver in this project".
+"""
 
 from __future__ import annotations
 

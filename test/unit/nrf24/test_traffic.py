@@ -1,4 +1,7 @@
-"""Checklist G, rows 58 and 59: threads on both ends, for a long time."""
+"""Rows 58 and 59: threads on both ends, for a long time.
+
+docs/radio.md, "Checklist G: driver in this project".
+"""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from drone_mesh.raspberry.options import (
 TOKEN = "0123456789abcdef"
 
 
-def test_a_router_needs_but_its_id_and_has_the_settings_of_the_reference():
+def test_a_router_needs_only_its_id_and_has_the_documented_settings():
     assert parse_router(["--id", "3"], {}) == Options(
         node_id=3,
         hardware=Hardware((0, 0), ce_gpio=25, irq_gpio=None),

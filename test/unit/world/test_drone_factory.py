@@ -1,4 +1,4 @@
-"""DroneFactory: ids, roles, start places, sizes and colours (reference, sections 3 and 11)."""
+"""DroneFactory: ids, roles, start places, sizes and colours (docs/protocol.md, "Fleet")."""
 
 from __future__ import annotations
 
