@@ -34,3 +34,7 @@ class GroundEngine(IDroneEngine):
     def get_location(self) -> Location:
         """Where it was put. Never raises."""
         return self._location
+
+    def why_not_fly(self) -> str:
+        """It never flies."""
+        return "it stands on the ground"

@@ -24,7 +24,11 @@ class Location(NamedTuple):
 
 
 class IDroneEngine(abc.ABC):
-    """Where the drone is and where it goes. Both functions may be called at any time."""
+    """Where the drone is and where it goes. Any thread may call every function at any time.
+
+    An engine of your own needs `set_goal` and `get_location`; the others have defaults that suit a
+    drone that can always fly.
+    """
 
     @abc.abstractmethod
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
@@ -33,3 +37,23 @@ class IDroneEngine(abc.ABC):
     @abc.abstractmethod
     def get_location(self) -> Location:
         """Where the drone is now. Raises LocationUnknown when that cannot be found out."""
+
+    def why_not_fly(self) -> str:
+        """Why the drone would not fly to a goal now; empty while it would."""
+        return ""
+
+    def can_fly(self) -> bool:
+        """Whether the drone would fly to a goal now. `why_not_fly` is the one to override."""
+        return not self.why_not_fly()
+
+    def is_flying(self) -> bool | None:
+        """Whether a flight to a goal is under way; None: judge by the places it reports."""
+        return None
+
+    def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly to the place of another node, to repair the mesh; else as `set_goal`.
+
+        An engine overrides this when it ends a repair in another way than an ordered flight, for
+        example hovering instead of landing.
+        """
+        self.set_goal(latitude, longitude, height)

@@ -35,3 +35,9 @@ def test_a_goal_that_is_no_place_is_refused_and_not_logged(caplog, latitude, lon
     with pytest.raises(GoalRefused):
         GroundEngine(7, HERE).set_goal(latitude, longitude, height)
     assert caplog.text == ""
+
+
+def test_it_cannot_fly_and_gives_the_reason():
+    engine = GroundEngine(7, HERE)
+    assert not engine.can_fly()
+    assert engine.why_not_fly() == "it stands on the ground"

@@ -1,0 +1,108 @@
+"""Where the mesh's common frame lies on the earth: degrees to metres and back.
+
+East is the longitude axis and north the latitude axis, in metres at the height of the origin;
+heights are differences of altitude, so straight up changes neither east nor north. pymap3d does the
+mathematics: it is pure Python without dependencies, so it installs on every Raspberry Pi; pyproj
+is 30 MB of compiled PROJ for the same result, and serves the tests as an independent witness.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import struct
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import pymap3d
+
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import ConfigurationError
+
+MAX_LATITUDE_DEG = 85.0  # our choice: nearer to a pole, east and north lose their meaning
+ALTITUDE_RANGE_M = (-500.0, 9000.0)  # of the earth's surface, rounded outwards
+_DIGEST_BYTES = 2
+_RESOLUTION_DEG = 1e7  # origins that agree in all of MAVLink's 1e-7 degrees are the same
+_SURFACE_STEPS = 3  # each divides the error of the height by 1000; two reach micrometres
+
+
+class EarthPlace(NamedTuple):
+    """A place on the earth (WGS84)."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float  # above mean sea level, as autopilots report it
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The origin of the common frame. Every node of a mesh needs the same one."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float  # above mean sea level
+
+    def __post_init__(self) -> None:
+        """Raises ConfigurationError for a place that cannot be an origin."""
+        lowest, highest = ALTITUDE_RANGE_M
+        bounds = (
+            ("latitude", self.latitude_deg, -MAX_LATITUDE_DEG, MAX_LATITUDE_DEG),
+            ("longitude", self.longitude_deg, -180.0, 180.0),
+            ("altitude", self.altitude_m, lowest, highest),
+        )
+        for name, value, low, high in bounds:
+            if not low <= value <= high:  # false for NaN too
+                raise ConfigurationError(f"origin: {name} {value:g} is outside {low:g}..{high:g}")
+
+    @classmethod
+    def parse(cls, text: str) -> Origin:
+        """From "LAT,LON,ALT": degrees, degrees, metres. Raises ConfigurationError."""
+        try:
+            latitude_deg, longitude_deg, altitude_m = (float(part) for part in text.split(","))
+        except ValueError:
+            raise ConfigurationError(
+                f"invalid origin {text!r}: use LAT,LON,ALT, as in 52.0907,5.1214,3"
+            ) from None
+        return cls(latitude_deg, longitude_deg, altitude_m)
+
+    @property
+    def digest(self) -> int:
+        """A number 1..65535 that differs for different origins (but for one pair in 65535)."""
+        exact = struct.pack(
+            "<qqq",
+            round(self.latitude_deg * _RESOLUTION_DEG),
+            round(self.longitude_deg * _RESOLUTION_DEG),
+            round(self.altitude_m * 100.0),
+        )
+        digest = hashlib.sha256(exact).digest()[:_DIGEST_BYTES]
+        return int.from_bytes(digest, "little") or 1  # 0 means: no origin
+
+    def to_frame(self, place: EarthPlace) -> Location:
+        """The place in metres of the common frame."""
+        east, north, _ = pymap3d.geodetic2enu(
+            place.latitude_deg,
+            place.longitude_deg,
+            self.altitude_m,
+            self.latitude_deg,
+            self.longitude_deg,
+            self.altitude_m,
+        )
+        return Location(float(north), float(east), place.altitude_m - self.altitude_m)
+
+    def to_earth(self, location: Location) -> EarthPlace:
+        """The place on the earth of a location in the common frame."""
+        up = 0.0  # of the surface at the origin's height, which curves away below the plane
+        latitude_deg = longitude_deg = math.nan
+        for _ in range(_SURFACE_STEPS):
+            latitude_deg, longitude_deg, altitude_m = pymap3d.enu2geodetic(
+                location.longitude,
+                location.latitude,
+                up,
+                self.latitude_deg,
+                self.longitude_deg,
+                self.altitude_m,
+            )
+            up += self.altitude_m - float(altitude_m)
+        return EarthPlace(
+            float(latitude_deg), float(longitude_deg), self.altitude_m + location.height
+        )
