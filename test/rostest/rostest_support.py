@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import threading
 import time
 from typing import Callable, Iterable
 from xmlrpc.client import ServerProxy
@@ -83,11 +82,13 @@ class MeshWatch:
     def __init__(self, count: int) -> None:
         self.count = count
         self._infos: dict[int, NodeDebugInfo] = {}
-        self._arrived = threading.Event()
+        self._unconnected_in_a_row: dict[int, int] = {}
         for node_id in range(count):
             rospy.Subscriber(f"/Nodes/{node_id}/debug", NodeDebugInfo, self._heard)
 
     def _heard(self, info: NodeDebugInfo) -> None:
+        before = self._unconnected_in_a_row.get(info.nodeID, 0)
+        self._unconnected_in_a_row[info.nodeID] = 0 if info.ConnectedWithGateway else before + 1
         self._infos[info.nodeID] = info
 
     def hops(self) -> dict[int, int | None]:
@@ -102,6 +103,17 @@ class MeshWatch:
         hops = self.hops()
         wanted = range(self.count) if node_ids is None else node_ids
         return all(hops.get(node_id) is not None for node_id in wanted)
+
+    def lost(self, *node_ids: int) -> bool:
+        """Whether these nodes reported twice in a row, a second apart, that they are not connected.
+
+        One report alone may fall between a heartbeat to the gateway and its answer.
+        """
+        return all(self._unconnected_in_a_row.get(node_id, 0) >= 2 for node_id in node_ids)
+
+    def off(self, node_id: int) -> bool:
+        """Whether the node reports that its antenna has no power."""
+        return not self._infos[node_id].on
 
     def info(self, node_id: int) -> NodeDebugInfo:
         """What the node said last."""
@@ -135,8 +147,16 @@ class MeshWatch:
         answer = call(f"/Drones/{node_id}/gps", RequestGPS)
         return (answer.longitude, answer.latitude, answer.height)
 
+    def wait_at(self, node_id: int, longitude: float, latitude: float, within_s: float) -> None:
+        """Return when the drone stands there; AssertionError after `within_s` simulated seconds."""
+        self.wait(
+            f"drone {node_id} at ({longitude:g}, {latitude:g})",
+            within_s,
+            lambda: self.stands_at(node_id, longitude, latitude),
+        )
+
     def stands_at(self, node_id: int, longitude: float, latitude: float) -> bool:
-        """Within 0.05 m, on the ground."""
+        """Whether it is within 0.05 m, and nearer to the ground than to a height of 1 m."""
         x, y, height = self.place(node_id)
         return abs(x - longitude) <= 0.05 and abs(y - latitude) <= 0.05 and height == 0
 

@@ -48,11 +48,11 @@ class EmulatedRadioTest(unittest.TestCase):
         self.assertEqual(order(1, 1e9, 1.0, 0), 422, "a place out of bounds")
 
         self.assertLess(order(5, 3.0, 24.0, 0), 300)
-        mesh.wait("drone 5 at its place", 60, lambda: mesh.stands_at(5, 24.0, 3.0))
+        mesh.wait_at(5, 24.0, 3.0, within_s=60)
         mesh.wait("drone 5 connected again", 30, lambda: mesh.connected([5]))
 
         mesh.switch(4, False)
-        mesh.wait("4 and the one behind it not connected", 30, lambda: not mesh.connected([5]))
+        mesh.wait("4 and 5, which is behind it, lost", 30, lambda: mesh.lost(4, 5))
         mesh.switch(4, True)
         mesh.wait("all connected again", 60, mesh.connected)
         self.assertEqual(log.failures(), [])

@@ -26,11 +26,7 @@ class LayoutTest(unittest.TestCase):
         mesh.wait("all connected at the start", 30, mesh.connected)
         mesh.set_to_case(0)
         for node_id, place in sorted(PLACES.items()):
-            mesh.wait(
-                f"drone {node_id} did not come to {place}, it is at {mesh.place(node_id)}",
-                LONGEST_FLIGHT_S,
-                lambda node_id=node_id, place=place: mesh.stands_at(node_id, *place),
-            )
+            mesh.wait_at(node_id, *place, within_s=LONGEST_FLIGHT_S)
         mesh.wait("all connected after the landing", 60, mesh.connected)
         self.assertEqual(log.failures(), [])
 

@@ -29,8 +29,8 @@ class ManagerRestartTest(unittest.TestCase):
             return bool(answer.status == 1)
 
         mesh.wait("the manager did not find the gateway", 40, ordered)
-        mesh.wait("drone 2 did not arrive", 20, lambda: mesh.stands_at(2, 3.0, 4.0))
-        self.assertTrue(mesh.connected([0, 1]))
+        mesh.wait_at(2, 3.0, 4.0, within_s=20)
+        mesh.wait("0 and 1 connected", 2, lambda: mesh.connected([0, 1]))
         self.assertEqual(log.failures(), [])
 
 

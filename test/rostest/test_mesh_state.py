@@ -19,15 +19,22 @@ class MeshStateTest(unittest.TestCase):
         if not rospy.core.is_initialized():
             rospy.init_node("test_mesh_state")
         self.state: MeshState | None = None
+        self.state_before: MeshState | None = None
         self.events: list[MeshEvent] = []
         self.diagnostics: DiagnosticArray | None = None
         self.log = LogWatch()
         rospy.Subscriber("/mesh/state", MeshState, self._on_state)
-        rospy.Subscriber("/mesh/events", MeshEvent, self.events.append)
+        events = rospy.Subscriber("/mesh/events", MeshEvent, self.events.append)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
+        wait_for("events can arrive", WALL_LIMIT_S, lambda: events.get_num_connections() > 0)
 
     def _on_state(self, message: MeshState) -> None:
-        self.state = message
+        self.state_before, self.state = self.state, message
+
+    def stands_still(self) -> bool:
+        """Whether time did not move between the last two states, both of a paused world."""
+        before, now = self.state_before, self.state
+        return before.paused and now.paused and before.header.stamp == now.header.stamp
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         self.diagnostics = message
@@ -79,7 +86,7 @@ class MeshStateTest(unittest.TestCase):
         wait_for("3 flies", WALL_LIMIT_S, lambda: len(self.state.nodes[3].path) >= 3)
         self.assertEqual(list(self.state.nodes[3].path[-3:]), [12.0, 30.0, 0.0])
         self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, True, 0.0).success)
-        wait_for("paused", WALL_LIMIT_S, lambda: self.state.paused)
+        wait_for("paused, and the last step made", WALL_LIMIT_S, self.stands_still)
         stood, place = self.state.header.stamp, tuple(self.state.nodes[3].position)
         seen = self.state.header.seq
         wait_for("news while paused", WALL_LIMIT_S, lambda: self.state.header.seq > seen + 3)

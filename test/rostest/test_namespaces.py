@@ -25,9 +25,11 @@ for node in range({DRONES}):
     rospy.Subscriber(f"/Nodes/{{node}}/debug", NodeDebugInfo,
                      lambda info: connected.__setitem__(info.nodeID, info.ConnectedWithGateway))
 deadline_s = time.monotonic() + 60
-while time.monotonic() < deadline_s and list(connected.values()).count(True) < {DRONES}:
+found = []
+while time.monotonic() < deadline_s and len(found) < {DRONES}:
     time.sleep(0.05)
-print(sorted(node for node in connected if connected[node]))
+    found = sorted(node for node, is_connected in list(connected.items()) if is_connected)
+print(found)
 """
 
 

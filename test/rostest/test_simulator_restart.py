@@ -11,6 +11,11 @@ from drone_mesh.srv import AreaScan
 from rostest_support import LogWatch, MeshWatch, call, kill_and_wait_for_respawn
 
 
+def near(node_id: int) -> list[int]:
+    """The nodes that this one could send to."""
+    return list(call("/SignalSimulator/othersinRange", AreaScan, node_id).near)
+
+
 class SimulatorRestartTest(unittest.TestCase):
     def test_the_mesh_is_connected_again_and_a_node_that_was_off_stays_off(self) -> None:
         rospy.init_node("test_simulator_restart")
@@ -19,22 +24,22 @@ class SimulatorRestartTest(unittest.TestCase):
         others = [node_id for node_id in range(10) if node_id != 9]
         mesh.wait("all connected", 30, mesh.connected)
         mesh.switch(9, False)
-        near_before = list(call("/SignalSimulator/othersinRange", AreaScan, 5).near)
-        sent_before = {node_id: mesh.info(node_id).totalMessages for node_id in others}
+        mesh.wait("9 off in the simulator", 3, lambda: 9 not in near(5))
+        near_before = near(5)
         kill_and_wait_for_respawn("/WirelessSignalSimulator")
+        # Counted only now: what the killed one carried has been reported since.
+        sent_before = {node_id: mesh.info(node_id).totalMessages for node_id in others}
 
-        def everybody_sent() -> bool:
+        def all_sent() -> bool:
             return all(mesh.info(n).totalMessages > sent_before[n] for n in others)
 
         mesh.wait(
             "all but 9 connected, with packets that the new simulator carried",
             20,
-            lambda: mesh.connected(others) and everybody_sent(),
+            lambda: mesh.connected(others) and all_sent(),
         )
-        self.assertEqual(
-            list(call("/SignalSimulator/othersinRange", AreaScan, 5).near), near_before
-        )
-        self.assertNotIn(9, list(call("/SignalSimulator/othersinRange", AreaScan, 6).near))
+        self.assertEqual(near(5), near_before)
+        self.assertNotIn(9, near(6))
         self.assertLessEqual(len(log.lines("the simulator is gone")), 1)
         self.assertEqual(log.failures(), [])
 

@@ -11,6 +11,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import rosgraph
 import rospkg
 import rospy
 import rostest
@@ -41,6 +42,13 @@ def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedP
         timeout=TOOL_LIMIT_S,
         check=False,
     )
+
+
+def recorder_listens() -> bool:
+    """Whether state and events go to the recorder; it looks for topics once a second."""
+    _publishers, subscribers, _services = rosgraph.Master("/test").getSystemState()
+    of_topic = dict(subscribers)
+    return all("/mesh_recorder" in of_topic.get(t, []) for t in ("/mesh/state", "/mesh/events"))
 
 
 class ToolsTest(unittest.TestCase):
@@ -102,6 +110,7 @@ class ToolsTest(unittest.TestCase):
         )
         try:
             wait_for("a bag", WALL_LIMIT_S, lambda: list(self.folder.glob("*.bag.active")))
+            wait_for("the recorder listens", WALL_LIMIT_S, recorder_listens)
             wait_for("all connected", WALL_LIMIT_S, lambda: self.connected() == 4)
             told = run("status")
             self.assertEqual(told.returncode, 0, told.stdout + told.stderr)

@@ -111,9 +111,10 @@ def press(screen, key):
 def test_the_drones_are_on_the_screen_in_their_colours_until_it_is_stopped(screen, window):
     wait_until_shown(screen)
     for colour in (RouterDrone.COLOUR, CONDITION_COLOURS[DroneCondition.LOST]):
-        assert pixels_like(screen, colour) > 100
+        wait_until(lambda colour=colour: pixels_like(screen, colour) > 100, f"{colour} on it")
     window.stop()
-    assert pixels_like(screen, GatewayDrone.COLOUR) == 0
+    # The screen's server hears of it a moment later.
+    wait_until(lambda: pixels_like(screen, GatewayDrone.COLOUR) == 0, "an empty screen")
 
 
 @needs_screen
