@@ -1,6 +1,6 @@
-"""What catkin has to know about the Python side; setup.cfg holds what only pip reads.
+"""What catkin must know of the Python side; setup.cfg holds what only pip reads.
 
-The version stands in package.xml alone: catkin refuses to build when the two differ.
+The version is defined in package.xml only: catkin refuses to build if the two differ.
 """
 
 from __future__ import annotations
@@ -14,18 +14,23 @@ HERE = Path(__file__).resolve().parent
 
 
 def requirements(name: str) -> list[str]:
-    lines = (HERE / "requirements" / name).read_text(encoding="utf-8").splitlines()
-    return [line for line in lines if line and not line.startswith("#")]
+    """The requirements in requirements/NAME.txt, and in the files that it includes."""
+    found: list[str] = []
+    for line in (HERE / "requirements" / f"{name}.txt").read_text(encoding="utf-8").splitlines():
+        if line.startswith("-r "):
+            found += requirements(line[3:].strip()[: -len(".txt")])
+        elif line and not line.startswith("#"):
+            found.append(line)
+    return found
 
+
+EXTRAS = ("console", "http", "raspberry", "report", "simulation")
 
 setup(
     name="drone_mesh",
     version=ElementTree.parse(str(HERE / "package.xml")).findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
-    package_data={"": ["*.csv", "*.html", "*.service", "static/*"]},
-    extras_require={
-        "raspberry": requirements("raspberry.txt"),
-        "simulation": requirements("simulation.txt"),
-    },
+    package_data={"": ["*.csv", "*.html", "*.service", "py.typed", "static/*"]},
+    extras_require={extra: requirements(extra) for extra in EXTRAS},
 )

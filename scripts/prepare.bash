@@ -5,6 +5,7 @@
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$root/.venv"
 noetic=/opt/ros/noetic/setup.bash
+simulation_requirements=(requirements/{console,http,report,simulation}.txt)
 
 if [ -e "$noetic" ]; then
   ros_packages=(
@@ -110,13 +111,13 @@ alone() {
 prepare_simulation() {
   apt_install "${ros_packages[@]}"
   make_venv
-  pip_install requirements/simulation.txt
+  pip_install "${simulation_requirements[@]}"
   build
 }
 
 prepare_unit_tests() {
   make_venv
-  pip_install requirements/simulation.txt requirements/test.txt
+  pip_install "${simulation_requirements[@]}" requirements/test.txt
   pip_install --no-deps requirements/test-bare.txt
 }
 

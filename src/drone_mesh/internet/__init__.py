@@ -1,8 +1,7 @@
-"""A gateway's way to the world outside over HTTP, for real and for simulated gateways alike.
+"""A gateway's connection to the outside world over HTTP, for real and for simulated gateways.
 
-Nothing in here knows of ROS or of a Raspberry Pi.
+No ROS and no hardware. Nothing is imported here: a gateway without HTTP loads no web server.
 """
 
-from drone_mesh.internet.http_internet import HttpInternet
-
-__all__ = ["HttpInternet"]
+DEFAULT_ADDRESS = "127.0.0.1"
+DEFAULT_PORT = 9080  # docs/raspberry-pi.md, "HTTP"

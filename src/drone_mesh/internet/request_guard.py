@@ -9,11 +9,11 @@ from starlette.datastructures import Headers
 from starlette.responses import JSONResponse
 
 from drone_mesh.web.access import Access, AccessDenied
+from drone_mesh.web.server_thread import MAX_HEAD_BYTES
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Receive, Scope, Send
 
-MOST_HEAD_BYTES = 8192  # our choice: all headers together
 MOST_BODY_BYTES = 1024  # our choice: no request needs a body; clients that send "{}" may
 MOST_TARGET_BYTES = 1024  # our choice: five times the longest address that means something
 
@@ -42,8 +42,8 @@ class RequestGuard:
         target_bytes = len(scope.get("raw_path") or b"") + len(scope["query_string"])
         if target_bytes > MOST_TARGET_BYTES:
             return 414, f"the address is longer than {MOST_TARGET_BYTES} bytes"
-        if sum(len(name) + len(value) for name, value in headers.raw) > MOST_HEAD_BYTES:
-            return 431, f"the headers are longer than {MOST_HEAD_BYTES} bytes"
+        if sum(len(name) + len(value) for name, value in headers.raw) > MAX_HEAD_BYTES:
+            return 431, f"the headers are longer than {MAX_HEAD_BYTES} bytes"
         if "transfer-encoding" in headers:
             return 411, "say with Content-Length how long the body is; no request needs one"
         length = headers.get("content-length", "0")

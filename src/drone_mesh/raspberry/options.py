@@ -14,9 +14,11 @@ from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
 from drone_mesh.web.access import access_for
+from drone_mesh.web.listening import MAX_PORT
 
 MOST_EMULATED = 17  # our choice: as many as in the field case, and what one machine carries
 TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
@@ -97,12 +99,15 @@ def parse_gateway(
     http.add_argument(
         "--bind",
         metavar="ADDRESS",
-        default="127.0.0.1",
+        default=DEFAULT_ADDRESS,
         help="address to listen on; any but one of this machine alone needs a token "
         "(default: %(default)s)",
     )
     http.add_argument(
-        "--port", type=_whole(1, 65535), default=9080, help="TCP port (default: %(default)s)"
+        "--port",
+        type=_whole(1, MAX_PORT),
+        default=DEFAULT_PORT,
+        help="TCP port (default: %(default)s)",
     )
     http.add_argument(
         "--token-file",

@@ -15,14 +15,14 @@ from typing import Callable, Iterator, Sequence
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import Work
-from drone_mesh.nrf24.errors import HardwareUnavailable
+from drone_mesh.internet.on_demand import http_internet
 from drone_mesh.nrf24.gpio import GpiodCe, GpiodIrq
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import open_spi
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
-from drone_mesh.raspberry.options import Hardware, HttpOptions, Options
+from drone_mesh.raspberry.options import Hardware, Options
 
 LOOK_PERIOD_S = 0.5  # our choice: how often the main thread looks at the nodes
 LONELY_AFTER_S = 15.0  # our choice: one check period and half of the next
@@ -138,18 +138,9 @@ def _settings(options: Options, node_id: int) -> RadioSettings:
 
 def _internet(options: Options) -> MakeInternet | None:
     http = options.http
-    return None if http is None else lambda submit: _http_internet(submit, http)
-
-
-def _http_internet(submit: Callable[[Work], None], http: HttpOptions) -> IInternetConnection:
-    try:  # a router does without these libraries, and they take a second to load
-        from drone_mesh.internet import HttpInternet
-    except ImportError as error:
-        raise HardwareUnavailable(
-            f"the Python package {error.name} is missing, which a gateway needs for HTTP: "
-            "pip install 'drone_mesh[raspberry]'"
-        ) from error
-    return HttpInternet(submit, http.address, http.port, http.token)
+    if http is None:
+        return None
+    return lambda submit: http_internet(submit, http.address, http.port, http.token)
 
 
 class _NoInternet(IInternetConnection):

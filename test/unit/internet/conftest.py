@@ -10,7 +10,7 @@ import pytest
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
-from drone_mesh.internet import HttpInternet
+from drone_mesh.internet.http_internet import HttpInternet
 
 TOKEN = "0123456789abcdef0123"
 

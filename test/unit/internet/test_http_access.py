@@ -8,7 +8,7 @@ import httpx
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.internet import HttpInternet
+from drone_mesh.internet.http_internet import HttpInternet
 
 ORDER = "/DroneMovement/1/2/3/4"
 

@@ -15,7 +15,7 @@ import httpx
 import pytest
 
 from drone_mesh.communication.interfaces import IGatewayCommands
-from drone_mesh.internet import HttpInternet
+from drone_mesh.internet.http_internet import HttpInternet
 
 PATIENCE_S = 20.0  # for threads; nothing here takes a tenth of it
 

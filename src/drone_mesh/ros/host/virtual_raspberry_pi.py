@@ -14,7 +14,8 @@ from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.execution import Seat
-from drone_mesh.internet.http_internet import DEFAULT_PORT, HttpInternet
+from drone_mesh.internet import DEFAULT_PORT
+from drone_mesh.internet.on_demand import http_internet
 from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.host.internet_mock import RosInternetMock
@@ -103,6 +104,5 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
         mock = RosInternetMock(self.node_id, self.seat)
         if self.settings.internet == "mock":
             return mock
-        return SeveralInternets(
-            mock, HttpInternet(self.seat.submit, port=DEFAULT_PORT + self.node_id)
-        )
+        http = http_internet(self.seat.submit, port=DEFAULT_PORT + self.node_id)
+        return SeveralInternets(mock, http)

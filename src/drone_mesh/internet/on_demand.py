@@ -1,0 +1,25 @@
+"""Loads the web server when a gateway is to take orders over HTTP, and not before."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from drone_mesh.communication.interfaces import IInternetConnection
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
+
+if TYPE_CHECKING:
+    from drone_mesh.internet.asking import Submit
+
+
+def http_internet(
+    submit: Submit, address: str = DEFAULT_ADDRESS, port: int = DEFAULT_PORT, token: str = ""
+) -> IInternetConnection:
+    """An HttpInternet, see there. Raises ConfigurationError also if its libraries are missing."""
+    try:  # they take a second to load, and only gateways with HTTP need them
+        from drone_mesh.internet.http_internet import HttpInternet
+    except ImportError as error:
+        raise ConfigurationError(
+            f"orders over HTTP need the Python package {error.name}: pip install 'drone_mesh[http]'"
+        ) from error
+    return HttpInternet(submit, address, port, token)
