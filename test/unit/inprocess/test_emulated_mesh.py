@@ -10,6 +10,7 @@ import pytest
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
+from drone_mesh.nrf24.emulator.wall_clock import WallClock
 
 # casus.yaml, layout 101: three rows of two behind a gateway
 GATEWAY = (-1.0, 0.0, 0.1)
@@ -60,16 +61,17 @@ def test_layout_101_connects_with_the_hops_of_2019_and_detours_when_router_3_is_
         assert statistics.sent == statistics.acknowledged + statistics.lost
 
 
-def test_a_mesh_ends_all_its_threads_when_it_stops():
+def test_a_mesh_in_the_time_of_the_wall_ends_all_its_threads_when_it_stops():
     before = threading.active_count()
-    mesh = layout_101(IdealDisc(9.0))
-    mesh.run_for(5.0)
-    assert threading.active_count() > before
+    clock = WallClock()
+    mesh = EmulatedMesh(clock, IdealDisc(9.0))
+    mesh.add_gateway(0, GATEWAY)
+    mesh.add_router(1, (-3.0, 4.0, 0.05))
+    names = {thread.name for thread in threading.enumerate()}
+    assert {"mesh 0", "mesh 1"} <= names
+    mesh.run_until(lambda: mesh.nodes[0].antenna.on() and mesh.nodes[1].antenna.on(), 20.0)
     mesh.stop()
-    for thread in threading.enumerate():
-        if thread.name.startswith(("mesh ", "nRF24 ")):
-            thread.join(timeout=10.0)
-            assert not thread.is_alive(), thread.name
+    clock.close()
     assert threading.active_count() == before
 
 

@@ -1,4 +1,4 @@
-"""Rows 58 and 59: threads on both ends, for a long time.
+"""Rows 58 and 59: tasks on both ends, for a long time.
 
 docs/radio.md, "Checklist G: driver in this project".
 """
@@ -6,8 +6,8 @@ docs/radio.md, "Checklist G: driver in this project".
 from __future__ import annotations
 
 import random
-import threading
 
+import greenlet
 import pytest
 
 PACKETS = 10_000
@@ -19,11 +19,11 @@ class RecordingSpi:
 
     def __init__(self, spi):
         self._spi = spi
-        self.sender = None  # the thread whose send is under way
+        self.sender = None  # the task whose send is under way
         self.intruders = []
 
     def xfer2(self, data):
-        me = threading.get_ident()
+        me = greenlet.getcurrent()
         if self.sender not in (None, me):
             self.intruders.append(bytes(data))
         if data[0] == 0x20:  # CONFIG: transmitter from here to the next time it is receiver
@@ -35,7 +35,7 @@ class RecordingSpi:
 
 
 class Station:
-    """One node with a thread that sends and one that receives."""
+    """One node with a task that sends and one that receives."""
 
     def __init__(self, lab, node_id, other, x_m):
         self.lab, self.other = lab, other
