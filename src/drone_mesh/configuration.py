@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Callable, Mapping, NamedTuple
 
+from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
@@ -30,7 +31,7 @@ class FactoryConfiguration:
     spacing: float = 1.0  # metres between routers
     gui: bool = False
     real_time_factor: float = 1.0  # 0: as fast as possible
-    max_distance: float = 9.0  # metres; in range is nearer than this
+    max_distance: float = MAX_DISTANCE_M  # metres; in range is nearer than this
     radio: str = "virtual"  # or "nrf24": the real driver on emulated chips
     internet: str = "mock"  # or "http": gateways also take orders over HTTP
     routing: str = "child_table_tree"

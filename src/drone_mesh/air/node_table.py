@@ -14,9 +14,9 @@ from drone_mesh.air.node import (
     check_position,
     check_topic,
 )
+from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 
-MAX_DISTANCE_M = 9.0  # docs/protocol.md, "Wireless signal simulator": in range is nearer than this
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
 
 

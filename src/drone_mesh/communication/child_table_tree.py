@@ -1,4 +1,4 @@
-"""ChildTableTree: each neighbour and the nodes behind it (SDD 3.2.1, reference section 8)."""
+"""ChildTableTree: each neighbour and the nodes behind it (docs/protocol.md, "ChildTableTree")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finding packets that go round in circles (reference 14.10)."""
+"""Detects packets that circulate (docs/protocol.md, "Circulating packets")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Counting what was dropped, and saying so without flooding the log."""
+"""Counts what was dropped, and logs it at a limited rate."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ _log = logging.getLogger(__name__)
 
 
 class Complaints:
-    """How often something was wrong, by reason. Belongs to the thread that works in the node."""
+    """Counts of problems, by reason. Belongs to the thread that works in the node."""
 
     def __init__(self, node_id: int) -> None:
         self._node_id = node_id
-        self._said_s: dict[str, float] = {}
+        self._logged_s: dict[str, float] = {}
         self.counts: Counter[str] = Counter()
 
     def add(self, reason: str, detail: str, now_s: float) -> None:
-        """Count `reason`; say it, with `detail`, unless that was done a short while ago."""
+        """Count `reason`, and log it with `detail` unless it was logged a short while ago."""
         self.counts[reason] += 1
-        said_s = self._said_s.get(reason)
-        if said_s is not None and 0 <= now_s - said_s < COMPLAINT_PERIOD_S:
+        logged_s = self._logged_s.get(reason)
+        if logged_s is not None and 0 <= now_s - logged_s < COMPLAINT_PERIOD_S:
             return
-        self._said_s[reason] = now_s
+        self._logged_s[reason] = now_s
         _log.warning(
             "node %d: %s: %s (%d so far)", self._node_id, reason, detail, self.counts[reason]
         )

@@ -1,4 +1,4 @@
-"""What a component has to do at which time."""
+"""What a component has to do at which time, and what time it is."""
 
 from __future__ import annotations
 
@@ -7,24 +7,28 @@ import math
 
 
 class Due(enum.IntEnum):
-    """The things that a component may have to do at some time."""
+    """What a component may have to do at some time."""
 
-    CHECK = 0  # the periodic look after routes and connection
+    CHECK = 0  # the periodic check of routes and connection
     INTRODUCE = 1  # after the antenna came back
     ASK_POSITION = 2  # in flight
-    ANSWER = 3  # of the gateway, to a heartbeat: from then on it is missing
+    ANSWER = 3  # the latest moment for the gateway's answer to a heartbeat
     DECIDE = 4  # a negotiation
 
 
 class Deadlines:
-    """One time per thing to do. Read for each packet and rarely changed, so the first is kept."""
+    """The time as the component was last told, and one time per thing to do.
+
+    Read for each packet and rarely changed, so the earliest of all is kept.
+    """
 
     def __init__(self) -> None:
+        self.now_s = 0.0
         self._at_s = [math.inf] * len(Due)
         self.next_s = math.inf  # the first of all
 
     def set(self, due: Due, at_s: float) -> None:
-        """`due` is at `at_s`; infinity: it is not to be done."""
+        """Schedule `due` at `at_s`; infinity cancels it."""
         self._at_s[due] = at_s
         self.next_s = min(self._at_s)
 
@@ -33,6 +37,6 @@ class Deadlines:
         return self._at_s[due]
 
     def clear(self) -> None:
-        """Nothing is to be done."""
+        """Cancel everything."""
         self._at_s = [math.inf] * len(Due)
         self.next_s = math.inf

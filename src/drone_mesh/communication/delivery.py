@@ -1,6 +1,6 @@
-"""Delivery: handing packets to neighbours, and telling the others who cannot be reached any more.
+"""Delivery: handing packets to neighbours, and informing them of nodes that are lost.
 
-Reference, section 8 ("Sending", "MISSING").
+docs/protocol.md, "Sending" and "Missing nodes".
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from drone_mesh.communication.interfaces import (
     IRoutingTechnique,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
 
 NodeReport = Callable[[MeshEventKind, int], None]
-"""Takes what happened, and to which other node."""
+"""Takes what happened, and which other node it concerns."""
 
 
 class Delivery:
-    """The packets that one node sends, what the routes learn from that, and who got lost by it.
+    """Sends the packets of one node; the routes learn from what succeeds and what fails.
 
-    Belongs to the component of its node, and is called by nobody else.
+    Only the component of its node and that component's parts call it.
     """
 
     def __init__(
@@ -32,29 +32,30 @@ class Delivery:
         node_id: int,
         antenna: IWirelessCommunication,
         routing: IRoutingTechnique,
+        neighbours: Neighbours,
         attempts: int,
         report: NodeReport,
         on_neighbour_lost: Callable[[int], None],
     ) -> None:
-        """`attempts`: how often a packet is handed over before its receiver counts as lost."""
+        """`attempts`: failed transmissions after which the receiver counts as lost."""
         self._node_id = node_id
         self._antenna = antenna
         self._routing = routing
+        self._neighbours = neighbours
         self._attempts = attempts
         self._report = report
         self._on_neighbour_lost = on_neighbour_lost
         self._missing_to_tell: deque[tuple[int, int, int]] = deque()
         self._telling = False
-        self.heard_s: dict[int, float] = {}  # direct neighbours, and when each was last heard
         self.total_sent = 0
 
     # Sending ---------------------------------------------------------------------------------
 
     def send(self, payload: bytes, to: int, failures: int = 0, came_from: int = NO_ROUTE) -> bool:
-        """Hand a packet to neighbour `to`, more than once if need be. The routes learn from it.
+        """Hand a packet to neighbour `to`, with retransmissions. The routes learn from it.
 
-        `failures`: how often that was tried in vain before; `came_from`: who hears of it first if
-        the neighbour turns out to be lost.
+        `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
+        first if `to` turns out to be lost.
         """
         for _attempt in range(failures, self._attempts):
             if self._antenna.send_message_to(payload):
@@ -63,30 +64,30 @@ class Delivery:
         self._neighbour_lost(to, came_from)
         return False
 
-    def send_own(self, kind: int, other: int, body: bytes = b"") -> bool:
-        """Send a packet of our own towards `other`, over one route after the other."""
-        me = self._node_id
+    def send_own(self, payload: bytes) -> bool:
+        """Send a packet of our own towards its addressee, over one route after the other."""
+        other = messages.addressee(payload)
         tried: list[int] = []
         while True:
             to = self._routing.get_direction_to_node(other)
             if to == NO_ROUTE or to in tried:
                 return False
-            if self.send(messages.packet(kind, me, me, to, other, body), to):
+            if self.send(messages.readdressed(payload, to), to):
                 return True
             tried.append(to)
 
-    def send_own_to_each(self, kind: int, others: Sequence[int], body: bytes) -> None:
-        """As `send_own` to each of these; the packets for direct neighbours leave together."""
-        me, routing = self._node_id, self._routing
+    def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
+        """As `send_own`, to each of these; the packets for direct neighbours leave together."""
+        routing = self._routing
         direct = [other for other in others if routing.get_direction_to_node(other) == other]
-        packets = [messages.packet(kind, me, me, other, other, body) for other in direct]
+        packets = [messages.addressed(payload, other) for other in direct]
         for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
             if taken:
                 self._sent(other)
             elif not self.send(packet, other, failures=1):
-                self.send_own(kind, other, body)
+                self.send_own(packet)
         for other in set(others).difference(direct):
-            self.send_own(kind, other, body)
+            self.send_own(messages.addressed(payload, other))
 
     def _sent(self, to: int) -> None:
         self.total_sent += 1
@@ -95,17 +96,17 @@ class Delivery:
     # Lost nodes ------------------------------------------------------------------------------
 
     def forget_route(self, other: int, node: int, told_by: int) -> None:
-        """`other` cannot reach `node`; if that was the last route, the others have to know."""
+        """`other` cannot reach `node`; if that was the last route, inform the other neighbours."""
         if other == node:
-            self.heard_s.pop(node, None)
+            self._neighbours.lost(node)
         if self._routing.other_cant_communicate_with_node(other, node):
             self._report(MeshEventKind.NODE_MISSING, node)
             self.tell_missing(node, told_by=told_by)
 
     def drop_routes_to(self, node: int) -> None:
-        """Forget every way to `node`, one after the other.
+        """Forget each route to `node`, one after the other.
 
-        A technique that keeps a way nevertheless is not asked again.
+        A technique that keeps a route in spite of that is not asked again.
         """
         tried: list[int] = []
         while True:
@@ -114,7 +115,7 @@ class Delivery:
                 return
             tried.append(to)
             if to == node:
-                self.heard_s.pop(node, None)
+                self._neighbours.lost(node)
                 self._routing.cant_communicate_with_node(node)
             else:
                 self._routing.other_cant_communicate_with_node(to, node)
@@ -122,26 +123,27 @@ class Delivery:
     def tell_missing(self, missing: int, first: int = NO_ROUTE, told_by: int = NO_ROUTE) -> None:
         """MISSING to every neighbour, `first` before the others and `told_by` not at all.
 
-        A neighbour that cannot be told is lost itself: that is told after this, not within it, so
-        that the depth of the call does not grow with the number of neighbours.
+        A neighbour that does not take the packet is lost itself. The loss is queued and not
+        handled within this call, so that the call depth does not grow with the neighbours.
         """
         self._missing_to_tell.append((missing, first, told_by))
         if self._telling:
             return
         self._telling = True
+        me = self._node_id
         try:
             while self._missing_to_tell:
                 missing, first, told_by = self._missing_to_tell.popleft()
-                body = bytes((missing,))
+                packet = messages.MissingMessage(me, me, me, me, missing).to_payload()
                 neighbours = self._routing.get_set_of_children() - {missing, told_by}
                 for neighbour in sorted(neighbours, key=lambda n: (n != first, n)):
                     if self._routing.get_direction_to_node(neighbour) == neighbour:
-                        self.send_own(MessageType.MISSING, neighbour, body)
+                        self.send_own(messages.addressed(packet, neighbour))
         finally:
             self._telling = False
 
     def _neighbour_lost(self, node: int, came_from: int) -> None:
-        if self.heard_s.pop(node, None) is not None:
+        if self._neighbours.lost(node):
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)
         if self._routing.cant_communicate_with_node(node):
             self._report(MeshEventKind.NODE_MISSING, node)

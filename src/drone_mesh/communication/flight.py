@@ -1,16 +1,21 @@
-"""Watching a flight, as seen from the mesh (reference, section 9, "Flight")."""
+"""The drone as the mesh sees it: its place and its flight (docs/protocol.md, "Flight")."""
 
 from __future__ import annotations
 
-from drone_mesh.communication.timing import LANDED_WITHIN_M
-from drone_mesh.drone.interfaces import Location
+import math
+
+from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.deadlines import Deadlines, Due
+from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import LocationUnknown
 
 STANDS_STILL_WITHIN_M = 1e-3  # our choice: far below what a drone flies in a second
-ASKS_WITHOUT_ANSWER = 10  # our choice: then nobody will ever know; the mesh has to go on
+ASKS_WITHOUT_ANSWER = 10  # our choice: then the position stays unknown, and the mesh goes on
 
 
 class Flight:
-    """One flight: where to, and whether it is over."""
+    """One flight: its goal, and whether it is over."""
 
     def __init__(self, goal: Location) -> None:
         self.goal = goal
@@ -18,7 +23,7 @@ class Flight:
         self._unanswered = 0
 
     def is_over(self, location: Location | None) -> bool:
-        """Take note of where the drone is (None: it cannot say); whether it has landed.
+        """Take note of where the drone is (None: unknown); whether it has landed.
 
         Landed is within 0.1 m of the goal, or no longer moving between two questions.
         """
@@ -31,3 +36,54 @@ class Flight:
         still = self._last is not None and location.distance_m(self._last) < STANDS_STILL_WITHIN_M
         self._last = location
         return still
+
+
+class Pilot:
+    """Flies the drone of one node, and watches the flight."""
+
+    def __init__(self, engine: IDroneEngine, deadlines: Deadlines, complaints: Complaints) -> None:
+        self._engine = engine
+        self._deadlines = deadlines
+        self._complaints = complaints
+        self._flight: Flight | None = None
+
+    @property
+    def goal(self) -> Location | None:
+        """Where the drone is flying to; None while it is not."""
+        flight = self._flight
+        return flight.goal if flight is not None else None
+
+    def location(self) -> Location | None:
+        """Where the drone is; None if it cannot say."""
+        try:
+            location = self._engine.get_location()
+            if not all(map(math.isfinite, location)):
+                raise LocationUnknown(f"invalid position of the drone: {location}")
+            return location
+        except LocationUnknown as error:
+            self._complaints.add("own location unknown", str(error), self._deadlines.now_s)
+            return None
+
+    def fly_to(self, goal: Location) -> None:
+        """Start a flight, or change the goal of the present one."""
+        self._flight = Flight(goal)
+        self._ask_position_later()
+        self._engine.set_goal(*goal)
+
+    def watch(self) -> bool:
+        """Look where the drone is; whether the flight is over now."""
+        assert self._flight is not None
+        if not self._flight.is_over(self.location()):
+            self._ask_position_later()
+            return False
+        self.forget_flight()
+        return True
+
+    def forget_flight(self) -> None:
+        """No longer watch the flight."""
+        self._flight = None
+        self._deadlines.set(Due.ASK_POSITION, math.inf)
+
+    def _ask_position_later(self) -> None:
+        now_s = self._deadlines.now_s
+        self._deadlines.set(Due.ASK_POSITION, now_s + FLIGHT_POSITION_PERIOD_S)

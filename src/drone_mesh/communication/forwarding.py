@@ -1,4 +1,4 @@
-"""Forwarding: sending packets on that are for somebody else (reference, section 8)."""
+"""Forwarding: packets that are addressed to other nodes (docs/protocol.md, "Forwarding")."""
 
 from __future__ import annotations
 
@@ -12,10 +12,7 @@ from drone_mesh.communication.observer import MeshEventKind
 
 
 class Forwarding:
-    """What one node does with packets that have further to go.
-
-    Belongs to the component of its node, and is called by nobody else.
-    """
+    """Hands the packets of other nodes to the next hop. Only the component of its node calls it."""
 
     def __init__(
         self,
@@ -33,8 +30,8 @@ class Forwarding:
         self._circulation = CirculationGuard()
 
     def forward(self, payload: bytes, now_s: float) -> None:
-        """Send a packet on towards its addressee; drop it if it goes round or has no way to go."""
-        creator, from_, kind, _to, forward = payload[: messages.HEADER_BYTES]
+        """Forward a packet to its addressee; drop it if it circulates or has no route."""
+        creator, from_, kind, _to, forward = messages.header(payload)
         routing = self._routing
         identity = b""
         if creator == self._node_id:
@@ -51,14 +48,14 @@ class Forwarding:
             to = routing.get_direction_to_node(forward)
             if to in (NO_ROUTE, from_):
                 self._stranded(kind, forward, now_s)
-                if to == from_ or lost != forward:  # else all were told when it was lost
+                if to == from_ or lost != forward:  # else all were informed when it was lost
                     self._delivery.tell_missing(forward, first=from_)
                 return
-            sent_on = messages.next_hop(payload, self._node_id, to)
-            if sent_on is None:
+            forwarded = messages.next_hop(payload, self._node_id, to)
+            if forwarded is None:
                 self._complaints.dropped("a heartbeat with too many hops", payload, now_s)
                 return
-            if self._delivery.send(sent_on, to, came_from=from_):
+            if self._delivery.send(forwarded, to, came_from=from_):
                 if identity:
                     self._circulation.passed(identity, from_, to, now_s)
                 return
@@ -66,14 +63,14 @@ class Forwarding:
         self._stranded(kind, forward, now_s)
 
     def _drop_circulating(self, payload: bytes, used: int, now_s: float) -> None:
-        kind, forward = payload[messages.TYPE], payload[messages.FORWARD]
-        self._complaints.dropped("a packet that goes round in circles", payload, now_s)
+        kind, forward = messages.type_of(payload), messages.addressee(payload)
+        self._complaints.dropped("a packet that circulates", payload, now_s)
         if used not in (forward, NO_ROUTE):
             self._routing.other_cant_communicate_with_node(used, forward)
         self._stranded(kind, forward, now_s)
 
     def _stranded(self, kind: int, forward: int, now_s: float) -> None:
-        """People want to know of an order that goes no further, though its gateway had a route."""
+        """Report an order that goes no further although its gateway had a route."""
         if kind == MessageType.MOVE_TO_LOCATION:
             reason = f"no route to drone {forward}"
             self._complaints.add(reason, "an order for it ends here", now_s)

@@ -1,4 +1,4 @@
-"""MeshnetworkGateway: the mesh's way to the world outside (reference, section 10; SDD 3.2.4)."""
+"""MeshnetworkGateway: connects the mesh to the world outside (docs/protocol.md, "Gateway")."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import logging
 import math
 import random
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
@@ -17,7 +16,10 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
     KnownNode,
 )
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.messages import (
+    GoToLocationMessage,
+    MovementNegotiationMessage,
+)
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
@@ -45,9 +47,6 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         """As MeshnetworkComponent; orders come in over `internet`."""
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._internet = internet
-        self._connected = True
-        self._preferred_gateway = node_id
-        self._hops = 0
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
 
     def stop(self) -> None:
@@ -55,14 +54,26 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._internet.disconnect()
         super().stop()
 
+    def get_connected_to_gateway(self) -> bool:
+        """Always: it is one."""
+        return True
+
+    def get_preferred_gateway(self) -> int:
+        """Itself."""
+        return self._node_id
+
+    def get_hops_from_gateway_away(self) -> int:
+        """None: it is one."""
+        return 0
+
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
         """Send a drone to a place (metres). True: there was a route and the next hop took it.
 
-        Raises GoalRefused for an id that no node has and for numbers that are no place.
+        Raises GoalRefused for an invalid node id or an invalid place.
         """
-        self._now_s = now_s
+        self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
             raise GoalRefused(f"drone {node_id}: ids are 0..{MAX_NODE_ID}")
         check_goal(latitude, longitude, height)
@@ -71,8 +82,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if node_id == self._node_id:
             self._take_order(node_id, Location(latitude, longitude, height))
             return True
-        body = messages.GoToLocationMessage.BODY.pack(latitude, longitude, int(height))
-        if self._delivery.send_own(MessageType.MOVE_TO_LOCATION, node_id, body):
+        me = self._node_id
+        order = GoToLocationMessage(me, me, node_id, node_id, latitude, longitude, int(height))
+        if self._delivery.send_own(order.to_payload()):
             return True
         _log.warning("gateway %d: no route to drone %d, it stays", self._node_id, node_id)
         self._report(MeshEventKind.NO_ROUTE, node_id)
@@ -86,7 +98,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
                 continue
             next_hop = self._routing.get_direction_to_node(node)
             hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
-            heard_s = max(heard_s, self._delivery.heard_s.get(node, -math.inf))
+            heard_s = max(heard_s, self._neighbours.last_heard_s(node, otherwise=-math.inf))
             if next_hop != NO_ROUTE or heard_s > -math.inf:
                 nodes.append(KnownNode(node, next_hop, hops, heard_s))
         return nodes
@@ -107,12 +119,12 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _on_heartbeat(
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
-        self._heartbeats[creator] = (min(hops + 1, NO_ROUTE), self._now_s)
+        self._heartbeats[creator] = (min(hops + 1, NO_ROUTE), self._deadlines.now_s)
         if creator != preferred_gateway:  # gateways do not answer each other
             self.send_heartbeat(creator)
 
-    def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
+    def _on_negotiation(self, bid: MovementNegotiationMessage) -> None:
         """A gateway does not fly for the mesh."""
 
-    def _flight_started(self) -> None:
+    def _took_off(self) -> None:
         """A gateway stays connected wherever it is."""

@@ -1,8 +1,8 @@
-"""The interfaces between the mesh software and what it stands on (SDD 2.2 and 3.2.2).
+"""The interfaces between the mesh software and its surroundings (docs/protocol.md, "Interfaces").
 
-Everything here is driven from outside: time comes in as `now_s`, seconds of whatever clock the
-caller lives by. One thread at a time works in a component; the getters of IMeshDebugInfo are
-snapshots and may be read from any thread.
+Everything here is driven from outside: time comes in as `now_s`, in seconds of the caller's clock.
+One thread at a time works in a component; the getters of IMeshDebugInfo are snapshots and may be
+read from any thread.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import abc
 from typing import NamedTuple, Sequence
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
-MAX_NODE_ID = 253  # reference, section 3
-BROADCAST = 254  # final addressee: everybody who hears it
+MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
+BROADCAST = 254  # final addressee: every node in range
 NO_ROUTE = 255  # "no such route", "no such node"
 
 
 class IMeshNetwork(abc.ABC):
-    """What an antenna knows of the mesh component above it (SDD 2.2.4)."""
+    """What an antenna may call of the mesh component above it."""
 
     @abc.abstractmethod
     def on_msg(self, payload: bytes, now_s: float) -> None:
@@ -33,11 +33,11 @@ class IMeshNetwork(abc.ABC):
 
     @abc.abstractmethod
     def on_antenna_registered(self, now_s: float) -> None:
-        """The antenna's medium came back and knows the antenna anew (a simulator restarted)."""
+        """The medium has registered the antenna again, for example after a simulator restart."""
 
 
 class IMeshDebugInfo(abc.ABC):
-    """Read-only snapshots of a component, for people (SDD 3.2.2)."""
+    """Read-only snapshots of a component, for people."""
 
     @abc.abstractmethod
     def get_node_id(self) -> int:
@@ -45,7 +45,7 @@ class IMeshDebugInfo(abc.ABC):
 
     @abc.abstractmethod
     def get_connected_to_gateway(self) -> bool:
-        """Whether a gateway answered last time; stays true while an answer is being waited for."""
+        """Whether a gateway answered the last heartbeat; stays true while it may still answer."""
 
     @abc.abstractmethod
     def get_total_message_sent(self) -> int:
@@ -78,7 +78,7 @@ class KnownNode(NamedTuple):
 
 
 class IGatewayCommands(abc.ABC):
-    """What the world outside may ask of a gateway (SDD 2.2.2)."""
+    """The commands that a gateway takes from the world outside."""
 
     @abc.abstractmethod
     def send_goal_request_to_drone(
@@ -86,7 +86,7 @@ class IGatewayCommands(abc.ABC):
     ) -> bool:
         """Send a drone to a place (metres). True: there was a route and the next hop took it.
 
-        Nothing is told back about its arrival. Raises GoalRefused for what is no order.
+        The arrival is not reported back. Raises GoalRefused for an invalid order.
         """
 
     @abc.abstractmethod
@@ -99,7 +99,7 @@ class IGatewayCommands(abc.ABC):
 
 
 class IWirelessCommunication(abc.ABC):
-    """A radio for 32-byte packets (SDD 2.2.3). Nothing here raises for a packet that is lost."""
+    """A radio for 32-byte packets. No method raises for a lost packet."""
 
     @abc.abstractmethod
     def start_antenna(self, mesh: IMeshNetwork) -> None:
@@ -116,7 +116,7 @@ class IWirelessCommunication(abc.ABC):
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
         """Send each to the node in its byte 3, in this order; for each whether that node has it.
 
-        A radio that can hand over many at once does that here.
+        A radio that can send many at once overrides this.
         """
         return [self.send_message_to(payload) for payload in payloads]
 
@@ -134,7 +134,7 @@ class IWirelessCommunication(abc.ABC):
 
 
 class IInternetConnection(abc.ABC):
-    """A gateway's way to the world outside the mesh (SDD 2.2.1)."""
+    """A gateway's connection to the world outside the mesh."""
 
     @abc.abstractmethod
     def connect(self, commands: IGatewayCommands) -> None:
@@ -146,29 +146,29 @@ class IInternetConnection(abc.ABC):
 
 
 class IRoutingEssentials(abc.ABC):
-    """What a routing technique may ask of the component that it serves (SDD 3.2.2)."""
+    """What a routing technique may ask of the component that it serves."""
 
     @abc.abstractmethod
     def search_other_nodes_in_range(self) -> None:
-        """Introduce this node to everybody who hears it."""
+        """Introduce this node to every node in range."""
 
     @abc.abstractmethod
     def send_heartbeat(self, other: int) -> bool:
-        """Send a heartbeat towards node `other`. False: there is no route, or nobody took it."""
+        """Send a heartbeat towards node `other`. False: no route, or no next hop took it."""
 
     def send_heartbeats(self, others: Sequence[int]) -> None:
-        """Send a heartbeat towards each of these nodes; what fails shows in the routes."""
+        """Send a heartbeat towards each of these nodes; failures show in the routes."""
         for other in others:
             self.send_heartbeat(other)
 
 
 class IRoutingTechnique(abc.ABC):
-    """Which neighbour leads to which node (SDD 2.2.9, reference section 8).
+    """Which neighbour leads to which node.
 
     A node in direct reach is a "child"; nodes behind it are its "grandchildren".
 
-    Called by one thread at a time, but for `get_direction_to_node` and `get_table_size`: whoever
-    reports on the node may call these meanwhile. If they raise then, that one report is an old one.
+    Called by one thread at a time, but for `get_direction_to_node` and `get_table_size`: a thread
+    that reports on the node may call these at any time. If they raise, the last report stands.
     """
 
     @abc.abstractmethod
@@ -181,11 +181,11 @@ class IRoutingTechnique(abc.ABC):
 
     @abc.abstractmethod
     def maintain_routing(self) -> None:
-        """Called once a check period: look after the routes."""
+        """Check the routes; called once a check period."""
 
     @abc.abstractmethod
     def node_moved_location(self) -> None:
-        """This node moved: what was known of the neighbourhood no longer holds."""
+        """This node moved: forget what was known of its neighbours."""
 
     @abc.abstractmethod
     def cant_communicate_with_node(self, node: int) -> int:
@@ -223,10 +223,10 @@ class IRoutingTechnique(abc.ABC):
         """Whether no node is known."""
 
     def proven_path_to_node(self, other: int, node: int) -> None:
-        """A packet made by `node` just came through `other`: from now on that is the way to it.
+        """A packet made by `node` just came through `other`: from now on that is the route to it.
 
-        Whatever else was believed about the way to `node` is forgotten, except that it may be in
-        direct reach itself (reference, section 8: heartbeats prove a path).
+        Other routes to `node` are forgotten, except that it may be in direct reach itself
+        (docs/protocol.md, "Receiving and learning": heartbeats prove a path).
         """
         for child in self.get_set_of_children():
             if child not in (other, node):

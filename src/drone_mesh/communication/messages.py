@@ -1,9 +1,11 @@
-"""The packets of the mesh: 32 bytes, little-endian, zero padded (reference, section 5).
+"""The packets of the mesh: 32 bytes, little-endian, zero padded.
 
-Each class knows its own bytes; nothing else in the package knows an offset, except for the five
-header bytes that are named here. The constructor arguments are those of the original encoder, in
-its order: creator, from, to, forward, then the body. Any byte value can be encoded and decoded;
-whether an id makes sense is judged by the component that receives it (reference 14.9).
+docs/protocol.md, "Packets".
+
+Each class knows its own bytes, and no other module knows an offset. The constructor arguments are
+those of the original encoder, in its order: creator, from, to, forward, then the body. Any byte
+value can be encoded and decoded; the component that receives a packet judges whether an id makes
+sense (docs/protocol.md, "Bad input").
 """
 
 from __future__ import annotations
@@ -15,41 +17,42 @@ from dataclasses import dataclass
 from typing import ClassVar, Union
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import PacketError
 
-CREATOR, FROM, TYPE, TO, FORWARD = range(5)  # places of the header bytes
+_CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # places of the header bytes
 HEADER_BYTES = 5
-MAX_HOPS = 254  # of a heartbeat (reference, section 8)
+MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
 class MessageType(enum.IntEnum):
-    """Byte 2. Types 128..255 are reserved for users' data (reference 14.9)."""
+    """Byte 2. Types 128..255 are reserved for users' data."""
 
     NOTDEFINED = 0
     LOCATION = 1  # where its creator is
     REQUESTLOCATION = 2  # asks for a LOCATION
-    PRESENT = 3  # "I am here", to everybody in range
+    PRESENT = 3  # introduces its creator to every node in range
     HEARTBEAT = 4  # proof of a path; counts its hops
     MISSING = 5  # its creator can no longer reach a node
     MOVE_TO_LOCATION = 6  # an order to fly
-    MOVEMENT_NEGOTIATION = 7  # what its creator bids for flying
+    MOVEMENT_NEGOTIATION = 7  # the bid of its creator to fly
 
 
 @dataclass(frozen=True)
 class Message:
-    """A header without a body; also REQUESTLOCATION, NOTDEFINED and types that we do not know.
+    """A header without a body: REQUESTLOCATION, NOTDEFINED and unknown types.
 
-    Of all classes this one alone takes the type as an argument, third, as the original did.
+    Only this class takes the type as an argument, in third place, as the original did.
     """
 
-    creator: int  # who made it
-    from_: int  # who sends this hop
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
     type: int
     to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = everybody in range
+    forward: int  # final addressee, 254 = every node in range
 
     def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that is no byte."""
+        """The 32 bytes. Raises PacketError for a value outside 0..255."""
         try:
             return packet(self.type, self.creator, self.from_, self.to, self.forward)
         except ValueError as error:
@@ -69,14 +72,30 @@ class LocationMessage:
     TYPE: ClassVar[MessageType] = MessageType.LOCATION
     BODY: ClassVar[struct.Struct] = struct.Struct("<ffhI")
 
-    creator: int  # who made it
-    from_: int  # who sends this hop
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
     to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = everybody in range
+    forward: int  # final addressee, 254 = every node in range
     latitude: float  # y, metres
     longitude: float  # x, metres
     height: int  # whole metres
     time_since_posix: int  # whole seconds of the creator's clock
+
+    @classmethod
+    def of(
+        cls, location: Location, now_s: float, creator: int, from_: int, to: int, forward: int
+    ) -> LocationMessage:
+        """`location` as a message. Heights are int16, whole metres."""
+        height = max(-(2**15), min(2**15 - 1, round(location.height)))
+        time_s = int(now_s) % 2**32
+        return cls(
+            creator, from_, to, forward, location.latitude, location.longitude, height, time_s
+        )
+
+    @property
+    def location(self) -> Location:
+        """The place in the message."""
+        return Location(self.latitude, self.longitude, self.height)
 
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
@@ -90,17 +109,23 @@ class LocationMessage:
 
 @dataclass(frozen=True)
 class IntroduceMessage:
-    """PRESENT: "I am here"."""
+    """PRESENT: introduces its creator."""
 
     TYPE: ClassVar[MessageType] = MessageType.PRESENT
     BODY: ClassVar[struct.Struct] = struct.Struct("<B?")
 
-    creator: int  # who made it
-    from_: int  # who sends this hop
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
     to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = everybody in range
+    forward: int  # final addressee, 254 = every node in range
     hops_until_gateway: int  # 255 while not known
     know_gateway: bool  # whether its creator is connected
+
+    @classmethod
+    def body(cls, payload: bytes) -> tuple[int, bool]:
+        """Hops until the gateway, and whether a gateway is known: faster than from_payload."""
+        hops, know_gateway = cls.BODY.unpack_from(payload, HEADER_BYTES)
+        return hops, know_gateway
 
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
@@ -119,18 +144,19 @@ class HeartbeatMessage:
     TYPE: ClassVar[MessageType] = MessageType.HEARTBEAT
     BODY: ClassVar[struct.Struct] = struct.Struct("<?BB")
 
-    creator: int  # who made it
-    from_: int  # who sends this hop
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
     to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = everybody in range
+    forward: int  # final addressee, 254 = every node in range
     know_gateway: bool  # whether its creator is connected
     preferred_gateway: int  # 255 while not known
-    hops: int  # how often it was forwarded
+    hops: int  # number of nodes that forwarded it
 
-    @property
-    def is_from_gateway(self) -> bool:
-        """Whether its creator is a gateway: only a gateway prefers itself."""
-        return self.creator == self.preferred_gateway
+    @classmethod
+    def body(cls, payload: bytes) -> tuple[bool, int, int]:
+        """Whether a gateway is known, which, and hops: faster than from_payload."""
+        know_gateway, preferred_gateway, hops = cls.BODY.unpack_from(payload, HEADER_BYTES)
+        return know_gateway, preferred_gateway, hops
 
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
@@ -149,10 +175,10 @@ class MissingMessage:
     TYPE: ClassVar[MessageType] = MessageType.MISSING
     BODY: ClassVar[struct.Struct] = struct.Struct("<B")
 
-    creator: int  # who made it
-    from_: int  # who sends this hop
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
     to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = everybody in range
+    forward: int  # final addressee, 254 = every node in range
     missing: int  # id of that node
 
     def to_payload(self) -> bytes:
@@ -172,13 +198,18 @@ class GoToLocationMessage:
     TYPE: ClassVar[MessageType] = MessageType.MOVE_TO_LOCATION
     BODY: ClassVar[struct.Struct] = struct.Struct("<ffh")
 
-    creator: int  # who made it
-    from_: int  # who sends this hop
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
     to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = everybody in range
+    forward: int  # final addressee, 254 = every node in range
     latitude: float  # y, metres
     longitude: float  # x, metres
     height: int  # whole metres
+
+    @property
+    def location(self) -> Location:
+        """The place in the message."""
+        return Location(self.latitude, self.longitude, self.height)
 
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
@@ -192,15 +223,15 @@ class GoToLocationMessage:
 
 @dataclass(frozen=True)
 class MovementNegotiationMessage:
-    """What its creator bids for flying."""
+    """The bid of its creator to fly."""
 
     TYPE: ClassVar[MessageType] = MessageType.MOVEMENT_NEGOTIATION
     BODY: ClassVar[struct.Struct] = struct.Struct("<f")
 
-    creator: int  # who made it
-    from_: int  # who sends this hop
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
     to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = everybody in range
+    forward: int  # final addressee, 254 = every node in range
     cost: float  # its distance to the gateway in metres; negative: it does not fly
 
     def to_payload(self) -> bytes:
@@ -223,14 +254,6 @@ _TypedMessage = Union[
 ]
 AnyMessage = Union[Message, _TypedMessage]
 
-_CLASS_OF_TYPE: dict[int, type[AnyMessage]] = {
-    MessageType.LOCATION: LocationMessage,
-    MessageType.PRESENT: IntroduceMessage,
-    MessageType.HEARTBEAT: HeartbeatMessage,
-    MessageType.MISSING: MissingMessage,
-    MessageType.MOVE_TO_LOCATION: GoToLocationMessage,
-    MessageType.MOVEMENT_NEGOTIATION: MovementNegotiationMessage,
-}
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
 _NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
@@ -240,13 +263,40 @@ _NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the star
 }
 
 
-def parse(payload: bytes) -> AnyMessage:
-    """The message in `payload`, of the class that its type calls for; Message for all others.
+def header(payload: bytes) -> tuple[int, int, int, int, int]:
+    """Creator, from, type, to and forward of a packet."""
+    creator, from_, kind, to, forward = payload[:HEADER_BYTES]
+    return creator, from_, kind, to, forward
 
-    Raises PacketError unless there are 32 bytes.
-    """
-    _check_length(payload)
-    return _CLASS_OF_TYPE.get(payload[TYPE], Message).from_payload(payload)
+
+def sender(payload: bytes) -> int:
+    """The node that sends this hop."""
+    return payload[_FROM]
+
+
+def receiver(payload: bytes) -> int:
+    """The node that this hop is for."""
+    return payload[_TO]
+
+
+def type_of(payload: bytes) -> int:
+    """The type of a packet; see MessageType."""
+    return payload[_TYPE]
+
+
+def addressee(payload: bytes) -> int:
+    """The node that a packet is for in the end, or BROADCAST."""
+    return payload[_FORWARD]
+
+
+def readdressed(payload: bytes, to: int) -> bytes:
+    """The same packet with `to` as the receiver of this hop."""
+    return payload[:_TO] + bytes((to,)) + payload[_TO + 1 :]
+
+
+def addressed(payload: bytes, other: int) -> bytes:
+    """The same packet for the neighbour `other`, as receiver of this hop and as addressee."""
+    return payload[:_TO] + bytes((other, other)) + payload[_FORWARD + 1 :]
 
 
 def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: bytes = b"") -> bytes:
@@ -255,28 +305,28 @@ def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: byt
 
 
 def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
-    """The same packet, sent on by `from_` to `to`; a heartbeat counts the hop.
+    """The same packet, forwarded by `from_` to `to`; a heartbeat counts the hop.
 
-    None for a heartbeat that has made as many hops as it may.
+    None for a heartbeat that has reached MAX_HOPS.
     """
-    sent_on = bytearray(payload)
-    sent_on[FROM] = from_
-    sent_on[TO] = to
-    if payload[TYPE] == _HEARTBEAT:
+    forwarded = bytearray(payload)
+    forwarded[_FROM] = from_
+    forwarded[_TO] = to
+    if payload[_TYPE] == _HEARTBEAT:
         if payload[_HEARTBEAT_HOPS] >= MAX_HOPS:
             return None
-        sent_on[_HEARTBEAT_HOPS] += 1
-    return bytes(sent_on)
+        forwarded[_HEARTBEAT_HOPS] += 1
+    return bytes(forwarded)
 
 
 def identity(payload: bytes) -> bytes:
-    """What stays the same while a packet that is no heartbeat is sent on."""
-    return payload[:FROM] + payload[TYPE:TO] + payload[FORWARD:]
+    """The bytes that stay the same while a packet other than a heartbeat is forwarded."""
+    return payload[:_FROM] + payload[_TYPE:_TO] + payload[_FORWARD:]
 
 
 def is_finite(payload: bytes) -> bool:
-    """Whether the numbers of a packet are numbers; True for types without any."""
-    numbers = _NUMBERS.get(payload[TYPE])
+    """Whether all floats of a packet are finite; True for types without floats."""
+    numbers = _NUMBERS.get(payload[_TYPE])
     return numbers is None or all(map(math.isfinite, numbers.unpack_from(payload, HEADER_BYTES)))
 
 

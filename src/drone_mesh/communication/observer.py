@@ -1,4 +1,4 @@
-"""What the mesh software reports about itself, as it happens."""
+"""Events that the mesh software reports as they happen."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import enum
 from dataclasses import dataclass
 from typing import Callable
 
+from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import NO_ROUTE
 
 
@@ -19,14 +20,14 @@ class MeshEventKind(enum.Enum):
     NEIGHBOUR_FOUND = "neighbour found"  # peer: it
     NEIGHBOUR_LOST = "neighbour lost"  # peer: it
     NODE_MISSING = "node missing"  # peer: a node that can no longer be reached in any way
-    NO_ROUTE = "no route"  # peer: the drone that an order could not be sent to
+    NO_ROUTE = "no route"  # peer: the drone whose order could not be sent
     POWER_ON = "power on"
     POWER_OFF = "power off"
-    EMERGENCY = "emergency"  # the time without a gateway has run out
+    EMERGENCY = "emergency"  # no gateway answered for too long
     NEGOTIATION_STARTED = "negotiation started"  # detail: the own score
-    NEGOTIATION_ENDED = "negotiation ended"  # peer: who flies
+    NEGOTIATION_ENDED = "negotiation ended"  # peer: the node that flies
     FLIGHT_DECIDED = "flight decided"  # peer: the node whose place it takes
-    FLIGHT_ORDERED = "flight ordered"  # peer: who made the order
+    FLIGHT_ORDERED = "flight ordered"  # peer: the creator of the order
     LANDED = "landed"
 
 
@@ -42,8 +43,21 @@ class MeshEvent:
 
 
 MeshObserver = Callable[[MeshEvent], None]
-"""Is called in the thread that works in the component, and must not call back into it."""
+"""Runs in the thread that works in the component, and must not call back into it."""
 
 
 def ignore_events(_event: MeshEvent) -> None:
-    """The observer of those who do not want to know."""
+    """An observer that does nothing."""
+
+
+class Reporter:
+    """Reports the events of one node to its observer."""
+
+    def __init__(self, node_id: int, deadlines: Deadlines, observer: MeshObserver) -> None:
+        self._node_id = node_id
+        self._deadlines = deadlines
+        self._observer = observer
+
+    def __call__(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
+        """Report what happened, which other node it concerns, and a few words for people."""
+        self._observer(MeshEvent(kind, self._node_id, self._deadlines.now_s, peer, detail))

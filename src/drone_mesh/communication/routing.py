@@ -9,28 +9,29 @@ from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import IRoutingTechnique
 from drone_mesh.errors import ConfigurationError
 
+DEFAULT_ROUTING = "child_table_tree"
 ROUTING_TECHNIQUES: dict[str, Callable[[], IRoutingTechnique]] = {
-    "child_table_tree": ChildTableTree,
+    DEFAULT_ROUTING: ChildTableTree,
 }
 
 
 def create_routing_technique(name: str) -> IRoutingTechnique:
     """A new technique: a name of ROUTING_TECHNIQUES, or "package.module:Class" for one of your own.
 
-    Raises ConfigurationError, naming what there is, for anything else.
+    Raises ConfigurationError, with the known names, for anything else.
     """
     module_name, colon, class_name = name.partition(":")
     make = _from_module(module_name, class_name) if colon else ROUTING_TECHNIQUES.get(name)
     if make is None:
         known = ", ".join(sorted(ROUTING_TECHNIQUES))
         raise ConfigurationError(
-            f"routing technique {name!r} is not known: use one of {known}, or package.module:Class"
+            f"unknown routing technique {name!r}: use one of {known}, or package.module:Class"
         )
     try:
         technique = make()
-    except TypeError as error:  # no class, or one that wants arguments or lacks functions
+    except TypeError as error:  # not a class, or one that needs arguments or lacks functions
         raise ConfigurationError(
-            f"routing technique {name!r} cannot be made by its name alone: {error}"
+            f"routing technique {name!r} cannot be created without arguments: {error}"
         ) from error
     if not isinstance(technique, IRoutingTechnique):
         raise ConfigurationError(f"routing technique {name!r} is not an IRoutingTechnique")

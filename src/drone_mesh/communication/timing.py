@@ -6,22 +6,22 @@ from dataclasses import dataclass
 
 from drone_mesh.errors import ConfigurationError
 
-HEARTBEAT_ANSWER_S = 0.5  # one heartbeat to the gateway under way at a time (reference, section 9)
-CIRCULATION_S = 0.5  # within this time the same packet from elsewhere circulates (reference 14.10)
-FLIGHT_POSITION_PERIOD_S = 1.0  # a flying node asks where it is this often (reference, section 9)
-LANDED_WITHIN_M = 0.1  # reference, section 9
+HEARTBEAT_ANSWER_S = 0.5  # one heartbeat to the gateway under way at a time
+CIRCULATION_S = 0.5  # within this time the same packet from elsewhere circulates
+FLIGHT_POSITION_PERIOD_S = 1.0  # a flying node asks where it is this often
+LANDED_WITHIN_M = 0.1  # docs/protocol.md, "Flight"
 
 
 @dataclass(frozen=True)
 class MeshTiming:
-    """Adjustable numbers of one node; the defaults are those of the reference, section 9."""
+    """Adjustable numbers of one node; the defaults are those of docs/protocol.md."""
 
     check_period_s: float = 10.0  # how often a node looks after its routes and its connection
     connection_lost_after_s: float = 30.0  # without a gateway for so long: emergency
     send_attempts: int = 3  # a packet that nobody took is sent so often in all
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError for a number that no node could live by."""
+        """Raises ConfigurationError for a number outside its range."""
         if not self.check_period_s > 0:
             raise ConfigurationError(f"check_period {self.check_period_s}: must be above 0 seconds")
         if not self.connection_lost_after_s > 0:

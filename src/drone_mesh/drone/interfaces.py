@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import abc
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Sequence
+
+from drone_mesh.drone.flight_path import Vector
 
 
 class Location(NamedTuple):
@@ -21,6 +23,20 @@ class Location(NamedTuple):
             + (self.longitude - other.longitude) ** 2
             + (self.height - other.height) ** 2
         )
+
+    @classmethod
+    def from_vector(cls, vector: Sequence[float]) -> Location:
+        """The place at x, y, z."""
+        x, y, z = vector
+        return cls(latitude=y, longitude=x, height=z)
+
+    def to_vector(self) -> Vector:
+        """x, y, z of the place."""
+        return self.longitude, self.latitude, self.height
+
+    def in_words(self) -> str:
+        """The place for people, as x, y, z."""
+        return f"x {self.longitude:.2f} m, y {self.latitude:.2f} m, z {self.height:.0f} m"
 
 
 class IDroneEngine(abc.ABC):

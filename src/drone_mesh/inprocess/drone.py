@@ -31,26 +31,22 @@ class InProcessDrone(IDroneEngine):
         """Fly there. Raises GoalRefused for a place out of bounds."""
         check_goal(latitude, longitude, height)
         here = self.get_location()
-        goal = (longitude, latitude, height)
-        target = self._path.goal if self._path else (here.longitude, here.latitude, here.height)
-        if goal == target:
+        goal = Location(latitude, longitude, height).to_vector()
+        if goal == (self._path.goal if self._path else here.to_vector()):
             return
         if self._path is None:
             self._on_flight(True)
-        self._path = FlightPath(
-            (here.longitude, here.latitude, here.height), goal, self._clock.now_s
-        )
+        self._path = FlightPath(here.to_vector(), goal, self._clock.now_s)
         self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
 
     def get_location(self) -> Location:
         """Where it is now. Never raises."""
         if self._path is None:
             return self._place
-        x, y, z = self._path.position_at(self._clock.now_s)
-        return Location(latitude=y, longitude=x, height=z)
+        return Location.from_vector(self._path.position_at(self._clock.now_s))
 
     def _arrive(self, path: FlightPath) -> None:
         if path is self._path:  # not replanned on the way
-            self._place = Location(path.goal[1], path.goal[0], path.goal[2])
+            self._place = Location.from_vector(path.goal)
             self._path = None
             self._on_flight(False)

@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.emulator.measured import measured_curve
@@ -15,7 +16,6 @@ from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 
-RANGE_M = 9.0  # docs/protocol.md, "Wireless signal simulator"
 PROGRESS_S = 5.0  # of the wall
 
 
@@ -54,10 +54,10 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
 
 def _links(name: str, rng: random.Random) -> LinkModel:
     if name == "distance":
-        return LogDistance.with_edge_at(RANGE_M, rng)
+        return LogDistance.with_edge_at(MAX_DISTANCE_M, rng)
     if name == "measured":
-        return measured_curve(rng, range_m=RANGE_M)
-    return IdealDisc(RANGE_M)
+        return measured_curve(rng, range_m=MAX_DISTANCE_M)
+    return IdealDisc(MAX_DISTANCE_M)
 
 
 def _grid(mesh: EmulatedMesh, nodes: int, spacing_m: float) -> None:

@@ -11,10 +11,8 @@ import random
 from collections import deque
 from typing import Callable
 
+from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.gateway import MeshnetworkGateway
-from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.drone.interfaces import Location
@@ -128,23 +126,15 @@ class EmulatedMesh:
         rng = random.Random(f"{self._seed} radio {node_id}")
         settings = self._settings.skewed(node_id) if self._skew else self._settings
         node = EmulatedNode(self.air, node_id, place, settings, rng)
-        engine = GroundEngine(node_id, Location(place[1], place[0], place[2]))
-        routing = create_routing_technique("child_table_tree")
-        node_rng = random.Random(f"{self._seed} mesh {node_id}")
-        if gateway:
-            node.component = MeshnetworkGateway(
-                node_id,
-                node.antenna,
-                engine,
-                routing,
-                NoInternet(),
-                rng=node_rng,
-                timing=self._timing,
-            )
-        else:
-            node.component = MeshnetworkRouter(
-                node_id, node.antenna, engine, routing, rng=node_rng, timing=self._timing
-            )
+        engine = GroundEngine(node_id, Location.from_vector(place))
+        node.component = assemble_component(
+            node_id,
+            node.antenna,
+            engine,
+            random.Random(f"{self._seed} mesh {node_id}"),
+            internet=NoInternet() if gateway else None,
+            timing=self._timing,
+        )
         self.nodes[node_id] = node
         node.start()
 

@@ -7,6 +7,8 @@ import math
 import random
 from typing import Callable, Iterable
 
+from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import (
@@ -15,8 +17,7 @@ from drone_mesh.communication.interfaces import (
     IInternetConnection,
 )
 from drone_mesh.communication.observer import MeshEvent
-from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.communication.routing import create_routing_technique
+from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.interfaces import Location
@@ -94,8 +95,8 @@ class Network:
         self,
         seed: int = 0,
         timing: MeshTiming | None = None,
-        routing: str = "child_table_tree",
-        max_distance_m: float = 9.0,
+        routing: str = DEFAULT_ROUTING,
+        max_distance_m: float = MAX_DISTANCE_M,
         loss: float = 0.0,
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,
@@ -146,19 +147,18 @@ class Network:
 
     def _add(self, node_id: int, x: float, y: float, start_s: float, gateway: bool) -> None:
         if node_id in self.nodes:
-            raise ValueError(f"node {node_id} is there already")
+            raise ValueError(f"node {node_id} already exists")
         node = Node(self.clock, self.air, node_id, Location(y, x, 0.0))
-        antenna, drone = node.antenna, node.drone
-        routing = create_routing_technique(self._routing)
-        rng = random.Random(self._rng.random())
-        if gateway:
-            node.component = MeshnetworkGateway(
-                node_id, antenna, drone, routing, NoInternet(), rng, self._timing, self._observe
-            )
-        else:
-            node.component = MeshnetworkRouter(
-                node_id, antenna, drone, routing, rng, self._timing, self._observe
-            )
+        node.component = assemble_component(
+            node_id,
+            node.antenna,
+            node.drone,
+            random.Random(self._rng.random()),
+            internet=NoInternet() if gateway else None,
+            routing=self._routing,
+            timing=self._timing,
+            observer=self._observe,
+        )
         self.nodes[node_id] = node
         self.clock.call_at(start_s, Node.start, node)
 
@@ -179,7 +179,7 @@ class Network:
         """
         node = self.nodes[gateway]
         if not isinstance(node.component, MeshnetworkGateway):
-            raise ValueError(f"node {gateway} is a router: orders go through a gateway")
+            raise ValueError(f"node {gateway} is a router; orders go through a gateway")
         taken = node.component.send_goal_request_to_drone(node_id, y, x, height, self.clock.now_s)
         node.plan()
         return taken

@@ -6,12 +6,13 @@ import math
 import random
 from typing import Callable, Iterable, Mapping
 
+from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import (
     IMeshDebugInfo,
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import FROM, TO
+from drone_mesh.communication.messages import readdressed, receiver, sender
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.inprocess.clock import VirtualClock
 
@@ -28,7 +29,7 @@ class InProcessAir:
         self,
         clock: VirtualClock,
         rng: random.Random,
-        max_distance_m: float = 9.0,
+        max_distance_m: float = MAX_DISTANCE_M,
         loss: float = 0.0,
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,
@@ -123,13 +124,13 @@ class InProcessAir:
 
     def send(self, payload: bytes) -> bool:
         """Hand a packet over; True when the receiver has it, or will in a moment."""
-        sender, to = payload[FROM], payload[TO]
-        if self._flying and (sender in self._flying or to in self._flying):
-            receiver = self._heard_by(sender, self._places((to,))).get(to)
+        from_, to = sender(payload), receiver(payload)
+        if self._flying and (from_ in self._flying or to in self._flying):
+            other = self._heard_by(from_, self._places((to,))).get(to)
         else:
-            links = self._links.get(sender)
-            receiver = links.get(to) if links else None
-        if receiver is None or not receiver.powered:
+            links = self._links.get(from_)
+            other = links.get(to) if links else None
+        if other is None or not other.powered:
             return False
         if self.loss and self._rng.random() < self.loss:
             return False
@@ -137,9 +138,9 @@ class InProcessAir:
         clock = self._clock
         at_s = clock.now_s + self._delay_s
         if self._jitter_s:
-            clock.call_at(at_s + self._rng.random() * self._jitter_s, receiver.receive, payload)
+            clock.call_at(at_s + self._rng.random() * self._jitter_s, other.receive, payload)
         else:
-            clock.call_in_line(at_s, receiver.receive, payload)
+            clock.call_in_line(at_s, other.receive, payload)
         return True
 
 
@@ -173,9 +174,8 @@ class InProcessAntenna(IWirelessCommunication):
     def broadcast_message(self, payload: bytes) -> None:
         """Send to each node in range."""
         if self.powered:
-            before, after = payload[:TO], payload[TO + 1 :]
             for other in self._air.in_range(self.node_id):
-                self._air.send(before + bytes((other,)) + after)
+                self._air.send(readdressed(payload, other))
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Nothing: whoever has the network has its nodes."""

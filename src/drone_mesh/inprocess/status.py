@@ -36,8 +36,7 @@ def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
 def _node_status(node_id: int, node: Node, now_s: float) -> NodeStatus:
     status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
     describe_component(status, node.component, node.antenna.powered, now_s)
-    place = node.drone.get_location()
-    status.position = (place.longitude, place.latitude, place.height)
+    status.position = node.drone.get_location().to_vector()
     path = node.drone.path
     status.path = () if path is None else way_ahead(path, now_s)
     return status

@@ -14,7 +14,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import FROM, TO
+from drone_mesh.communication.messages import readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
@@ -111,15 +111,15 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         """See the interface; what cannot be sent (not 32 bytes, no such node) is not sent."""
         if self._silent or not self._powered or len(payload) != PAYLOAD_BYTES:
             return False
-        receiver = payload[TO]
-        if receiver > MAX_NODE_ID or receiver == self._radio.node_id:
+        to = receiver(payload)
+        if to > MAX_NODE_ID or to == self._radio.node_id:
             return False
-        return self._radio.send(receiver, bytes(payload))
+        return self._radio.send(to, bytes(payload))
 
     def broadcast_message(self, payload: bytes) -> None:
         """One frame for all; each receiver's antenna puts its own id into byte 3."""
         if self._powered and not self._silent and len(payload) == PAYLOAD_BYTES:
-            self._radio.broadcast(_with_receiver(payload, BROADCAST))
+            self._radio.broadcast(readdressed(payload, BROADCAST))
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         self._info = info if on else None
@@ -147,7 +147,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
             return
         self._note(payload)
         if received.pipe == BROADCAST_PIPE:
-            payload = _with_receiver(payload, self._radio.node_id)
+            payload = readdressed(payload, self._radio.node_id)
         if self._on_payload is not None:
             self._on_payload(payload)
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
@@ -155,11 +155,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
     def _note(self, payload: bytes) -> None:
         """Count repetitions; they are handed on, for the same packet again is normal."""
         now_s = self._runtime.now_s()
-        before, then_s = self._seen.get(payload[FROM], (b"", now_s))
+        before, then_s = self._seen.get(sender(payload), (b"", now_s))
         if before == payload and now_s - then_s < DUPLICATE_S:
             self._duplicates += 1
-        self._seen[payload[FROM]] = (payload, now_s)
-
-
-def _with_receiver(payload: bytes, node_id: int) -> bytes:
-    return payload[:TO] + bytes((node_id,)) + payload[TO + 1 :]
+        self._seen[sender(payload)] = (payload, now_s)

@@ -57,7 +57,7 @@ class EmulatedAir:
     def radio(self, node_id: int, settings: RadioSettings) -> NRF24LowLevelInterface:
         """The driver of a new chip at the place of that node."""
         place = self.place(node_id)
-        position = (place.longitude, place.latitude, place.height)
+        position = place.to_vector()
         chip = EmulatedChip(self._air, f"node {node_id}", position)
         return NRF24LowLevelInterface(
             chip.spi,

@@ -8,12 +8,9 @@ import random
 import time
 from typing import Callable
 
-from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IInternetConnection
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
-from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.execution import MeshExecutor, Work
@@ -46,7 +43,16 @@ class RadioNode:
         self._seat = self._executor.seat()
         self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
         self._internet = make_internet(self._seat.submit) if make_internet is not None else None
-        self.component = self._make_component(location, options)
+        self.component = assemble_component(
+            radio.node_id,
+            self._antenna,
+            GroundEngine(radio.node_id, location),
+            random.Random(),
+            internet=self._internet,
+            routing=options.routing,
+            timing=options.timing,
+            observer=_log_event,
+        )
         self._started = False
 
     def start(self) -> None:
@@ -70,26 +76,6 @@ class RadioNode:
             if self._internet is not None:
                 self._internet.disconnect()
             self.radio.close()
-
-    def _make_component(self, location: Location, options: Options) -> MeshnetworkComponent:
-        node_id = self.radio.node_id
-        engine = GroundEngine(node_id, location)
-        routing = create_routing_technique(options.routing)
-        rng = random.Random()
-        if self._internet is None:
-            return MeshnetworkRouter(
-                node_id, self._antenna, engine, routing, rng, options.timing, _log_event
-            )
-        return MeshnetworkGateway(
-            node_id,
-            self._antenna,
-            engine,
-            routing,
-            self._internet,
-            rng,
-            options.timing,
-            _log_event,
-        )
 
 
 _ABOUT_GATEWAYS = frozenset(

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Sequence
 
+from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.roles import Role
 
@@ -55,7 +56,7 @@ class MeshStatus:
 
     stamp_s: float
     nodes: Sequence[NodeStatus]  # ascending ids
-    max_distance: float = 9.0  # m
+    max_distance: float = MAX_DISTANCE_M  # m
     real_time_factor: float = 1.0
     achieved_real_time_factor: float = 0.0
     paused: bool = False

@@ -69,13 +69,13 @@ class DroneEngine(IDroneEngine):
         bounds.
         """
         check_goal(latitude, longitude, height)
-        self._goals.append((longitude, latitude, height + self._half_height_m))
+        self._goals.append(Location(latitude, longitude, height + self._half_height_m).to_vector())
         self._world.wake(self)
 
     def get_location(self) -> Location:
         """Where the underside is, in metres, after the last step. Never raises LocationUnknown."""
         x, y, z = self._state.position
-        return Location(latitude=y, longitude=x, height=z - self._half_height_m)
+        return Location.from_vector((x, y, z - self._half_height_m))
 
     def step(self, now_s: float) -> bool:
         """Take the goals that wait, fly on to `now_s`; True while in flight. For the world."""

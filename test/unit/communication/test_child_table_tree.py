@@ -1,4 +1,4 @@
-"""ChildTableTree: the original's own cases, and each rule of the reference, section 8."""
+"""ChildTableTree: the original's own cases, and each rule of docs/protocol.md."""
 
 from __future__ import annotations
 
@@ -242,7 +242,7 @@ operation = st.one_of(
 
 @settings(derandomize=True, deadline=None, database=None, max_examples=60)
 @given(st.lists(operation, max_size=40))
-def test_does_what_the_words_of_the_reference_say(operations):
+def test_does_what_the_words_of_the_protocol_say(operations):
     tree, naive = ChildTableTree(), Naive()
     for name, *ids in operations:
         assert getattr(tree, name)(*ids) == getattr(naive, name)(*ids), (name, ids)

@@ -1,4 +1,4 @@
-"""What each node does with a packet from the air: refuse, learn, forward (reference 8, 14.9-10)."""
+"""What each node does with a packet from the air: refuse, learn, forward."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 import random
 
 import pytest
-from mesh_bench import Bench, packet
+from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 
@@ -37,140 +37,140 @@ BAD = {
 @pytest.mark.parametrize("gateway", [False, True], ids=["router", "gateway"])
 @pytest.mark.parametrize("payload", BAD.values(), ids=BAD)
 def test_bad_input_teaches_nothing_changes_nothing_and_is_counted(payload, gateway):
-    bench = Bench(gateway=gateway)
-    reported = list(bench.events)
-    bench.mesh.on_msg(payload, 1.0)
-    assert bench.routing.empty()
-    assert bench.mesh.get_neighbours() == {}
-    assert bench.events == reported
-    assert (bench.tried(), bench.broadcasts(), bench.engine.goals) == ([], [], [])
-    assert sum(bench.mesh.complaints.counts.values()) == 1
+    rig = Rig(gateway=gateway)
+    reported = list(rig.events)
+    rig.mesh.on_msg(payload, 1.0)
+    assert rig.routing.empty()
+    assert rig.mesh.get_neighbours() == {}
+    assert rig.events == reported
+    assert (rig.tried(), rig.broadcasts(), rig.engine.goals) == ([], [], [])
+    assert sum(rig.mesh.complaints.counts.values()) == 1
 
 
 def test_a_flood_of_bad_input_is_one_line_in_the_log(caplog):
-    bench = Bench()
+    rig = Rig()
     with caplog.at_level(logging.WARNING):
         for tenth in range(100):
-            bench.mesh.on_msg(BAD["creator 255"], tenth / 10)
+            rig.mesh.on_msg(BAD["creator 255"], tenth / 10)
     assert [record.getMessage() for record in caplog.records] == [
         "node 1: dropped bad ids: " + BAD["creator 255"].hex() + " (1 so far)"
     ]
-    bench.mesh.on_msg(BAD["creator 255"], 40.0)
+    rig.mesh.on_msg(BAD["creator 255"], 40.0)
     assert caplog.records[-1].getMessage().endswith("(101 so far)")
 
 
 @pytest.mark.parametrize("kind", ["00", "08", "7f", "80", "ff"])
 def test_a_type_that_is_not_known_teaches_and_is_not_processed(kind):
-    bench = Bench()
-    bench.hear(f"05 02 {kind} 01 01")
-    assert bench.tried() == []
-    assert bench.routing.get_direction_to_node(5) == 2
+    rig = Rig()
+    rig.hear(f"05 02 {kind} 01 01")
+    assert rig.tried() == []
+    assert rig.routing.get_direction_to_node(5) == 2
 
 
 @pytest.mark.parametrize("kind", ["00", "08", "7f", "80", "ff"])
 def test_a_type_that_is_not_known_is_forwarded_like_any_other(kind):
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear(f"05 02 {kind} 01 09 de ad be ef")
-    assert bench.sent() == [packet(f"05 01 {kind} 09 09 de ad be ef")]
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear(f"05 02 {kind} 01 09 de ad be ef")
+    assert rig.sent() == [packet(f"05 01 {kind} 09 09 de ad be ef")]
 
 
 # Learning ------------------------------------------------------------------------------------
 
 
 def test_who_sends_is_a_direct_neighbour():
-    bench = Bench()
-    bench.now_s = 2.5
-    bench.hear("02 02 00 01 01")
-    assert bench.routing.get_set_of_children() == {2}
-    assert bench.mesh.get_neighbours() == {2: 2.5}
+    rig = Rig()
+    rig.now_s = 2.5
+    rig.hear("02 02 00 01 01")
+    assert rig.routing.get_set_of_children() == {2}
+    assert rig.mesh.get_neighbours() == {2: 2.5}
 
 
 def test_a_packet_that_is_sent_on_teaches_as_well():
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear("05 02 00 01 09")
-    assert bench.routing.get_set_of_children() == {2, 9}
-    assert bench.routing.get_direction_to_node(5) == 2
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear("05 02 00 01 09")
+    assert rig.routing.get_set_of_children() == {2, 9}
+    assert rig.routing.get_direction_to_node(5) == 2
 
 
 def test_a_heartbeat_lists_its_creator_under_its_sender_and_under_no_other_child():
-    bench = Bench()
-    bench.hear("05 02 00 01 01", "05 03 04 01 01 00 ff 01")
-    assert bench.routing.get_direction_to_node(5) == 3
-    assert bench.routing.get_table_size() == 3  # 2, 3, and 5 under 3
+    rig = Rig()
+    rig.hear("05 02 00 01 01", "05 03 04 01 01 00 ff 01")
+    assert rig.routing.get_direction_to_node(5) == 3
+    assert rig.routing.get_table_size() == 3  # 2, 3, and 5 under 3
 
 
 def test_any_other_packet_teaches_its_creator_only_while_that_is_unknown():
-    bench = Bench()
-    bench.hear("05 03 00 01 01", "05 02 00 01 01")
-    assert bench.routing.get_direction_to_node(5) == 3
-    assert bench.routing.get_table_size() == 3
+    rig = Rig()
+    rig.hear("05 03 00 01 01", "05 02 00 01 01")
+    assert rig.routing.get_direction_to_node(5) == 3
+    assert rig.routing.get_table_size() == 3
 
 
 def test_a_packet_of_a_direct_neighbour_that_came_round_leaves_it_a_neighbour():
-    bench = Bench()
-    bench.know_neighbour(5)
-    bench.hear("05 02 00 01 01")
-    assert bench.routing.get_direction_to_node(5) == 5
-    assert bench.routing.get_table_size() == 2
+    rig = Rig()
+    rig.know_neighbour(5)
+    rig.hear("05 02 00 01 01")
+    assert rig.routing.get_direction_to_node(5) == 5
+    assert rig.routing.get_table_size() == 2
 
 
 def test_a_packet_of_its_own_that_comes_back_does_not_teach_the_way_to_itself():
-    bench = Bench()
-    bench.hear("01 02 04 01 01 00 ff 01", "01 02 00 01 01")
-    assert bench.routing.get_direction_to_node(1) == NO_ROUTE
-    assert bench.routing.get_set_of_children() == {2}
+    rig = Rig()
+    rig.hear("01 02 04 01 01 00 ff 01", "01 02 00 01 01")
+    assert rig.routing.get_direction_to_node(1) == NO_ROUTE
+    assert rig.routing.get_set_of_children() == {2}
 
 
 def test_it_learns_first_and_then_answers():
-    """The first question of a new neighbour, and of a node behind it, can be answered (14.2)."""
-    bench = Bench()
-    bench.engine.place = bench.engine.place._replace(latitude=1.0)
-    bench.now_s = 3.9
-    bench.hear("05 02 02 01 01")
-    assert bench.sent() == [packet("01 01 01 02 05 00 00 80 3f 00 00 00 00 00 00 03")]
+    """The first question of a new neighbour, and of a node behind it, can be answered."""
+    rig = Rig()
+    rig.engine.place = rig.engine.place._replace(latitude=1.0)
+    rig.now_s = 3.9
+    rig.hear("05 02 02 01 01")
+    assert rig.sent() == [packet("01 01 01 02 05 00 00 80 3f 00 00 00 00 00 00 03")]
 
 
 # Forwarding ----------------------------------------------------------------------------------
 
 
 def test_forwarding_changes_from_and_to_alone():
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear("05 02 06 01 09 00 00 80 3f 00 00 00 40 07")
-    assert bench.sent() == [packet("05 01 06 09 09 00 00 80 3f 00 00 00 40 07")]
-    assert bench.mesh.get_total_message_sent() == 1
-    assert bench.engine.goals == []
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear("05 02 06 01 09 00 00 80 3f 00 00 00 40 07")
+    assert rig.sent() == [packet("05 01 06 09 09 00 00 80 3f 00 00 00 40 07")]
+    assert rig.mesh.get_total_message_sent() == 1
+    assert rig.engine.goals == []
 
 
 def test_forwarding_goes_to_the_neighbour_that_has_the_node():
-    bench = Bench()
-    bench.hear("09 03 00 01 01", "05 02 00 01 09")
-    assert bench.sent() == [packet("05 01 00 03 09")]
+    rig = Rig()
+    rig.hear("09 03 00 01 01", "05 02 00 01 09")
+    assert rig.sent() == [packet("05 01 00 03 09")]
 
 
 def test_a_heartbeat_counts_its_hops():
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear("05 02 04 01 09 01 00 03")
-    assert bench.sent() == [packet("05 01 04 09 09 01 00 04")]
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear("05 02 04 01 09 01 00 03")
+    assert rig.sent() == [packet("05 01 04 09 09 01 00 04")]
 
 
 def test_a_heartbeat_with_254_hops_is_dropped():
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear("05 02 04 01 09 01 00 fd")
-    assert bench.sent() == [packet("05 01 04 09 09 01 00 fe")]
-    bench.hear("06 02 04 01 09 01 00 fe", "07 02 04 01 09 01 00 ff")
-    assert bench.sent() == []
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear("05 02 04 01 09 01 00 fd")
+    assert rig.sent() == [packet("05 01 04 09 09 01 00 fe")]
+    rig.hear("06 02 04 01 09 01 00 fe", "07 02 04 01 09 01 00 ff")
+    assert rig.sent() == []
 
 
 def test_without_a_route_the_neighbours_are_told_the_sender_first():
-    bench = Bench()
-    bench.know_neighbour(2, 3, 7)
-    bench.hear("07 07 00 01 09")
-    assert bench.sent() == [
+    rig = Rig()
+    rig.know_neighbour(2, 3, 7)
+    rig.hear("07 07 00 01 09")
+    assert rig.sent() == [
         packet("01 01 05 07 07 09"),
         packet("01 01 05 02 02 09"),
         packet("01 01 05 03 03 09"),
@@ -178,49 +178,49 @@ def test_without_a_route_the_neighbours_are_told_the_sender_first():
 
 
 def test_a_packet_is_not_sent_back_to_where_it_came_from():
-    bench = Bench()
-    bench.hear("09 07 00 01 01")
-    bench.know_neighbour(2)
-    bench.hear("05 07 00 01 09")
-    assert bench.sent() == [packet("01 01 05 07 07 09"), packet("01 01 05 02 02 09")]
+    rig = Rig()
+    rig.hear("09 07 00 01 01")
+    rig.know_neighbour(2)
+    rig.hear("05 07 00 01 09")
+    assert rig.sent() == [packet("01 01 05 07 07 09"), packet("01 01 05 02 02 09")]
 
 
 def test_when_the_next_hop_does_not_take_it_one_other_route_is_tried():
-    bench = Bench()
-    bench.hear("09 03 00 01 01")
-    bench.routing.other_can_communicate_with_node(4, 9)
-    bench.antenna.dead = {3}
-    bench.hear("05 02 80 01 09")
-    assert bench.tried(0x80) == [packet("05 01 80 03 09")] * 3 + [packet("05 01 80 04 09")]
-    assert bench.routing.get_direction_to_node(9) == 4
+    rig = Rig()
+    rig.hear("09 03 00 01 01")
+    rig.routing.other_can_communicate_with_node(4, 9)
+    rig.antenna.dead = {3}
+    rig.hear("05 02 80 01 09")
+    assert rig.tried(0x80) == [packet("05 01 80 03 09")] * 3 + [packet("05 01 80 04 09")]
+    assert rig.routing.get_direction_to_node(9) == 4
 
 
 def test_after_two_routes_that_do_not_take_it_it_is_dropped():
-    bench = Bench()
+    rig = Rig()
     for child in (3, 4, 6):
-        bench.routing.other_can_communicate_with_node(child, 9)
-    bench.antenna.gets_lost = lambda payload: payload[2] == 0x80 and payload[3] in (3, 4)
-    bench.hear("05 02 80 01 09")
-    assert bench.tried(0x80) == [packet("05 01 80 03 09")] * 3 + [packet("05 01 80 04 09")] * 3
-    assert bench.routing.get_direction_to_node(9) == 6
+        rig.routing.other_can_communicate_with_node(child, 9)
+    rig.antenna.gets_lost = lambda payload: payload[2] == 0x80 and payload[3] in (3, 4)
+    rig.hear("05 02 80 01 09")
+    assert rig.tried(0x80) == [packet("05 01 80 03 09")] * 3 + [packet("05 01 80 04 09")] * 3
+    assert rig.routing.get_direction_to_node(9) == 6
 
 
 def test_when_the_only_next_hop_does_not_take_it_the_neighbours_are_told_once_the_sender_first():
-    bench = Bench()
-    bench.know_neighbour(2, 3, 9)
-    bench.antenna.dead = {9}
-    bench.hear("05 03 80 01 09")
-    assert bench.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 02 02 09")]
-    assert bench.routing.get_direction_to_node(9) == NO_ROUTE
+    rig = Rig()
+    rig.know_neighbour(2, 3, 9)
+    rig.antenna.dead = {9}
+    rig.hear("05 03 80 01 09")
+    assert rig.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 02 02 09")]
+    assert rig.routing.get_direction_to_node(9) == NO_ROUTE
 
 
 def test_when_the_next_hop_and_with_it_the_addressee_are_lost_the_neighbours_are_told_of_both():
-    bench = Bench()
-    bench.know_neighbour(2, 3, 4)
-    bench.routing.other_can_communicate_with_node(4, 9)
-    bench.antenna.dead = {4}
-    bench.hear("05 03 80 01 09")
-    assert bench.sent() == [
+    rig = Rig()
+    rig.know_neighbour(2, 3, 4)
+    rig.routing.other_can_communicate_with_node(4, 9)
+    rig.antenna.dead = {4}
+    rig.hear("05 03 80 01 09")
+    assert rig.sent() == [
         packet("01 01 05 03 03 04"),
         packet("01 01 05 02 02 04"),
         packet("01 01 05 03 03 09"),
@@ -229,80 +229,80 @@ def test_when_the_next_hop_and_with_it_the_addressee_are_lost_the_neighbours_are
 
 
 def test_when_a_lost_addressee_could_be_reached_over_the_sender_alone_the_neighbours_are_told():
-    bench = Bench()
-    bench.know_neighbour(2, 3, 9)
-    bench.routing.other_can_communicate_with_node(3, 9)
-    bench.antenna.dead = {9}
-    bench.hear("05 03 80 01 09")
-    assert bench.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 02 02 09")]
+    rig = Rig()
+    rig.know_neighbour(2, 3, 9)
+    rig.routing.other_can_communicate_with_node(3, 9)
+    rig.antenna.dead = {9}
+    rig.hear("05 03 80 01 09")
+    assert rig.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 02 02 09")]
 
 
 # Orders that go no further -------------------------------------------------------------------
 
 
-def stranded(bench):
-    """Whether the bench told, once, of an order for drone 9 that ends here."""
-    told = [event.peer for event in bench.events if event.kind.name == "NO_ROUTE"]
-    assert bench.mesh.complaints.counts["no route to drone 9"] == len(told)
+def stranded(rig):
+    """Whether the rig told, once, of an order for drone 9 that ends here."""
+    told = [event.peer for event in rig.events if event.kind.name == "NO_ROUTE"]
+    assert rig.mesh.complaints.counts["no route to drone 9"] == len(told)
     return told == [9]
 
 
 def test_an_order_without_a_route_ends_here_and_that_is_told():
-    bench = Bench()
-    bench.know_neighbour(3)
-    bench.hear("00 03 06 01 09")
-    assert stranded(bench)
+    rig = Rig()
+    rig.know_neighbour(3)
+    rig.hear("00 03 06 01 09")
+    assert stranded(rig)
 
 
 def test_an_order_that_comes_round_ends_here_and_that_is_told():
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear("00 02 06 01 09")
-    assert not stranded(bench)
-    bench.hear("00 04 06 01 09")
-    assert stranded(bench)
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear("00 02 06 01 09")
+    assert not stranded(rig)
+    rig.hear("00 04 06 01 09")
+    assert stranded(rig)
 
 
 def test_an_order_that_two_next_hops_do_not_take_ends_here_and_that_is_told():
-    bench = Bench()
+    rig = Rig()
     for child in (4, 6, 7):
-        bench.routing.other_can_communicate_with_node(child, 9)
-    bench.antenna.gets_lost = lambda payload: payload[2] == 6
-    bench.hear("00 03 06 01 09")
-    assert stranded(bench)
+        rig.routing.other_can_communicate_with_node(child, 9)
+    rig.antenna.gets_lost = lambda payload: payload[2] == 6
+    rig.hear("00 03 06 01 09")
+    assert stranded(rig)
 
 
-# Packets that go round in circles (14.10) ----------------------------------------------------
+# Circulating packets ------------------------------------------------------------------------
 
 
 def test_a_packet_that_it_made_itself_is_not_forwarded_and_its_entry_forgotten():
-    bench = Bench()
-    bench.hear("09 03 00 01 01")
-    bench.know_neighbour(2)
-    bench.hear("01 02 80 01 09")
-    assert bench.sent() == []
-    assert bench.routing.get_direction_to_node(9) == NO_ROUTE
-    assert bench.routing.get_set_of_children() == {2, 3}
+    rig = Rig()
+    rig.hear("09 03 00 01 01")
+    rig.know_neighbour(2)
+    rig.hear("01 02 80 01 09")
+    assert rig.sent() == []
+    assert rig.routing.get_direction_to_node(9) == NO_ROUTE
+    assert rig.routing.get_set_of_children() == {2, 3}
 
 
 def test_a_direct_neighbour_is_never_forgotten_for_a_packet_that_goes_round():
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear("01 02 80 01 09")
-    bench.hear("05 02 80 01 09", "05 03 80 01 09")
-    assert bench.sent() == [packet("05 01 80 09 09")]
-    assert bench.routing.get_direction_to_node(9) == 9
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear("01 02 80 01 09")
+    rig.hear("05 02 80 01 09", "05 03 80 01 09")
+    assert rig.sent() == [packet("05 01 80 09 09")]
+    assert rig.routing.get_direction_to_node(9) == 9
 
 
 def test_the_same_packet_from_another_neighbour_is_dropped_and_its_entry_forgotten():
-    bench = Bench()
-    bench.hear("09 03 00 01 01")
-    bench.hear("05 02 80 01 09 2a")
-    bench.wait(0.4)
-    bench.hear("05 04 80 01 09 2a")
-    assert bench.sent() == [packet("05 01 80 03 09 2a")]
-    assert bench.routing.get_direction_to_node(9) == NO_ROUTE
-    assert bench.routing.get_set_of_children() == {2, 3, 4}
+    rig = Rig()
+    rig.hear("09 03 00 01 01")
+    rig.hear("05 02 80 01 09 2a")
+    rig.wait(0.4)
+    rig.hear("05 04 80 01 09 2a")
+    assert rig.sent() == [packet("05 01 80 03 09 2a")]
+    assert rig.routing.get_direction_to_node(9) == NO_ROUTE
+    assert rig.routing.get_set_of_children() == {2, 3, 4}
 
 
 @pytest.mark.parametrize(
@@ -315,46 +315,46 @@ def test_the_same_packet_from_another_neighbour_is_dropped_and_its_entry_forgott
     ],
 )
 def test_a_packet_that_differs_or_comes_the_same_way_again_is_forwarded(second):
-    bench = Bench()
-    bench.hear("09 03 00 01 01", "05 02 80 01 09 2a", second)
-    assert len(bench.sent()) == 2
-    assert bench.routing.get_direction_to_node(9) == 3
+    rig = Rig()
+    rig.hear("09 03 00 01 01", "05 02 80 01 09 2a", second)
+    assert len(rig.sent()) == 2
+    assert rig.routing.get_direction_to_node(9) == 3
 
 
 def test_the_same_packet_from_another_neighbour_is_forwarded_after_half_a_second():
-    bench = Bench()
-    bench.hear("09 03 00 01 01", "05 02 80 01 09 2a")
-    bench.wait(0.51)
-    bench.hear("05 04 80 01 09 2a")
-    assert bench.sent() == [packet("05 01 80 03 09 2a"), packet("05 01 80 03 09 2a")]
+    rig = Rig()
+    rig.hear("09 03 00 01 01", "05 02 80 01 09 2a")
+    rig.wait(0.51)
+    rig.hear("05 04 80 01 09 2a")
+    assert rig.sent() == [packet("05 01 80 03 09 2a"), packet("05 01 80 03 09 2a")]
 
 
 def test_the_half_second_counts_from_the_first_time():
-    bench = Bench()
-    bench.hear("09 03 00 01 01", "05 02 80 01 09 2a")
-    bench.wait(0.3)
-    bench.hear("05 02 80 01 09 2a")
-    bench.wait(0.3)
-    bench.hear("05 04 80 01 09 2a")
-    assert len(bench.sent()) == 3
+    rig = Rig()
+    rig.hear("09 03 00 01 01", "05 02 80 01 09 2a")
+    rig.wait(0.3)
+    rig.hear("05 02 80 01 09 2a")
+    rig.wait(0.3)
+    rig.hear("05 04 80 01 09 2a")
+    assert len(rig.sent()) == 3
 
 
 def test_the_entry_that_is_forgotten_is_the_one_that_was_used_in_the_end():
     """The first next hop did not take the packet: what went round went by the second."""
-    bench = Bench()
-    bench.hear("09 03 00 01 01")
+    rig = Rig()
+    rig.hear("09 03 00 01 01")
     for child in (4, 6):
-        bench.routing.other_can_communicate_with_node(child, 9)
-    bench.antenna.dead = {3}
-    bench.hear("05 02 80 01 09", "05 07 80 01 09")
-    assert bench.sent(0x80) == [packet("05 01 80 04 09")]
-    assert bench.routing.get_direction_to_node(9) == 6
+        rig.routing.other_can_communicate_with_node(child, 9)
+    rig.antenna.dead = {3}
+    rig.hear("05 02 80 01 09", "05 07 80 01 09")
+    assert rig.sent(0x80) == [packet("05 01 80 04 09")]
+    assert rig.routing.get_direction_to_node(9) == 6
 
 
 def test_a_heartbeat_is_bounded_by_its_hops_and_not_by_the_way_it_came():
-    bench = Bench()
-    bench.hear("09 03 00 01 01", "05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 01")
-    assert bench.sent() == [packet("05 01 04 03 09 00 ff 02")] * 2
+    rig = Rig()
+    rig.hear("09 03 00 01 01", "05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 01")
+    assert rig.sent() == [packet("05 01 04 03 09 00 ff 02")] * 2
 
 
 # Anything at all -----------------------------------------------------------------------------
@@ -362,7 +362,7 @@ def test_a_heartbeat_is_bounded_by_its_hops_and_not_by_the_way_it_came():
 
 @pytest.mark.parametrize("gateway", [False, True], ids=["router", "gateway"])
 def test_ten_thousand_random_packets_raise_nothing_and_the_node_still_answers(gateway):
-    bench = Bench(gateway=gateway)
+    rig = Rig(gateway=gateway)
     rng = random.Random(14)
     for number in range(10_000):
         payload = bytearray(rng.getrandbits(256).to_bytes(32, "little"))
@@ -373,13 +373,13 @@ def test_ten_thousand_random_packets_raise_nothing_and_the_node_still_answers(ga
         elif payload[2] == 6:
             continue  # orders to move are left out
         if number % 50 == 0:
-            bench.antenna.dead = set(rng.sample(range(254), 5))
-            bench.wait(1.0)
-        bench.mesh.on_msg(bytes(payload), bench.now_s)
-    bench.antenna.dead = set()
-    bench.know_neighbour(5)
-    bench.hear("05 05 02 01 01")
-    assert [p[:5] for p in bench.sent(1)] == [bytes((1, 1, 1, 5, 5))]
-    bench.wait(300.0)
-    bench.hear("05 05 02 01 01")
-    assert [p[:5] for p in bench.sent(1)][-1] == bytes((1, 1, 1, 5, 5))
+            rig.antenna.dead = set(rng.sample(range(254), 5))
+            rig.wait(1.0)
+        rig.mesh.on_msg(bytes(payload), rig.now_s)
+    rig.antenna.dead = set()
+    rig.know_neighbour(5)
+    rig.hear("05 05 02 01 01")
+    assert [p[:5] for p in rig.sent(1)] == [bytes((1, 1, 1, 5, 5))]
+    rig.wait(300.0)
+    rig.hear("05 05 02 01 01")
+    assert [p[:5] for p in rig.sent(1)][-1] == bytes((1, 1, 1, 5, 5))

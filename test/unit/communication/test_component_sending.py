@@ -1,11 +1,11 @@
-"""What each node does to get a packet through, and whom it tells if it fails (reference 8)."""
+"""What each node does to get a packet through, and which nodes it informs if it fails."""
 
 from __future__ import annotations
 
 import random
 
 import pytest
-from mesh_bench import AlwaysHalf, Bench, BenchEngine, RecordingAntenna, packet
+from rig import AlwaysHalf, RecordingAntenna, Rig, RigEngine, packet
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -21,41 +21,41 @@ ASK = "05 05 02 01 01"
 
 @pytest.mark.parametrize("gateway", [False, True], ids=["router", "gateway"])
 def test_starting_switches_antenna_and_debugging_on_and_introduces_the_node(gateway):
-    bench = Bench(node_id=3, gateway=gateway)
-    assert bench.antenna.calls == [
-        ("start_antenna", bench.mesh),
-        ("debugging_mode", bench.mesh, True),
+    rig = Rig(node_id=3, gateway=gateway)
+    assert rig.antenna.calls == [
+        ("start_antenna", rig.mesh),
+        ("debugging_mode", rig.mesh, True),
     ]
-    bench.antenna.calls.clear()
-    bench.mesh.stop()
-    assert bench.antenna.calls == [("debugging_mode", bench.mesh, False), ("stop_antenna",)]
-    assert bench.mesh.next_tick_s == float("inf")
+    rig.antenna.calls.clear()
+    rig.mesh.stop()
+    assert rig.antenna.calls == [("debugging_mode", rig.mesh, False), ("stop_antenna",)]
+    assert rig.mesh.next_tick_s == float("inf")
 
 
 def test_debugging_stays_off_unless_it_is_asked_for():
-    bench = Bench(debug=False)
-    bench.mesh.stop()
-    assert [call[0] for call in bench.antenna.calls] == ["start_antenna", "stop_antenna"]
+    rig = Rig(debug=False)
+    rig.mesh.stop()
+    assert [call[0] for call in rig.antenna.calls] == ["start_antenna", "stop_antenna"]
 
 
 def test_a_router_introduces_itself_without_a_gateway_and_a_gateway_with_itself():
     for gateway, introduction in ((False, "03 03 03 fe fe ff 00"), (True, "03 03 03 fe fe 00 01")):
-        bench = Bench(node_id=3, gateway=gateway)
-        bench.mesh.search_other_nodes_in_range()
-        assert bench.broadcasts() == [packet(introduction)]
+        rig = Rig(node_id=3, gateway=gateway)
+        rig.mesh.search_other_nodes_in_range()
+        assert rig.broadcasts() == [packet(introduction)]
 
 
 @pytest.mark.parametrize("node_id", [-1, 254, 255])
 def test_an_id_that_no_node_has_is_refused(node_id):
     with pytest.raises(ValueError, match=f"node id {node_id}: must be 0..253"):
-        Bench(node_id=node_id)
+        Rig(node_id=node_id)
 
 
 def test_the_first_check_comes_after_a_random_part_of_the_period_and_then_once_a_period():
     first_checks = set()
     for seed in range(5):
         antenna, rng = RecordingAntenna(), random.Random(seed)
-        mesh = MeshnetworkRouter(1, antenna, BenchEngine(), ChildTableTree(), rng)
+        mesh = MeshnetworkRouter(1, antenna, RigEngine(), ChildTableTree(), rng)
         mesh.start(100.0)
         assert antenna.broadcasts == [packet("01 01 03 fe fe ff")]
         first_s = mesh.next_tick_s
@@ -69,22 +69,22 @@ def test_the_first_check_comes_after_a_random_part_of_the_period_and_then_once_a
 
 
 def test_the_check_period_is_adjustable():
-    bench = Bench(timing=MeshTiming(check_period_s=2.0))
-    bench.wait(9.5)
-    assert len(bench.broadcasts()) == 5  # at 1, 3, 5, 7 and 9 s
+    rig = Rig(timing=MeshTiming(check_period_s=2.0))
+    rig.wait(9.5)
+    assert len(rig.broadcasts()) == 5  # at 1, 3, 5, 7 and 9 s
 
 
 def test_a_tick_before_anything_is_due_does_nothing():
-    bench = Bench()
-    bench.mesh.tick(4.9)
-    assert (bench.tried(), bench.broadcasts()) == ([], [])
+    rig = Rig()
+    rig.mesh.tick(4.9)
+    assert (rig.tried(), rig.broadcasts()) == ([], [])
 
 
 def test_a_late_tick_makes_up_for_one_check_and_not_for_many():
-    bench = Bench()
-    bench.mesh.tick(47.0)
-    assert len(bench.broadcasts()) == 1
-    assert bench.mesh.next_tick_s == 55.0
+    rig = Rig()
+    rig.mesh.tick(47.0)
+    assert len(rig.broadcasts()) == 1
+    assert rig.mesh.next_tick_s == 55.0
 
 
 @pytest.mark.parametrize(
@@ -102,24 +102,24 @@ def test_timing_that_no_node_could_live_by_is_refused(changes, why):
 
 
 def test_maintaining_introduces_the_node_and_sends_each_child_a_heartbeat():
-    bench = Bench(gateway=True)
-    bench.know_neighbour(7, 3)
-    bench.wait_until(5.0)
-    assert bench.broadcasts() == [packet("01 01 03 fe fe 00 01")]
-    assert bench.sent() == [packet("01 01 04 03 03 01 01"), packet("01 01 04 07 07 01 01")]
+    rig = Rig(gateway=True)
+    rig.know_neighbour(7, 3)
+    rig.wait_until(5.0)
+    assert rig.broadcasts() == [packet("01 01 03 fe fe 00 01")]
+    assert rig.sent() == [packet("01 01 04 03 03 01 01"), packet("01 01 04 07 07 01 01")]
 
 
 # Sending -------------------------------------------------------------------------------------
 
 
 def test_a_round_of_heartbeats_tries_three_times_and_then_another_way():
-    bench = Bench()
-    bench.know_neighbour(2, 3)
-    bench.routing.other_can_communicate_with_node(3, 2)
-    bench.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] == 2
-    bench.mesh.send_heartbeats([2, 3])
+    rig = Rig()
+    rig.know_neighbour(2, 3)
+    rig.routing.other_can_communicate_with_node(3, 2)
+    rig.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] == 2
+    rig.mesh.send_heartbeats([2, 3])
     lost, other_way = packet("01 01 04 02 02 00 ff"), packet("01 01 04 03 02 00 ff")
-    heartbeats = bench.tried(4)
+    heartbeats = rig.tried(4)
     assert heartbeats.count(lost) == 3
     assert heartbeats.count(other_way) == 1
     assert heartbeats.count(packet("01 01 04 03 03 00 ff")) == 1
@@ -127,11 +127,11 @@ def test_a_round_of_heartbeats_tries_three_times_and_then_another_way():
 
 
 def test_a_round_of_heartbeats_goes_to_those_behind_others_as_well():
-    bench = Bench()
-    bench.know_neighbour(3)
-    bench.routing.other_can_communicate_with_node(3, 9)
-    bench.mesh.send_heartbeats([9])
-    assert bench.sent(4) == [packet("01 01 04 03 09 00 ff")]
+    rig = Rig()
+    rig.know_neighbour(3)
+    rig.routing.other_can_communicate_with_node(3, 9)
+    rig.mesh.send_heartbeats([9])
+    assert rig.sent(4) == [packet("01 01 04 03 09 00 ff")]
 
 
 class Obstinate(ChildTableTree):
@@ -143,7 +143,7 @@ class Obstinate(ChildTableTree):
 
 def test_a_technique_that_does_not_forget_a_route_does_not_stop_the_node():
     antenna = RecordingAntenna()
-    router = MeshnetworkRouter(1, antenna, BenchEngine(), Obstinate(), AlwaysHalf())
+    router = MeshnetworkRouter(1, antenna, RigEngine(), Obstinate(), AlwaysHalf())
     router.start(0.0)
     router.on_msg(packet("00 02 04 01 01 01 00 01"), 0.0)
     router.on_msg(packet("02 02 00 01 fe"), 0.0)
@@ -155,11 +155,11 @@ def test_a_technique_that_does_not_forget_a_route_does_not_stop_the_node():
 
 
 def test_a_packet_that_is_taken_counts_as_sent_and_teaches():
-    bench = Bench()
-    bench.hear(ASK)
-    assert bench.sent() == [packet(LOCATION_OF_ORIGIN)]
-    assert bench.mesh.get_total_message_sent() == 1
-    assert bench.routing.get_direction_to_node(5) == 5
+    rig = Rig()
+    rig.hear(ASK)
+    assert rig.sent() == [packet(LOCATION_OF_ORIGIN)]
+    assert rig.mesh.get_total_message_sent() == 1
+    assert rig.routing.get_direction_to_node(5) == 5
 
 
 def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
@@ -176,7 +176,7 @@ def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
             return super().cant_communicate_with_node(node)
 
     antenna = RecordingAntenna()
-    mesh = MeshnetworkRouter(1, antenna, BenchEngine(), Told(), AlwaysHalf())
+    mesh = MeshnetworkRouter(1, antenna, RigEngine(), Told(), AlwaysHalf())
     mesh.start(0.0)
     mesh.on_msg(packet(ASK), 0.0)
     assert told == [("can", 5), ("can", 5)]  # heard, and has taken the answer
@@ -186,209 +186,209 @@ def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
 
 
 def test_broadcasts_do_not_count_as_sent():
-    bench = Bench()
-    bench.mesh.search_other_nodes_in_range()
-    assert bench.mesh.get_total_message_sent() == 0
+    rig = Rig()
+    rig.mesh.search_other_nodes_in_range()
+    assert rig.mesh.get_total_message_sent() == 0
 
 
 @pytest.mark.parametrize("lost", [1, 2])
 def test_a_packet_that_is_lost_is_sent_again_and_costs_no_neighbour(lost):
-    bench = Bench()
-    bench.antenna.losing = lost
-    bench.hear(ASK)
-    assert bench.tried() == [packet(LOCATION_OF_ORIGIN)] * (lost + 1)
-    assert bench.routing.get_set_of_children() == {5}
-    assert bench.mesh.get_total_message_sent() == 1
+    rig = Rig()
+    rig.antenna.losing = lost
+    rig.hear(ASK)
+    assert rig.tried() == [packet(LOCATION_OF_ORIGIN)] * (lost + 1)
+    assert rig.routing.get_set_of_children() == {5}
+    assert rig.mesh.get_total_message_sent() == 1
 
 
 def test_after_three_failures_the_neighbour_is_lost_and_the_others_are_told():
-    bench = Bench()
-    bench.know_neighbour(2, 5, 7)
-    bench.antenna.losing = 3
-    bench.hear(ASK)
-    assert bench.tried(1) == [packet(LOCATION_OF_ORIGIN)] * 3
-    assert bench.sent() == [packet("01 01 05 02 02 05"), packet("01 01 05 07 07 05")]
-    assert bench.routing.get_set_of_children() == {2, 7}
-    assert bench.mesh.get_neighbours().keys() == {2, 7}
-    assert bench.kinds()[-2:] == ["NEIGHBOUR_LOST", "NODE_MISSING"]
+    rig = Rig()
+    rig.know_neighbour(2, 5, 7)
+    rig.antenna.losing = 3
+    rig.hear(ASK)
+    assert rig.tried(1) == [packet(LOCATION_OF_ORIGIN)] * 3
+    assert rig.sent() == [packet("01 01 05 02 02 05"), packet("01 01 05 07 07 05")]
+    assert rig.routing.get_set_of_children() == {2, 7}
+    assert rig.mesh.get_neighbours().keys() == {2, 7}
+    assert rig.kinds()[-2:] == ["NEIGHBOUR_LOST", "NODE_MISSING"]
 
 
 def test_how_often_it_is_tried_is_adjustable():
-    bench = Bench(timing=MeshTiming(send_attempts=5))
-    bench.antenna.dead = {5}
-    bench.hear(ASK)
-    assert bench.tried() == [packet(LOCATION_OF_ORIGIN)] * 5
+    rig = Rig(timing=MeshTiming(send_attempts=5))
+    rig.antenna.dead = {5}
+    rig.hear(ASK)
+    assert rig.tried() == [packet(LOCATION_OF_ORIGIN)] * 5
 
 
 def test_a_lost_neighbour_that_another_one_can_reach_is_not_missing():
     """Its own packet goes on over the next route."""
-    bench = Bench()
-    bench.hear("05 02 00 01 01")
-    bench.antenna.dead = {5}
-    bench.hear(ASK)
-    assert bench.sent() == [packet("01 01 01 02 05")]
-    assert bench.routing.get_direction_to_node(5) == 2
+    rig = Rig()
+    rig.hear("05 02 00 01 01")
+    rig.antenna.dead = {5}
+    rig.hear(ASK)
+    assert rig.sent() == [packet("01 01 01 02 05")]
+    assert rig.routing.get_direction_to_node(5) == 2
 
 
 def test_own_packets_try_every_route():
-    bench = Bench()
+    rig = Rig()
     for child in (2, 3, 4):
-        bench.routing.other_can_communicate_with_node(child, 9)
-    bench.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] in (2, 3)
-    assert bench.mesh.send_heartbeat(9)
-    assert bench.sent(4) == [packet("01 01 04 04 09 00 ff")]
+        rig.routing.other_can_communicate_with_node(child, 9)
+    rig.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] in (2, 3)
+    assert rig.mesh.send_heartbeat(9)
+    assert rig.sent(4) == [packet("01 01 04 04 09 00 ff")]
 
 
 def test_a_heartbeat_without_a_route_is_false_and_sends_nothing():
-    bench = Bench()
-    bench.know_neighbour(2)
-    assert not bench.mesh.send_heartbeat(9)
-    assert bench.tried() == []
+    rig = Rig()
+    rig.know_neighbour(2)
+    assert not rig.mesh.send_heartbeat(9)
+    assert rig.tried() == []
 
 
 def test_a_heartbeat_that_nobody_takes_is_false():
-    bench = Bench()
-    bench.routing.other_can_communicate_with_node(2, 9)
-    bench.antenna.dead = {2}
-    assert not bench.mesh.send_heartbeat(9)
-    assert bench.routing.empty()
+    rig = Rig()
+    rig.routing.other_can_communicate_with_node(2, 9)
+    rig.antenna.dead = {2}
+    assert not rig.mesh.send_heartbeat(9)
+    assert rig.routing.empty()
 
 
 def test_a_neighbour_that_cannot_be_told_is_lost_and_the_rest_learn_of_both():
-    bench = Bench()
-    bench.know_neighbour(2, 3, 5)
-    bench.antenna.dead = {2, 5}
-    bench.hear(ASK)
-    assert bench.sent() == [packet("01 01 05 03 03 05"), packet("01 01 05 03 03 02")]
-    assert bench.routing.get_set_of_children() == {3}
+    rig = Rig()
+    rig.know_neighbour(2, 3, 5)
+    rig.antenna.dead = {2, 5}
+    rig.hear(ASK)
+    assert rig.sent() == [packet("01 01 05 03 03 05"), packet("01 01 05 03 03 02")]
+    assert rig.routing.get_set_of_children() == {3}
 
 
 def test_losing_two_hundred_neighbours_at_once_is_survived():
-    bench = Bench(node_id=253)
+    rig = Rig(node_id=253)
     for node in range(200):
-        bench.routing.can_communicate_with_node(node)
-    bench.antenna.dead = set(range(200))
-    bench.wait_until(5.0)
-    assert bench.routing.empty()
+        rig.routing.can_communicate_with_node(node)
+    rig.antenna.dead = set(range(200))
+    rig.wait_until(5.0)
+    assert rig.routing.empty()
 
 
 # Missing nodes -------------------------------------------------------------------------------
 
 
 def test_a_missing_node_is_dropped_and_told_to_all_but_the_one_that_told():
-    bench = Bench()
-    bench.know_neighbour(3, 4)
-    bench.hear("09 02 00 01 01", "02 02 05 01 01 09")
-    assert bench.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 04 04 09")]
-    assert bench.routing.get_direction_to_node(9) == NO_ROUTE
-    assert bench.routing.get_set_of_children() == {2, 3, 4}
+    rig = Rig()
+    rig.know_neighbour(3, 4)
+    rig.hear("09 02 00 01 01", "02 02 05 01 01 09")
+    assert rig.sent() == [packet("01 01 05 03 03 09"), packet("01 01 05 04 04 09")]
+    assert rig.routing.get_direction_to_node(9) == NO_ROUTE
+    assert rig.routing.get_set_of_children() == {2, 3, 4}
 
 
 def test_a_missing_node_that_was_never_behind_the_teller_is_no_news():
-    bench = Bench()
-    bench.know_neighbour(3)
-    bench.hear("02 02 05 01 01 09")
-    assert bench.sent() == []
+    rig = Rig()
+    rig.know_neighbour(3)
+    rig.hear("02 02 05 01 01 09")
+    assert rig.sent() == []
 
 
 def test_a_missing_node_that_has_another_way_is_not_told_on():
-    bench = Bench()
-    bench.know_neighbour(4)
+    rig = Rig()
+    rig.know_neighbour(4)
     for child in (2, 3):
-        bench.routing.other_can_communicate_with_node(child, 9)
-    bench.hear("02 02 05 01 01 09")
-    assert bench.sent() == []
-    assert bench.routing.get_direction_to_node(9) == 3
+        rig.routing.other_can_communicate_with_node(child, 9)
+    rig.hear("02 02 05 01 01 09")
+    assert rig.sent() == []
+    assert rig.routing.get_direction_to_node(9) == 3
 
 
 def test_a_neighbour_that_is_missing_elsewhere_stays_a_neighbour():
-    bench = Bench()
-    bench.know_neighbour(2, 9)
-    bench.hear("02 02 05 01 01 09")
-    assert bench.sent() == []
-    assert bench.routing.get_direction_to_node(9) == 9
+    rig = Rig()
+    rig.know_neighbour(2, 9)
+    rig.hear("02 02 05 01 01 09")
+    assert rig.sent() == []
+    assert rig.routing.get_direction_to_node(9) == 9
 
 
 @pytest.mark.parametrize("missing", ["01", "fe", "ff"])
 def test_that_this_node_or_no_node_is_missing_is_no_news(missing):
-    bench = Bench()
-    bench.know_neighbour(2, 3)
-    bench.hear(f"02 02 05 01 01 {missing}")
-    assert bench.sent() == []
-    assert bench.routing.get_set_of_children() == {2, 3}
+    rig = Rig()
+    rig.know_neighbour(2, 3)
+    rig.hear(f"02 02 05 01 01 {missing}")
+    assert rig.sent() == []
+    assert rig.routing.get_set_of_children() == {2, 3}
 
 
 # Location ------------------------------------------------------------------------------------
 
 
 def test_the_own_location_is_told_with_whole_metres_of_height_and_whole_seconds():
-    bench = Bench()
-    bench.engine.place = bench.engine.place._replace(latitude=1.5, longitude=-2.0, height=2.6)
-    bench.wait(1.99)
-    bench.hear(ASK)
-    assert bench.sent() == [packet("01 01 01 05 05 00 00 c0 3f 00 00 00 c0 03 00 01 00 00 00")]
+    rig = Rig()
+    rig.engine.place = rig.engine.place._replace(latitude=1.5, longitude=-2.0, height=2.6)
+    rig.wait(1.99)
+    rig.hear(ASK)
+    assert rig.sent() == [packet("01 01 01 05 05 00 00 c0 3f 00 00 00 c0 03 00 01 00 00 00")]
 
 
 def test_a_drone_that_does_not_know_its_place_tells_none():
-    """It does not invent a place (14.6)."""
-    bench = Bench()
-    bench.engine.place = None
-    bench.hear(ASK)
-    assert bench.tried() == []
-    bench.engine.place = BenchEngine().place
-    bench.hear(ASK)
-    assert bench.sent() == [packet("01 01 01 05 05")]
+    """It does not invent a place."""
+    rig = Rig()
+    rig.engine.place = None
+    rig.hear(ASK)
+    assert rig.tried() == []
+    rig.engine.place = RigEngine().place
+    rig.hear(ASK)
+    assert rig.sent() == [packet("01 01 01 05 05")]
 
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf")])
 def test_a_place_that_is_none_is_not_told(number):
-    bench = Bench()
-    bench.engine.place = bench.engine.place._replace(latitude=number)
-    bench.hear(ASK)
-    assert bench.tried() == []
+    rig = Rig()
+    rig.engine.place = rig.engine.place._replace(latitude=number)
+    rig.hear(ASK)
+    assert rig.tried() == []
 
 
 @pytest.mark.parametrize(("height", "on_the_air"), [(40000.0, "ff 7f"), (-40000.0, "00 80")])
 def test_a_height_beyond_the_field_is_its_limit(height, on_the_air):
-    bench = Bench()
-    bench.engine.place = bench.engine.place._replace(height=height)
-    bench.hear(ASK)
-    assert bench.sent() == [packet(f"01 01 01 05 05 00 00 00 00 00 00 00 00 {on_the_air}")]
+    rig = Rig()
+    rig.engine.place = rig.engine.place._replace(height=height)
+    rig.hear(ASK)
+    assert rig.sent() == [packet(f"01 01 01 05 05 00 00 00 00 00 00 00 00 {on_the_air}")]
 
 
 def test_an_answer_goes_the_way_the_question_came_with_the_asker_as_addressee():
-    bench = Bench()
-    bench.hear("09 05 02 01 01")
-    assert bench.sent() == [packet("01 01 01 05 09")]
+    rig = Rig()
+    rig.hear("09 05 02 01 01")
+    assert rig.sent() == [packet("01 01 01 05 09")]
 
 
 # The medium comes back -----------------------------------------------------------------------
 
 
 def test_a_node_that_the_medium_knows_anew_introduces_itself_soon():
-    bench = Bench()
-    bench.mesh.on_antenna_registered(bench.now_s)
-    bench.wait(2.0)
-    assert bench.broadcasts() == [packet("01 01 03 fe fe ff")]
+    rig = Rig()
+    rig.mesh.on_antenna_registered(rig.now_s)
+    rig.wait(2.0)
+    assert rig.broadcasts() == [packet("01 01 03 fe fe ff")]
 
 
 def test_a_node_that_is_switched_on_introduces_itself_soon_and_one_that_is_off_does_not():
-    bench = Bench()
-    bench.antenna.powered = False
-    bench.mesh.on_antenna_power(False, bench.now_s)
-    bench.mesh.on_antenna_registered(bench.now_s)
-    bench.wait(1.0)
-    bench.antenna.powered = True
-    assert bench.broadcasts() == []
-    bench.mesh.on_antenna_power(True, bench.now_s)
-    bench.wait(1.0)
-    assert bench.broadcasts() == [packet("01 01 03 fe fe ff")]
+    rig = Rig()
+    rig.antenna.powered = False
+    rig.mesh.on_antenna_power(False, rig.now_s)
+    rig.mesh.on_antenna_registered(rig.now_s)
+    rig.wait(1.0)
+    rig.antenna.powered = True
+    assert rig.broadcasts() == []
+    rig.mesh.on_antenna_power(True, rig.now_s)
+    rig.wait(1.0)
+    assert rig.broadcasts() == [packet("01 01 03 fe fe ff")]
 
 
 def test_after_the_return_of_the_medium_each_node_waits_for_its_own_part_of_a_second():
-    bench = Bench()
-    bench.mesh.on_antenna_registered(bench.now_s)
-    bench.wait(0.69)
-    assert bench.broadcasts() == []
-    bench.wait(0.02)  # 0.2 s and half a second
-    assert bench.broadcasts() == [packet("01 01 03 fe fe ff")]
+    rig = Rig()
+    rig.mesh.on_antenna_registered(rig.now_s)
+    rig.wait(0.69)
+    assert rig.broadcasts() == []
+    rig.wait(0.02)  # 0.2 s and half a second
+    assert rig.broadcasts() == [packet("01 01 03 fe fe ff")]

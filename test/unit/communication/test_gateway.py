@@ -1,45 +1,45 @@
-"""A gateway answers heartbeats and brings orders into the mesh (reference, section 10)."""
+"""A gateway answers heartbeats and brings orders into the mesh."""
 
 from __future__ import annotations
 
 import logging
 
 import pytest
-from mesh_bench import Bench, packet
+from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 
 
-def gateway_bench(node_id=1):
-    return Bench(node_id=node_id, gateway=True)
+def gateway_rig(node_id=1):
+    return Rig(node_id=node_id, gateway=True)
 
 
 def test_a_gateway_is_connected_to_itself_from_the_start_and_for_ever():
-    bench = gateway_bench()
-    bench.hear("09 02 04 01 01 01 09 00")  # another gateway
-    bench.wait(100.0)
-    bench.mesh.on_antenna_power(False, bench.now_s)
-    assert bench.mesh.get_connected_to_gateway()
-    assert bench.mesh.get_preferred_gateway() == 1
-    assert bench.mesh.get_hops_from_gateway_away() == 0
-    assert bench.mesh.get_route_to_gateway() == 1
+    rig = gateway_rig()
+    rig.hear("09 02 04 01 01 01 09 00")  # another gateway
+    rig.wait(100.0)
+    rig.mesh.on_antenna_power(False, rig.now_s)
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.get_preferred_gateway() == 1
+    assert rig.mesh.get_hops_from_gateway_away() == 0
+    assert rig.mesh.get_route_to_gateway() == 1
 
 
 def test_the_internet_is_connected_at_the_start_and_disconnected_at_the_end():
-    bench = gateway_bench()
-    assert bench.internet.calls == [("connect", bench.mesh)]
-    bench.mesh.stop()
-    assert bench.internet.calls[1:] == [("disconnect",)]
+    rig = gateway_rig()
+    assert rig.internet.calls == [("connect", rig.mesh)]
+    rig.mesh.stop()
+    assert rig.internet.calls[1:] == [("disconnect",)]
 
 
 def test_a_check_maintains_the_routes_and_does_nothing_else():
-    bench = gateway_bench()
-    bench.know_neighbour(2)
-    bench.wait_until(15.0)
-    assert bench.broadcasts() == [packet("01 01 03 fe fe 00 01")] * 2
-    assert bench.tried() == [packet("01 01 04 02 02 01 01 00")] * 2
+    rig = gateway_rig()
+    rig.know_neighbour(2)
+    rig.wait_until(15.0)
+    assert rig.broadcasts() == [packet("01 01 03 fe fe 00 01")] * 2
+    assert rig.tried() == [packet("01 01 04 02 02 01 01 00")] * 2
 
 
 # Answers -------------------------------------------------------------------------------------
@@ -54,101 +54,101 @@ def test_a_check_maintains_the_routes_and_does_nothing_else():
     ],
 )
 def test_the_heartbeat_of_a_router_is_answered_the_way_it_came(heartbeat):
-    bench = gateway_bench()
-    bench.hear(heartbeat)
-    assert bench.sent() == [packet("01 01 04 02 05 01 01 00")]
+    rig = gateway_rig()
+    rig.hear(heartbeat)
+    assert rig.sent() == [packet("01 01 04 02 05 01 01 00")]
 
 
 def test_the_heartbeat_of_a_gateway_is_not_answered():
-    bench = gateway_bench()
-    bench.hear("09 02 04 01 01 01 09 01")
-    assert bench.tried() == []
+    rig = gateway_rig()
+    rig.hear("09 02 04 01 01 01 09 01")
+    assert rig.tried() == []
 
 
 def test_the_introduction_of_a_node_that_knows_no_gateway_is_answered():
-    bench = gateway_bench()
-    bench.hear("05 05 03 01 fe ff 00")
-    assert bench.sent() == [packet("01 01 04 05 05 01 01 00")]
+    rig = gateway_rig()
+    rig.hear("05 05 03 01 fe ff 00")
+    assert rig.sent() == [packet("01 01 04 05 05 01 01 00")]
 
 
 def test_the_introduction_of_a_connected_node_is_not_answered():
-    bench = gateway_bench()
-    bench.hear("05 05 03 01 fe 03 01", "09 09 03 01 fe 00 01")
-    assert bench.tried() == []
+    rig = gateway_rig()
+    rig.hear("05 05 03 01 fe 03 01", "09 09 03 01 fe 00 01")
+    assert rig.tried() == []
 
 
 def test_a_gateway_tells_its_location_when_it_is_asked():
-    bench = gateway_bench()
-    bench.hear("05 02 02 01 01")
-    assert bench.sent() == [packet("01 01 01 02 05")]
+    rig = gateway_rig()
+    rig.hear("05 02 02 01 01")
+    assert rig.sent() == [packet("01 01 01 02 05")]
 
 
 def test_a_gateway_does_not_negotiate():
-    bench = gateway_bench()
-    bench.hear("05 05 07 01 01 00 00 80 3f")
-    bench.wait(4.0)
-    assert bench.tried() == []
-    assert bench.engine.goals == []
+    rig = gateway_rig()
+    rig.hear("05 05 07 01 01 00 00 80 3f")
+    rig.wait(4.0)
+    assert rig.tried() == []
+    assert rig.engine.goals == []
 
 
 def test_a_gateway_forwards_like_any_node():
-    bench = gateway_bench()
-    bench.know_neighbour(9)
-    bench.hear("05 02 04 01 09 00 ff 03")
-    assert bench.sent() == [packet("05 01 04 09 09 00 ff 04")]
+    rig = gateway_rig()
+    rig.know_neighbour(9)
+    rig.hear("05 02 04 01 09 00 ff 03")
+    assert rig.sent() == [packet("05 01 04 09 09 00 ff 04")]
 
 
 # Orders --------------------------------------------------------------------------------------
 
 
 def test_an_order_goes_to_the_next_hop():
-    bench = gateway_bench()
-    bench.hear("05 02 00 01 01")
-    assert bench.mesh.send_goal_request_to_drone(5, 1.5, -2.0, 7, bench.now_s)
-    assert bench.sent() == [packet("01 01 06 02 05 00 00 c0 3f 00 00 00 c0 07 00")]
+    rig = gateway_rig()
+    rig.hear("05 02 00 01 01")
+    assert rig.mesh.send_goal_request_to_drone(5, 1.5, -2.0, 7, rig.now_s)
+    assert rig.sent() == [packet("01 01 06 02 05 00 00 c0 3f 00 00 00 c0 07 00")]
 
 
 def test_an_order_goes_over_another_route_when_the_first_does_not_take_it():
-    bench = gateway_bench()
+    rig = gateway_rig()
     for child in (2, 3):
-        bench.routing.other_can_communicate_with_node(child, 5)
-    bench.antenna.dead = {2}
-    assert bench.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, bench.now_s)
-    assert bench.sent(6) == [packet("01 01 06 03 05")]
+        rig.routing.other_can_communicate_with_node(child, 5)
+    rig.antenna.dead = {2}
+    assert rig.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, rig.now_s)
+    assert rig.sent(6) == [packet("01 01 06 03 05")]
 
 
 def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(caplog):
-    bench = gateway_bench()
-    bench.know_neighbour(2)
+    rig = gateway_rig()
+    rig.know_neighbour(2)
     caplog.clear()
     with caplog.at_level(logging.INFO):
-        assert not bench.mesh.send_goal_request_to_drone(77, 0.0, 0.0, 0, bench.now_s)
+        assert not rig.mesh.send_goal_request_to_drone(77, 0.0, 0.0, 0, rig.now_s)
     assert [record.getMessage() for record in caplog.records] == [
         "gateway 1: no route to drone 77, it stays"
     ]
-    assert bench.tried() == []
-    assert (bench.events[-1].kind.name, bench.events[-1].peer) == ("NO_ROUTE", 77)
+    assert rig.tried() == []
+    assert (rig.events[-1].kind.name, rig.events[-1].peer) == ("NO_ROUTE", 77)
 
 
 def test_an_order_that_nobody_takes_is_false():
-    bench = gateway_bench()
-    bench.know_neighbour(5)
-    bench.antenna.dead = {5}
-    assert not bench.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, bench.now_s)
+    rig = gateway_rig()
+    rig.know_neighbour(5)
+    rig.antenna.dead = {5}
+    assert not rig.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, rig.now_s)
 
 
 def test_an_order_for_its_own_drone_is_flown_and_the_landing_told():
-    bench = gateway_bench()
-    bench.know_neighbour(2)
-    assert bench.mesh.send_goal_request_to_drone(1, 3.0, 4.0, 5, bench.now_s)
-    assert bench.engine.goals == [Location(3.0, 4.0, 5)]
-    assert bench.kinds()[-1] == "FLIGHT_ORDERED"
-    assert bench.tried() == []
-    assert bench.mesh.get_connected_to_gateway()
-    bench.engine.place = Location(3.0, 4.0, 5.0)
-    bench.wait(1.1)
-    assert bench.routing.empty()
-    assert bench.broadcasts() == [packet("01 01 03 fe fe 00 01")]
+    rig = gateway_rig()
+    rig.know_neighbour(2)
+    assert rig.mesh.send_goal_request_to_drone(1, 3.0, 4.0, 5, rig.now_s)
+    assert rig.engine.goals == [Location(3.0, 4.0, 5)]
+    assert rig.kinds()[-1] == "FLIGHT_ORDERED"
+    assert rig.tried() == []
+    assert rig.mesh.get_connected_to_gateway()
+    rig.engine.place = Location(3.0, 4.0, 5.0)
+    rig.wait(1.1)
+    assert rig.routing.empty()
+    assert rig.broadcasts() == [packet("01 01 03 fe fe 00 01")]
 
 
 @pytest.mark.parametrize(
@@ -169,30 +169,30 @@ def test_an_order_for_its_own_drone_is_flown_and_the_landing_told():
     ],
 )
 def test_what_is_no_order_is_refused_with_the_reason(order, why):
-    bench = gateway_bench()
-    bench.know_neighbour(5)
+    rig = gateway_rig()
+    rig.know_neighbour(5)
     with pytest.raises(GoalRefused, match=why):
-        bench.mesh.send_goal_request_to_drone(*order, bench.now_s)
-    assert bench.tried() == []
-    assert bench.engine.goals == []
+        rig.mesh.send_goal_request_to_drone(*order, rig.now_s)
+    assert rig.tried() == []
+    assert rig.engine.goals == []
 
 
 def test_an_order_at_the_bounds_is_taken():
-    bench = gateway_bench()
-    bench.know_neighbour(5)
-    assert bench.mesh.send_goal_request_to_drone(5, 5000.0, -5000.0, 500, bench.now_s)
+    rig = gateway_rig()
+    rig.know_neighbour(5)
+    assert rig.mesh.send_goal_request_to_drone(5, 5000.0, -5000.0, 500, rig.now_s)
 
 
 # What it knows -------------------------------------------------------------------------------
 
 
 def test_a_gateway_learns_all_whose_heartbeats_reach_it_with_their_hops():
-    bench = gateway_bench()
-    bench.now_s = 2.0
-    bench.hear("02 02 04 01 01 00 ff 00", "05 02 04 01 01 00 ff 03", "07 02 00 01 01")
-    bench.now_s = 3.0
-    bench.hear("03 03 00 01 01")
-    assert bench.mesh.get_known_nodes() == [
+    rig = gateway_rig()
+    rig.now_s = 2.0
+    rig.hear("02 02 04 01 01 00 ff 00", "05 02 04 01 01 00 ff 03", "07 02 00 01 01")
+    rig.now_s = 3.0
+    rig.hear("03 03 00 01 01")
+    assert rig.mesh.get_known_nodes() == [
         KnownNode(2, 2, 1, 2.0),
         KnownNode(3, 3, NO_ROUTE, 3.0),
         KnownNode(5, 2, 4, 2.0),
@@ -201,8 +201,8 @@ def test_a_gateway_learns_all_whose_heartbeats_reach_it_with_their_hops():
 
 
 def test_a_node_that_is_lost_is_still_listed_without_a_route():
-    bench = gateway_bench()
-    bench.hear("05 05 04 01 01 00 ff 00")
-    bench.antenna.dead = {5}
-    bench.wait_until(5.0)
-    assert bench.mesh.get_known_nodes() == [KnownNode(5, NO_ROUTE, 1, 0.0)]
+    rig = gateway_rig()
+    rig.hear("05 05 04 01 01 00 ff 00")
+    rig.antenna.dead = {5}
+    rig.wait_until(5.0)
+    assert rig.mesh.get_known_nodes() == [KnownNode(5, NO_ROUTE, 1, 0.0)]

@@ -1,9 +1,9 @@
-"""How a router gets, keeps and judges its connection to a gateway (reference, section 9)."""
+"""How a router gets, keeps and judges its connection to a gateway."""
 
 from __future__ import annotations
 
 import pytest
-from mesh_bench import Bench, packet
+from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 
@@ -12,17 +12,17 @@ ANSWER = "00 00 04 01 01 01 00 00"  # of gateway 0, a neighbour
 INTRODUCTION_1_HOP = "01 01 03 fe fe 01 01"
 
 
-def connected_bench():
-    bench = Bench()
-    bench.connect_to_gateway()
-    return bench
+def connected_rig():
+    rig = Rig()
+    rig.connect_to_gateway()
+    return rig
 
 
 # Becoming connected --------------------------------------------------------------------------
 
 
 def test_a_router_starts_unconnected_with_255_for_what_it_does_not_know():
-    mesh = Bench().mesh
+    mesh = Rig().mesh
     assert not mesh.get_connected_to_gateway()
     assert mesh.get_hops_from_gateway_away() == 255
     assert mesh.get_preferred_gateway() == 255
@@ -33,84 +33,84 @@ def test_a_router_starts_unconnected_with_255_for_what_it_does_not_know():
 
 @pytest.mark.parametrize(("hops", "told"), [(0, 1), (3, 4), (253, 254), (254, 255), (255, 255)])
 def test_a_heartbeat_of_a_gateway_connects_with_one_hop_more_than_it_made(hops, told):
-    bench = Bench()
-    bench.hear(f"09 02 04 01 01 01 09 {hops:02x}")
-    assert bench.mesh.get_connected_to_gateway()
-    assert bench.mesh.get_preferred_gateway() == 9
-    assert bench.mesh.get_hops_from_gateway_away() == told
-    assert bench.mesh.get_route_to_gateway() == 2
+    rig = Rig()
+    rig.hear(f"09 02 04 01 01 01 09 {hops:02x}")
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.get_preferred_gateway() == 9
+    assert rig.mesh.get_hops_from_gateway_away() == told
+    assert rig.mesh.get_route_to_gateway() == 2
 
 
 def test_becoming_connected_introduces_the_node_at_once():
-    bench = Bench()
-    bench.hear(ANSWER)
-    assert bench.broadcasts() == [packet(INTRODUCTION_1_HOP)]
-    assert "CONNECTED" in bench.kinds()
+    rig = Rig()
+    rig.hear(ANSWER)
+    assert rig.broadcasts() == [packet(INTRODUCTION_1_HOP)]
+    assert "CONNECTED" in rig.kinds()
 
 
 def test_staying_connected_is_no_reason_to_introduce_the_node():
-    bench = connected_bench()
-    bench.hear(ANSWER)
-    assert bench.broadcasts() == []
+    rig = connected_rig()
+    rig.hear(ANSWER)
+    assert rig.broadcasts() == []
 
 
 def test_becoming_connected_asks_a_gateway_next_door_for_its_location():
-    bench = Bench()
-    bench.hear(ANSWER)
-    assert bench.sent() == [packet("01 01 02 00 00")]
+    rig = Rig()
+    rig.hear(ANSWER)
+    assert rig.sent() == [packet("01 01 02 00 00")]
 
 
 def test_becoming_connected_asks_the_gateway_and_the_next_hop_for_their_locations():
-    bench = Bench()
-    bench.hear("00 02 04 01 01 01 00 01")
-    assert bench.sent() == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
+    rig = Rig()
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.sent() == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
 
 
 # The check -----------------------------------------------------------------------------------
 
 
 def test_a_connected_router_checks_with_a_heartbeat_to_its_gateway():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.wait_until(5.0)
-    assert bench.sent(HEARTBEAT) == [
+    rig = Rig()
+    rig.connect_through(2)
+    rig.wait_until(5.0)
+    assert rig.sent(HEARTBEAT) == [
         packet("01 01 04 02 02 01"),  # routing maintains its child
         packet("01 01 04 02 00 01"),
     ]
 
 
 def test_a_gateway_that_is_a_neighbour_gets_one_heartbeat_in_a_check():
-    bench = connected_bench()
-    bench.wait_until(5.0)
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 00 00 01")]
+    rig = connected_rig()
+    rig.wait_until(5.0)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 00 00 01")]
 
 
 def test_the_location_of_the_gateway_is_asked_for_until_it_is_known():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.wait_until(5.0)
-    assert packet("01 01 02 02 00") in bench.sent(REQUEST)
-    bench.hear("00 02 04 01 01 01 00 01", "00 02 01 01 01 00 00 80 3f")
-    bench.wait_until(15.0)
-    assert bench.sent(REQUEST) == [packet("01 01 02 02 02")]  # the next hop, in each round
+    rig = Rig()
+    rig.connect_through(2)
+    rig.wait_until(5.0)
+    assert packet("01 01 02 02 00") in rig.sent(REQUEST)
+    rig.hear("00 02 04 01 01 01 00 01", "00 02 01 01 01 00 00 80 3f")
+    rig.wait_until(15.0)
+    assert rig.sent(REQUEST) == [packet("01 01 02 02 02")]  # the next hop, in each round
 
 
 @pytest.mark.parametrize("neighbour", [0, 2], ids=["gateway", "router"])
 def test_the_location_of_the_next_hop_is_asked_for_in_each_round(neighbour):
-    bench = Bench()
-    bench.connect_through(neighbour, hops=0)
+    rig = Rig()
+    rig.connect_through(neighbour, hops=0)
     for check_s in (5.0, 15.0, 25.0):
-        bench.wait_until(check_s)
-        assert packet(f"01 01 02 0{neighbour} 0{neighbour}") in bench.sent(REQUEST)
-        bench.hear(f"00 0{neighbour} 04 01 01 01 00 00", "00 02 01 01 01 00 00 80 3f")
+        rig.wait_until(check_s)
+        assert packet(f"01 01 02 0{neighbour} 0{neighbour}") in rig.sent(REQUEST)
+        rig.hear(f"00 0{neighbour} 04 01 01 01 00 00", "00 02 01 01 01 00 00 80 3f")
 
 
 def test_a_check_finds_an_antenna_that_is_off_and_does_nothing_but_disconnect():
-    bench = connected_bench()
-    bench.antenna.powered = False
-    bench.wait_until(5.0)
-    assert not bench.mesh.get_connected_to_gateway()
-    assert (bench.tried(), bench.broadcasts()) == ([], [])
+    rig = connected_rig()
+    rig.antenna.powered = False
+    rig.wait_until(5.0)
+    assert not rig.mesh.get_connected_to_gateway()
+    assert (rig.tried(), rig.broadcasts()) == ([], [])
 
 
 # Waiting for the answer ----------------------------------------------------------------------
@@ -118,143 +118,143 @@ def test_a_check_finds_an_antenna_that_is_off_and_does_nothing_but_disconnect():
 
 def test_a_heartbeat_says_that_its_creator_is_connected_and_to_whom():
     """The flag is noted for the packet before it becomes false."""
-    bench = connected_bench()
-    assert bench.mesh.send_heartbeat(0)
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 00 00 01 00 00")]
+    rig = connected_rig()
+    assert rig.mesh.send_heartbeat(0)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 00 00 01 00 00")]
 
 
 def test_a_heartbeat_that_is_not_answered_ends_the_connection():
-    bench = connected_bench()
-    bench.mesh.send_heartbeat(0)
-    bench.wait(0.6)
-    assert not bench.mesh.get_connected_to_gateway()
-    assert bench.kinds()[-1] == "DISCONNECTED"
+    rig = connected_rig()
+    rig.mesh.send_heartbeat(0)
+    rig.wait(0.6)
+    assert not rig.mesh.get_connected_to_gateway()
+    assert rig.kinds()[-1] == "DISCONNECTED"
 
 
 def test_a_heartbeat_that_is_answered_keeps_the_connection():
-    bench = connected_bench()
-    bench.mesh.send_heartbeat(0)
-    bench.wait(0.1)
-    bench.hear(ANSWER)
-    bench.wait(4.0)
-    assert bench.mesh.get_connected_to_gateway()
-    assert "DISCONNECTED" not in bench.kinds()
+    rig = connected_rig()
+    rig.mesh.send_heartbeat(0)
+    rig.wait(0.1)
+    rig.hear(ANSWER)
+    rig.wait(4.0)
+    assert rig.mesh.get_connected_to_gateway()
+    assert "DISCONNECTED" not in rig.kinds()
 
 
 def test_an_answer_after_more_than_half_a_second_connects_again():
-    bench = connected_bench()
-    bench.mesh.send_heartbeat(0)
-    bench.wait(0.7)
-    bench.hear(ANSWER)
-    assert bench.mesh.get_connected_to_gateway()
-    assert bench.mesh.get_hops_from_gateway_away() == 1
+    rig = connected_rig()
+    rig.mesh.send_heartbeat(0)
+    rig.wait(0.7)
+    rig.hear(ANSWER)
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.get_hops_from_gateway_away() == 1
 
 
 def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
     """Introduced, and the places asked for: the first question may have been lost with it."""
-    bench = Bench()
-    bench.connect_through(2)
-    bench.mesh.send_heartbeat(0)
-    bench.wait(0.7)
-    bench.forget()
-    bench.hear("00 02 04 01 01 01 00 01")
-    assert bench.broadcasts() == [packet("01 01 03 fe fe 02 01")]
-    assert bench.sent(REQUEST) == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
+    rig = Rig()
+    rig.connect_through(2)
+    rig.mesh.send_heartbeat(0)
+    rig.wait(0.7)
+    rig.forget()
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.broadcasts() == [packet("01 01 03 fe fe 02 01")]
+    assert rig.sent(REQUEST) == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
 
 
 def test_a_heartbeat_that_nobody_takes_ends_the_connection_at_once():
-    bench = connected_bench()
-    bench.antenna.dead = {0}
-    assert not bench.mesh.send_heartbeat(0)
-    assert not bench.mesh.get_connected_to_gateway()
+    rig = connected_rig()
+    rig.antenna.dead = {0}
+    assert not rig.mesh.send_heartbeat(0)
+    assert not rig.mesh.get_connected_to_gateway()
 
 
 def test_waiting_for_an_answer_does_not_touch_the_hops():
-    bench = connected_bench()
-    bench.mesh.send_heartbeat(0)
-    bench.wait(0.6)
-    assert bench.mesh.get_hops_from_gateway_away() == 1
+    rig = connected_rig()
+    rig.mesh.send_heartbeat(0)
+    rig.wait(0.6)
+    assert rig.mesh.get_hops_from_gateway_away() == 1
 
 
 def test_a_heartbeat_to_another_node_does_not_touch_the_connection():
-    bench = connected_bench()
-    bench.know_neighbour(2)
-    bench.mesh.send_heartbeat(2)
-    bench.wait(0.6)
-    assert bench.mesh.get_connected_to_gateway()
+    rig = connected_rig()
+    rig.know_neighbour(2)
+    rig.mesh.send_heartbeat(2)
+    rig.wait(0.6)
+    assert rig.mesh.get_connected_to_gateway()
 
 
 def test_one_heartbeat_to_the_gateway_is_under_way_within_half_a_second():
-    bench = connected_bench()
-    bench.mesh.send_heartbeat(0)
-    bench.wait(0.4)
-    assert bench.mesh.send_heartbeat(0)
-    assert len(bench.sent(HEARTBEAT)) == 1
-    bench.wait(0.2)
-    bench.mesh.send_heartbeat(0)
-    assert len(bench.sent(HEARTBEAT)) == 1
+    rig = connected_rig()
+    rig.mesh.send_heartbeat(0)
+    rig.wait(0.4)
+    assert rig.mesh.send_heartbeat(0)
+    assert len(rig.sent(HEARTBEAT)) == 1
+    rig.wait(0.2)
+    rig.mesh.send_heartbeat(0)
+    assert len(rig.sent(HEARTBEAT)) == 1
 
 
 def test_waiting_for_the_first_answer_is_not_being_connected():
-    bench = Bench()
-    bench.hear("02 02 04 01 01 01 00 00")
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 02 00 00 00 00")]
-    assert not bench.mesh.get_connected_to_gateway()
-    bench.mesh.search_other_nodes_in_range()
-    assert bench.broadcasts() == [packet("01 01 03 fe fe ff 00")]
-    bench.hear("03 03 04 01 01 00 ff 00")  # knows none: there is nothing to tell it
-    assert bench.sent() == []
+    rig = Rig()
+    rig.hear("02 02 04 01 01 01 00 00")
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 00 00 00")]
+    assert not rig.mesh.get_connected_to_gateway()
+    rig.mesh.search_other_nodes_in_range()
+    assert rig.broadcasts() == [packet("01 01 03 fe fe ff 00")]
+    rig.hear("03 03 04 01 01 00 ff 00")  # knows none: there is nothing to tell it
+    assert rig.sent() == []
 
 
 def test_while_the_first_answer_is_waited_for_no_other_offer_is_taken():
-    bench = Bench()
-    bench.hear("02 02 04 01 01 01 00 00")
-    bench.forget()
-    bench.hear("03 03 03 01 fe 02 01", "03 03 04 01 01 01 09 00")
-    assert bench.tried() == []
-    assert bench.mesh.get_preferred_gateway() == 0
-    bench.wait(0.6)
-    bench.hear("03 03 04 01 01 01 09 00")
-    assert bench.mesh.get_preferred_gateway() == 9
+    rig = Rig()
+    rig.hear("02 02 04 01 01 01 00 00")
+    rig.forget()
+    rig.hear("03 03 03 01 fe 02 01", "03 03 04 01 01 01 09 00")
+    assert rig.tried() == []
+    assert rig.mesh.get_preferred_gateway() == 0
+    rig.wait(0.6)
+    rig.hear("03 03 04 01 01 01 09 00")
+    assert rig.mesh.get_preferred_gateway() == 9
 
 
 def test_a_check_while_the_first_answer_is_waited_for_does_not_drop_the_way():
-    bench = Bench()
-    bench.wait_until(4.8)
-    bench.hear("02 02 04 01 01 01 00 00")
-    bench.wait_until(5.1)
-    assert bench.sent(5) == []
-    assert bench.mesh.get_route_to_gateway() == 2
-    bench.hear("00 02 04 01 01 01 00 01")
-    assert bench.mesh.get_connected_to_gateway()
+    rig = Rig()
+    rig.wait_until(4.8)
+    rig.hear("02 02 04 01 01 01 00 00")
+    rig.wait_until(5.1)
+    assert rig.sent(5) == []
+    assert rig.mesh.get_route_to_gateway() == 2
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_connected_to_gateway()
 
 
 # Heartbeats of routers -----------------------------------------------------------------------
 
 
 def test_a_router_that_knows_no_gateway_gets_a_heartbeat_back():
-    bench = connected_bench()
-    bench.hear("05 02 04 01 01 00 ff 01")
-    assert bench.sent() == [packet("01 01 04 02 05 01 00 00")]
+    rig = connected_rig()
+    rig.hear("05 02 04 01 01 00 ff 01")
+    assert rig.sent() == [packet("01 01 04 02 05 01 00 00")]
 
 
 def test_the_gateway_of_a_router_is_taken_and_tried():
-    bench = Bench()
-    bench.hear("02 02 04 01 01 01 09 00")
-    assert bench.mesh.get_preferred_gateway() == 9
-    assert bench.mesh.get_route_to_gateway() == 2
-    assert bench.sent() == [packet("01 01 04 02 09 00 09 00")]
+    rig = Rig()
+    rig.hear("02 02 04 01 01 01 09 00")
+    assert rig.mesh.get_preferred_gateway() == 9
+    assert rig.mesh.get_route_to_gateway() == 2
+    assert rig.sent() == [packet("01 01 04 02 09 00 09 00")]
 
 
 def test_taking_a_gateway_drops_every_other_entry_for_it():
-    bench = Bench()
-    bench.know_neighbour(9)
-    bench.hear("09 03 00 01 01")
-    bench.routing.other_can_communicate_with_node(3, 9)
-    bench.hear("02 02 04 01 01 01 09 00")
-    assert bench.routing.get_direction_to_node(9) == 2
-    assert bench.routing.other_cant_communicate_with_node(2, 9) == 1  # the last way
-    assert bench.sent() == [packet("01 01 04 02 09 00 09 00")]
+    rig = Rig()
+    rig.know_neighbour(9)
+    rig.hear("09 03 00 01 01")
+    rig.routing.other_can_communicate_with_node(3, 9)
+    rig.hear("02 02 04 01 01 01 09 00")
+    assert rig.routing.get_direction_to_node(9) == 2
+    assert rig.routing.other_cant_communicate_with_node(2, 9) == 1  # the last way
+    assert rig.sent() == [packet("01 01 04 02 09 00 09 00")]
 
 
 @pytest.mark.parametrize(
@@ -265,156 +265,156 @@ def test_taking_a_gateway_drops_every_other_entry_for_it():
     ],
 )
 def test_the_heartbeat_of_a_connected_router_tells_a_connected_one_nothing(heartbeat):
-    bench = connected_bench()
-    bench.hear(heartbeat)
-    assert bench.tried() == []
-    assert bench.mesh.get_preferred_gateway() == 0
+    rig = connected_rig()
+    rig.hear(heartbeat)
+    assert rig.tried() == []
+    assert rig.mesh.get_preferred_gateway() == 0
 
 
 def test_two_unconnected_routers_tell_each_other_nothing():
-    bench = Bench()
-    bench.hear("02 02 04 01 01 00 ff 00", "03 03 04 01 01 00 09 00")
-    assert bench.tried() == []
-    assert bench.mesh.get_preferred_gateway() == 255
+    rig = Rig()
+    rig.hear("02 02 04 01 01 00 ff 00", "03 03 04 01 01 00 09 00")
+    assert rig.tried() == []
+    assert rig.mesh.get_preferred_gateway() == 255
 
 
 @pytest.mark.parametrize("gateway", ["01", "fe", "ff"])
 def test_a_gateway_that_cannot_be_one_is_not_taken(gateway):
-    bench = Bench()
-    bench.hear(f"02 02 04 01 01 01 {gateway} 00")
-    assert bench.tried() == []
-    assert bench.mesh.get_preferred_gateway() == 255
+    rig = Rig()
+    rig.hear(f"02 02 04 01 01 01 {gateway} 00")
+    assert rig.tried() == []
+    assert rig.mesh.get_preferred_gateway() == 255
 
 
 def test_a_router_does_not_become_its_own_gateway():
-    bench = Bench()
-    bench.hear("01 02 04 01 01 01 01 00")
-    assert not bench.mesh.get_connected_to_gateway()
-    assert bench.mesh.get_preferred_gateway() == 255
+    rig = Rig()
+    rig.hear("01 02 04 01 01 01 01 00")
+    assert not rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.get_preferred_gateway() == 255
 
 
 # Introductions -------------------------------------------------------------------------------
 
 
 def test_a_connected_router_answers_the_introduction_of_one_that_is_not():
-    bench = connected_bench()
-    bench.hear("02 02 03 01 fe ff 00")
-    assert bench.sent() == [packet("01 01 04 02 02 01 00 00")]
+    rig = connected_rig()
+    rig.hear("02 02 03 01 fe ff 00")
+    assert rig.sent() == [packet("01 01 04 02 02 01 00 00")]
 
 
 def test_an_unconnected_router_answers_the_introduction_of_one_that_is():
-    bench = Bench()
-    bench.hear("02 02 03 01 fe 03 01")
-    assert bench.sent() == [packet("01 01 04 02 02 00 ff 00")]
+    rig = Rig()
+    rig.hear("02 02 03 01 fe 03 01")
+    assert rig.sent() == [packet("01 01 04 02 02 00 ff 00")]
 
 
 def test_a_router_that_waits_for_its_gateway_does_not_answer_one_that_is_connected():
-    bench = connected_bench()
-    bench.know_neighbour(2)
-    bench.mesh.send_heartbeat(0)
-    bench.forget()
-    bench.hear("02 02 03 01 fe 03 01")
-    assert bench.tried() == []
+    rig = connected_rig()
+    rig.know_neighbour(2)
+    rig.mesh.send_heartbeat(0)
+    rig.forget()
+    rig.hear("02 02 03 01 fe 03 01")
+    assert rig.tried() == []
 
 
 def test_introductions_among_connected_and_among_unconnected_are_not_answered():
-    bench = connected_bench()
-    bench.hear("02 02 03 01 fe 03 01")
-    assert bench.tried() == []
-    bench = Bench()
-    bench.hear("02 02 03 01 fe ff 00")
-    assert bench.tried() == []
+    rig = connected_rig()
+    rig.hear("02 02 03 01 fe 03 01")
+    assert rig.tried() == []
+    rig = Rig()
+    rig.hear("02 02 03 01 fe ff 00")
+    assert rig.tried() == []
 
 
 # Shortcuts -----------------------------------------------------------------------------------
 
 
 def test_the_next_heartbeat_tries_a_neighbour_with_fewer_hops():
-    bench = Bench()
-    bench.connect_through(2, hops=4)
-    bench.hear("03 03 03 01 fe 02 01")
-    bench.mesh.send_heartbeat(0)
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00 00")]
-    bench.hear("00 03 04 01 01 01 00 02")
-    assert bench.mesh.get_hops_from_gateway_away() == 3
-    assert bench.mesh.get_route_to_gateway() == 3
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear("03 03 03 01 fe 02 01")
+    rig.mesh.send_heartbeat(0)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00 00")]
+    rig.hear("00 03 04 01 01 01 00 02")
+    assert rig.mesh.get_hops_from_gateway_away() == 3
+    assert rig.mesh.get_route_to_gateway() == 3
 
 
 def test_the_neighbour_with_the_fewest_hops_is_tried():
-    bench = Bench()
-    bench.connect_through(2, hops=4)
-    bench.hear("03 03 03 01 fe 03 01", "04 04 03 01 fe 01 01", "05 05 03 01 fe 02 01")
-    bench.mesh.send_heartbeat(0)
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 04 00 01 00 00")]
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear("03 03 03 01 fe 03 01", "04 04 03 01 fe 01 01", "05 05 03 01 fe 02 01")
+    rig.mesh.send_heartbeat(0)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 04 00 01 00 00")]
 
 
 @pytest.mark.parametrize("hops", ["04", "05", "fe", "ff"])
 def test_a_neighbour_that_would_not_make_the_way_shorter_is_not_tried(hops):
-    bench = Bench()
-    bench.connect_through(2, hops=4)
-    bench.hear(f"03 03 03 01 fe {hops} 01")
-    bench.mesh.send_heartbeat(0)
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear(f"03 03 03 01 fe {hops} 01")
+    rig.mesh.send_heartbeat(0)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
 def test_an_introduction_counts_for_one_heartbeat():
-    bench = Bench()
-    bench.connect_through(2, hops=4)
-    bench.hear("03 03 03 01 fe 02 01")
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear("03 03 03 01 fe 02 01")
     for next_hop in (3, 2):
-        bench.forget()
-        bench.mesh.send_heartbeat(0)
-        assert bench.sent(HEARTBEAT) == [packet(f"01 01 04 0{next_hop} 00 01 00 00")]
-        bench.wait(0.1)
-        bench.hear("00 02 04 01 01 01 00 04")
-        bench.wait(0.5)
+        rig.forget()
+        rig.mesh.send_heartbeat(0)
+        assert rig.sent(HEARTBEAT) == [packet(f"01 01 04 0{next_hop} 00 01 00 00")]
+        rig.wait(0.1)
+        rig.hear("00 02 04 01 01 01 00 04")
+        rig.wait(0.5)
 
 
 def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():
-    bench = Bench()
-    bench.connect_through(2, hops=4)
-    bench.hear("03 03 03 01 fe 02 01")
-    bench.antenna.dead = {3}
-    assert bench.mesh.send_heartbeat(0)
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear("03 03 03 01 fe 02 01")
+    rig.antenna.dead = {3}
+    assert rig.mesh.send_heartbeat(0)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
 def test_only_a_neighbour_can_be_a_shortcut():
     """What passed on the introduction of somebody else, or of this node, is no way."""
     for creator in ("05", "01"):
-        bench = Bench()
-        bench.connect_through(2, hops=4)
-        bench.hear(f"{creator} 03 03 01 fe 01 01")
-        bench.mesh.send_heartbeat(0)
-        assert bench.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
+        rig = Rig()
+        rig.connect_through(2, hops=4)
+        rig.hear(f"{creator} 03 03 01 fe 01 01")
+        rig.mesh.send_heartbeat(0)
+        assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
 def test_a_neighbour_that_is_nearer_to_another_gateway_is_a_way_to_that_one_alone():
     """Its few hops say nothing of the own gateway: that heartbeat goes the usual way."""
-    bench = Bench()
-    bench.connect_through(2, hops=4)
-    bench.hear("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
-    bench.mesh.send_heartbeat(0)
-    assert bench.sent(HEARTBEAT) == [
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
+    rig.mesh.send_heartbeat(0)
+    assert rig.sent(HEARTBEAT) == [
         packet("01 01 04 03 09 01 00 00"),
         packet("01 01 04 02 00 01 00 00"),
     ]
-    bench.hear("09 03 04 01 01 01 09 02")
-    assert bench.mesh.get_preferred_gateway() == 9
-    assert bench.mesh.get_hops_from_gateway_away() == 3
-    bench.hear("00 02 04 01 01 01 00 04")
-    assert bench.mesh.get_preferred_gateway() == 9
+    rig.hear("09 03 04 01 01 01 09 02")
+    assert rig.mesh.get_preferred_gateway() == 9
+    assert rig.mesh.get_hops_from_gateway_away() == 3
+    rig.hear("00 02 04 01 01 01 00 04")
+    assert rig.mesh.get_preferred_gateway() == 9
 
 
 def test_a_shortcut_of_before_the_connection_was_lost_is_none():
-    bench = Bench()
-    bench.connect_through(2, hops=4)
-    bench.mesh.send_heartbeat(0)
-    bench.hear("03 03 03 01 fe 02 01")
-    bench.wait_until(5.0)
-    bench.forget()
-    bench.hear("02 02 04 01 01 01 00 00")
-    assert bench.sent(HEARTBEAT) == [packet("01 01 04 02 00 00 00 00")]
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.mesh.send_heartbeat(0)
+    rig.hear("03 03 03 01 fe 02 01")
+    rig.wait_until(5.0)
+    rig.forget()
+    rig.hear("02 02 04 01 01 01 00 00")
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 00 00 00")]
 
 
 # Several gateways ----------------------------------------------------------------------------
@@ -424,84 +424,84 @@ def test_a_shortcut_of_before_the_connection_was_lost_is_none():
     ("hops", "preferred"), [("00", 9), ("01", 9), ("02", 0), ("03", 0), ("fe", 0)]
 )
 def test_a_connected_router_changes_its_gateway_only_for_fewer_hops(hops, preferred):
-    bench = Bench()
-    bench.connect_through(2, hops=2)
-    bench.hear(f"09 03 04 01 01 01 09 {hops}")
-    assert bench.mesh.get_preferred_gateway() == preferred
-    assert bench.mesh.get_hops_from_gateway_away() == (int(hops, 16) + 1 if preferred else 3)
+    rig = Rig()
+    rig.connect_through(2, hops=2)
+    rig.hear(f"09 03 04 01 01 01 09 {hops}")
+    assert rig.mesh.get_preferred_gateway() == preferred
+    assert rig.mesh.get_hops_from_gateway_away() == (int(hops, 16) + 1 if preferred else 3)
 
 
 def test_the_own_gateway_is_believed_whatever_it_says():
-    bench = Bench()
-    bench.connect_through(2, hops=2)
-    bench.hear("00 03 04 01 01 01 00 07")
-    assert bench.mesh.get_hops_from_gateway_away() == 8
+    rig = Rig()
+    rig.connect_through(2, hops=2)
+    rig.hear("00 03 04 01 01 01 00 07")
+    assert rig.mesh.get_hops_from_gateway_away() == 8
 
 
 def test_within_a_period_of_the_last_answer_a_lost_gateway_is_not_given_up_for_a_far_one():
-    bench = Bench()
-    bench.connect_through(2, hops=2)
-    bench.mesh.send_heartbeat(0)
-    bench.wait(1.0)
-    assert not bench.mesh.get_connected_to_gateway()
-    bench.hear("09 03 04 01 01 01 09 02")
-    assert bench.mesh.get_preferred_gateway() == 0
-    bench.wait(9.5)
-    bench.hear("09 03 04 01 01 01 09 02")
-    assert bench.mesh.get_preferred_gateway() == 9
-    assert bench.mesh.get_connected_to_gateway()
+    rig = Rig()
+    rig.connect_through(2, hops=2)
+    rig.mesh.send_heartbeat(0)
+    rig.wait(1.0)
+    assert not rig.mesh.get_connected_to_gateway()
+    rig.hear("09 03 04 01 01 01 09 02")
+    assert rig.mesh.get_preferred_gateway() == 0
+    rig.wait(9.5)
+    rig.hear("09 03 04 01 01 01 09 02")
+    assert rig.mesh.get_preferred_gateway() == 9
+    assert rig.mesh.get_connected_to_gateway()
 
 
 def test_an_unconnected_router_takes_the_first_gateway_that_answers():
-    bench = Bench()
-    bench.hear("09 03 04 01 01 01 09 20")
-    assert bench.mesh.get_preferred_gateway() == 9
+    rig = Rig()
+    rig.hear("09 03 04 01 01 01 09 20")
+    assert rig.mesh.get_preferred_gateway() == 9
 
 
 def test_another_gateway_has_another_location():
-    bench = Bench()
-    bench.connect_through(2, hops=2)
-    bench.hear("00 02 01 01 01 00 00 80 3f", "09 03 04 01 01 01 09 01")
-    bench.forget()
-    bench.wait_until(5.0)
-    assert packet("01 01 02 03 09") in bench.sent(REQUEST)
+    rig = Rig()
+    rig.connect_through(2, hops=2)
+    rig.hear("00 02 01 01 01 00 00 80 3f", "09 03 04 01 01 01 09 01")
+    rig.forget()
+    rig.wait_until(5.0)
+    assert packet("01 01 02 03 09") in rig.sent(REQUEST)
 
 
 # Power ---------------------------------------------------------------------------------------
 
 
 def test_switching_off_disconnects_at_once():
-    bench = connected_bench()
-    bench.antenna.powered = False
-    bench.mesh.on_antenna_power(False, bench.now_s)
-    assert not bench.mesh.get_connected_to_gateway()
-    assert bench.mesh.get_hops_from_gateway_away() == 255
-    bench.wait(60.0)
-    assert (bench.tried(), bench.broadcasts(), bench.engine.goals) == ([], [], [])
+    rig = connected_rig()
+    rig.antenna.powered = False
+    rig.mesh.on_antenna_power(False, rig.now_s)
+    assert not rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.get_hops_from_gateway_away() == 255
+    rig.wait(60.0)
+    assert (rig.tried(), rig.broadcasts(), rig.engine.goals) == ([], [], [])
 
 
 def test_switching_off_while_waiting_for_an_answer_disconnects_at_once():
-    bench = connected_bench()
-    bench.mesh.send_heartbeat(0)
-    bench.mesh.on_antenna_power(False, bench.now_s)
-    assert not bench.mesh.get_connected_to_gateway()
+    rig = connected_rig()
+    rig.mesh.send_heartbeat(0)
+    rig.mesh.on_antenna_power(False, rig.now_s)
+    assert not rig.mesh.get_connected_to_gateway()
 
 
 def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
-    bench = Bench()
-    bench.hear("02 02 01 01 01 00 00 80 3f")
-    bench.antenna.dead = {2}
-    bench.wait_until(16.0)  # the timer runs since 5 s
-    bench.antenna.powered = False
-    bench.mesh.on_antenna_power(False, bench.now_s)
-    bench.wait_until(30.0)
-    bench.antenna.powered = True
-    bench.mesh.on_antenna_power(True, bench.now_s)
-    bench.wait_until(64.0)  # at 35 s it starts anew
-    assert bench.engine.goals == []
-    bench.wait_until(66.0)
-    assert len(bench.engine.goals) == 1
+    rig = Rig()
+    rig.hear("02 02 01 01 01 00 00 80 3f")
+    rig.antenna.dead = {2}
+    rig.wait_until(16.0)  # the timer runs since 5 s
+    rig.antenna.powered = False
+    rig.mesh.on_antenna_power(False, rig.now_s)
+    rig.wait_until(30.0)
+    rig.antenna.powered = True
+    rig.mesh.on_antenna_power(True, rig.now_s)
+    rig.wait_until(64.0)  # at 35 s it starts anew
+    assert rig.engine.goals == []
+    rig.wait_until(66.0)
+    assert len(rig.engine.goals) == 1
 
 
 def test_a_router_that_was_never_connected_knows_no_way_to_a_gateway():
-    assert Bench().mesh.get_route_to_gateway() == NO_ROUTE
+    assert Rig().mesh.get_route_to_gateway() == NO_ROUTE

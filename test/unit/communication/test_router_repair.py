@@ -1,11 +1,11 @@
-"""What a router does about a lost connection: wait, negotiate, fly back (reference, section 9)."""
+"""What a router does about a lost connection: wait, negotiate, fly back."""
 
 from __future__ import annotations
 
 import struct
 
 import pytest
-from mesh_bench import Bench, packet
+from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.timing import MeshTiming
@@ -29,174 +29,174 @@ def own_bid(to: int, score: float) -> bytes:
     return (bytes((1, 1, BID, to, to)) + struct.pack("<f", score)).ljust(32, b"\0")
 
 
-def lone_bench():
+def lone_rig():
     """Connected through 2 to gateway 0, whose place is (0, 4); 2 stands at (0, 8). Then 2 dies.
 
     The check at 5 s notices, the one at 15 s starts the timer, that at EMERGENCY_S acts.
     """
-    bench = Bench()
-    bench.engine.place = Location(12.0, 0.0, 0.0)
-    bench.connect_through(2)
-    bench.hear("00 02 01 01 01 00 00 80 40", NEIGHBOUR_2_AT_0_8)
-    assert bench.mesh.get_last_good_known_location_id() == 2
-    bench.antenna.dead = {2}
-    return bench
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 40", NEIGHBOUR_2_AT_0_8)
+    assert rig.mesh.get_last_good_known_location_id() == 2
+    rig.antenna.dead = {2}
+    return rig
 
 
-def group_bench(*neighbours):
+def group_rig(*neighbours):
     """As above, and among unconnected neighbours that live on."""
-    bench = lone_bench()
-    bench.know_neighbour(*neighbours)
-    return bench
+    rig = lone_rig()
+    rig.know_neighbour(*neighbours)
+    return rig
 
 
-def fly(bench, place):
+def fly(rig, place):
     """One second of flight."""
-    bench.engine.place = place
-    bench.wait(1.0)
+    rig.engine.place = place
+    rig.wait(1.0)
 
 
 # The place to step back to -------------------------------------------------------------------
 
 
 def test_the_place_of_the_next_hop_is_the_one_to_step_back_to():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear(NEIGHBOUR_2_AT_0_8, "00 02 01 01 01 00 00 80 40")
-    assert bench.mesh.get_last_good_known_location_id() == 2
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(NEIGHBOUR_2_AT_0_8, "00 02 01 01 01 00 00 80 40")
+    assert rig.mesh.get_last_good_known_location_id() == 2
 
 
 def test_it_is_the_gateways_when_that_is_the_next_hop():
-    bench = Bench()
-    bench.connect_to_gateway()
-    bench.hear(GATEWAY_AT_0_4)
-    assert bench.mesh.get_last_good_known_location_id() == 0
+    rig = Rig()
+    rig.connect_to_gateway()
+    rig.hear(GATEWAY_AT_0_4)
+    assert rig.mesh.get_last_good_known_location_id() == 0
 
 
 def test_it_is_unknown_until_somebody_told():
-    bench = Bench()
-    bench.connect_through(2)
-    assert bench.mesh.get_last_good_known_location_id() == 255
+    rig = Rig()
+    rig.connect_through(2)
+    assert rig.mesh.get_last_good_known_location_id() == 255
 
 
 # Flight --------------------------------------------------------------------------------------
 
 
 def test_an_order_is_flown_and_ends_the_connection():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear(GATEWAY_AT_0_4, NEIGHBOUR_2_AT_0_8, "00 02 06 01 01 00 00 80 3f 00 00 00 c0 07 00")
-    assert bench.engine.goals == [Location(1.0, -2.0, 7)]
-    assert not bench.mesh.get_connected_to_gateway()
-    assert bench.mesh.get_hops_from_gateway_away() == 255
-    assert bench.mesh.get_last_good_known_location_id() == 0
-    assert "FLIGHT_ORDERED" in bench.kinds()
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(GATEWAY_AT_0_4, NEIGHBOUR_2_AT_0_8, "00 02 06 01 01 00 00 80 3f 00 00 00 c0 07 00")
+    assert rig.engine.goals == [Location(1.0, -2.0, 7)]
+    assert not rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.get_hops_from_gateway_away() == 255
+    assert rig.mesh.get_last_good_known_location_id() == 0
+    assert "FLIGHT_ORDERED" in rig.kinds()
 
 
 def test_a_drone_that_knows_no_gateway_location_has_no_place_to_step_back_to_after_an_order():
-    bench = Bench()
-    bench.hear(NEIGHBOUR_2_AT_0_8, "02 02 06 01 01 00 00 80 3f")
-    assert bench.mesh.get_last_good_known_location_id() == 255
+    rig = Rig()
+    rig.hear(NEIGHBOUR_2_AT_0_8, "02 02 06 01 01 00 00 80 3f")
+    assert rig.mesh.get_last_good_known_location_id() == 255
 
 
 def test_an_ordered_flight_keeps_the_routes_until_the_landing():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear("00 02 06 01 01 00 00 a0 41")
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("00 02 06 01 01 00 00 a0 41")
     for latitude in (1.0, 8.0, 15.0):
-        fly(bench, Location(latitude, 0.0, 0.0))
-        assert bench.routing.get_set_of_children() == {2}
-    fly(bench, Location(20.0, 0.0, 0.0))
-    assert bench.routing.empty()
-    assert bench.mesh.get_neighbours() == {}
+        fly(rig, Location(latitude, 0.0, 0.0))
+        assert rig.routing.get_set_of_children() == {2}
+    fly(rig, Location(20.0, 0.0, 0.0))
+    assert rig.routing.empty()
+    assert rig.mesh.get_neighbours() == {}
 
 
 def test_it_has_landed_within_a_tenth_of_a_metre_of_the_goal_and_then_introduces_itself():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear("00 02 06 01 01 00 00 a0 41")
-    bench.forget()
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("00 02 06 01 01 00 00 a0 41")
+    rig.forget()
     for latitude in (2.0, 10.0, 19.89):
-        fly(bench, Location(latitude, 0.0, 0.0))
-        assert "LANDED" not in bench.kinds()
-    fly(bench, Location(19.91, 0.0, 0.0))
-    assert "LANDED" in bench.kinds()
-    assert bench.broadcasts() == [packet("01 01 03 fe fe ff 00")]
+        fly(rig, Location(latitude, 0.0, 0.0))
+        assert "LANDED" not in rig.kinds()
+    fly(rig, Location(19.91, 0.0, 0.0))
+    assert "LANDED" in rig.kinds()
+    assert rig.broadcasts() == [packet("01 01 03 fe fe ff 00")]
 
 
 def test_it_has_landed_when_it_no_longer_moves():
-    bench = Bench()
-    bench.hear("02 02 06 01 01 00 00 a0 41")
-    fly(bench, Location(7.0, 0.0, 0.0))
-    fly(bench, Location(7.5, 0.0, 0.0))
-    assert "LANDED" not in bench.kinds()
-    fly(bench, Location(7.5, 0.0, 0.0))
-    assert "LANDED" in bench.kinds()
+    rig = Rig()
+    rig.hear("02 02 06 01 01 00 00 a0 41")
+    fly(rig, Location(7.0, 0.0, 0.0))
+    fly(rig, Location(7.5, 0.0, 0.0))
+    assert "LANDED" not in rig.kinds()
+    fly(rig, Location(7.5, 0.0, 0.0))
+    assert "LANDED" in rig.kinds()
 
 
 def test_it_asks_for_its_position_once_a_second_and_not_before():
-    bench = Bench()
-    bench.hear("02 02 06 01 01")  # where it stands
-    bench.wait(0.9)
-    assert "LANDED" not in bench.kinds()
-    bench.wait(0.2)
-    assert "LANDED" in bench.kinds()
+    rig = Rig()
+    rig.hear("02 02 06 01 01")  # where it stands
+    rig.wait(0.9)
+    assert "LANDED" not in rig.kinds()
+    rig.wait(0.2)
+    assert "LANDED" in rig.kinds()
 
 
 def test_a_flight_is_not_turned_round_however_long_it_takes():
-    bench = lone_bench()
-    bench.hear("00 02 06 01 01 00 00 fa 43")  # 500 m away: nobody there
-    assert len(bench.engine.goals) == 1
+    rig = lone_rig()
+    rig.hear("00 02 06 01 01 00 00 fa 43")  # 500 m away: nobody there
+    assert len(rig.engine.goals) == 1
     for second in range(250):
-        fly(bench, Location(2.0 * second, 0.0, 0.0))
-    assert len(bench.engine.goals) == 1
-    assert bench.sent(MISSING) == []
+        fly(rig, Location(2.0 * second, 0.0, 0.0))
+    assert len(rig.engine.goals) == 1
+    assert rig.sent(MISSING) == []
 
 
 def test_after_the_landing_the_time_without_a_gateway_counts_from_the_next_check():
-    bench = Bench()
-    bench.connect_to_gateway()
-    bench.hear(GATEWAY_AT_0_4, "00 00 06 01 01 00 00 a0 41")
+    rig = Rig()
+    rig.connect_to_gateway()
+    rig.hear(GATEWAY_AT_0_4, "00 00 06 01 01 00 00 a0 41")
     for second in range(52):
-        fly(bench, Location(second / 3, 0.0, 0.0))
-    fly(bench, Location(20.0, 0.0, 0.0))  # at 53 s; checks at 55, 65, 75 and 85 s
-    bench.wait_until(84.9)
-    assert len(bench.engine.goals) == 1
-    bench.wait_until(85.1)
-    assert bench.engine.goals[1:] == [GATEWAY_PLACE]
+        fly(rig, Location(second / 3, 0.0, 0.0))
+    fly(rig, Location(20.0, 0.0, 0.0))  # at 53 s; checks at 55, 65, 75 and 85 s
+    rig.wait_until(84.9)
+    assert len(rig.engine.goals) == 1
+    rig.wait_until(85.1)
+    assert rig.engine.goals[1:] == [GATEWAY_PLACE]
 
 
 def test_an_order_ends_the_time_without_a_gateway():
-    bench = lone_bench()
-    bench.wait_until(30.0)  # the timer runs since 15 s
-    bench.hear("09 03 06 01 01 00 00 a0 41")
-    bench.antenna.dead = {2, 3, 9}
-    fly(bench, Location(16.0, 0.0, 0.0))
-    bench.hear(bid(3, 1.0))
-    assert bench.sent(BID) == []
-    fly(bench, Location(20.0, 0.0, 0.0))
-    bench.wait_until(64.9)  # it runs again from the check at 35 s
-    assert len(bench.engine.goals) == 1
-    bench.wait_until(65.1)
-    assert len(bench.engine.goals) == 2
+    rig = lone_rig()
+    rig.wait_until(30.0)  # the timer runs since 15 s
+    rig.hear("09 03 06 01 01 00 00 a0 41")
+    rig.antenna.dead = {2, 3, 9}
+    fly(rig, Location(16.0, 0.0, 0.0))
+    rig.hear(bid(3, 1.0))
+    assert rig.sent(BID) == []
+    fly(rig, Location(20.0, 0.0, 0.0))
+    rig.wait_until(64.9)  # it runs again from the check at 35 s
+    assert len(rig.engine.goals) == 1
+    rig.wait_until(65.1)
+    assert len(rig.engine.goals) == 2
 
 
 def test_the_same_order_during_the_flight_is_no_new_flight():
-    bench = Bench()
-    bench.hear("00 02 06 01 01 00 00 a0 41", "09 03 06 01 01 00 00 a0 41")
-    assert bench.engine.goals == [Location(20.0, 0.0, 0)]
+    rig = Rig()
+    rig.hear("00 02 06 01 01 00 00 a0 41", "09 03 06 01 01 00 00 a0 41")
+    assert rig.engine.goals == [Location(20.0, 0.0, 0)]
 
 
 def test_the_same_order_of_a_second_gateway_is_told_of_once():
-    bench = Bench()
-    bench.hear("00 02 06 01 01 00 00 a0 41", "07 02 06 01 01 00 00 a0 41")
-    assert bench.kinds().count("FLIGHT_ORDERED") == 1
+    rig = Rig()
+    rig.hear("00 02 06 01 01 00 00 a0 41", "07 02 06 01 01 00 00 a0 41")
+    assert rig.kinds().count("FLIGHT_ORDERED") == 1
 
 
 def test_another_order_during_the_flight_replaces_the_first():
-    bench = Bench()
-    bench.hear("00 02 06 01 01 00 00 a0 41", "00 02 06 01 01 00 00 80 3f")
-    assert bench.engine.goals == [Location(20.0, 0.0, 0), Location(1.0, 0.0, 0)]
+    rig = Rig()
+    rig.hear("00 02 06 01 01 00 00 a0 41", "00 02 06 01 01 00 00 80 3f")
+    assert rig.engine.goals == [Location(20.0, 0.0, 0), Location(1.0, 0.0, 0)]
 
 
 @pytest.mark.parametrize(
@@ -209,63 +209,63 @@ def test_another_order_during_the_flight_replaces_the_first():
     ],
 )
 def test_an_order_out_of_bounds_is_refused_and_counted(place):
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear(f"00 02 06 01 01 {place}")
-    assert bench.engine.goals == []
-    assert bench.mesh.get_connected_to_gateway()
-    assert bench.mesh.complaints.counts["order refused"] == 1
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(f"00 02 06 01 01 {place}")
+    assert rig.engine.goals == []
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.complaints.counts["order refused"] == 1
 
 
 def test_a_drone_that_cannot_say_where_it_is_now_and_then_flies_on():
-    bench = Bench()
-    bench.hear("02 02 06 01 01 00 00 fa 43")
+    rig = Rig()
+    rig.hear("02 02 06 01 01 00 00 fa 43")
     for second in range(30):
-        fly(bench, Location(2.0 * second, 0.0, 0.0) if second % 3 == 0 else None)
-    assert "LANDED" not in bench.kinds()
+        fly(rig, Location(2.0 * second, 0.0, 0.0) if second % 3 == 0 else None)
+    assert "LANDED" not in rig.kinds()
 
 
 def test_a_drone_that_cannot_say_where_it_is_does_not_fly_for_ever():
-    bench = Bench()
-    bench.hear("02 02 06 01 01 00 00 a0 41")
-    bench.engine.place = None
-    bench.wait(30.0)
-    assert "LANDED" in bench.kinds()
+    rig = Rig()
+    rig.hear("02 02 06 01 01 00 00 a0 41")
+    rig.engine.place = None
+    rig.wait(30.0)
+    assert "LANDED" in rig.kinds()
 
 
 def test_a_heartbeat_that_is_answered_in_flight_counts_no_more_after_the_landing():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear("00 02 06 01 01 00 00 a0 41", "00 02 04 01 01 01 00 01")
-    assert bench.mesh.get_connected_to_gateway()
-    fly(bench, Location(20.0, 0.0, 0.0))
-    assert "LANDED" in bench.kinds()
-    assert not bench.mesh.get_connected_to_gateway()
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("00 02 06 01 01 00 00 a0 41", "00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_connected_to_gateway()
+    fly(rig, Location(20.0, 0.0, 0.0))
+    assert "LANDED" in rig.kinds()
+    assert not rig.mesh.get_connected_to_gateway()
 
 
 # Lost connection -----------------------------------------------------------------------------
 
 
 def test_a_lost_gateway_is_dropped_and_the_neighbours_are_told():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.routing.other_can_communicate_with_node(3, 0)
-    bench.mesh.send_heartbeat(0)
-    bench.wait_until(4.9)
-    bench.forget()
-    assert bench.mesh.get_hops_from_gateway_away() == 2
-    bench.wait_until(5.1)
-    assert bench.mesh.get_hops_from_gateway_away() == 255
-    assert bench.mesh.get_route_to_gateway() == NO_ROUTE
-    assert bench.sent(MISSING) == [packet("01 01 05 02 02 00"), packet("01 01 05 03 03 00")]
-    assert bench.routing.get_set_of_children() == {2, 3}
+    rig = Rig()
+    rig.connect_through(2)
+    rig.routing.other_can_communicate_with_node(3, 0)
+    rig.mesh.send_heartbeat(0)
+    rig.wait_until(4.9)
+    rig.forget()
+    assert rig.mesh.get_hops_from_gateway_away() == 2
+    rig.wait_until(5.1)
+    assert rig.mesh.get_hops_from_gateway_away() == 255
+    assert rig.mesh.get_route_to_gateway() == NO_ROUTE
+    assert rig.sent(MISSING) == [packet("01 01 05 02 02 00"), packet("01 01 05 03 03 00")]
+    assert rig.routing.get_set_of_children() == {2, 3}
 
 
 def test_who_never_knew_a_gateway_has_none_to_drop():
-    bench = Bench()
-    bench.know_neighbour(2)
-    bench.wait_until(6.0)
-    assert bench.sent(MISSING) == []
+    rig = Rig()
+    rig.know_neighbour(2)
+    rig.wait_until(6.0)
+    assert rig.sent(MISSING) == []
 
 
 @pytest.mark.parametrize(
@@ -278,67 +278,67 @@ def test_who_never_knew_a_gateway_has_none_to_drop():
     ],
 )
 def test_the_emergency_comes_at_the_first_check_when_the_time_has_run_out(timing, flies_at_s):
-    bench = Bench(timing=timing)
-    bench.connect_through(2)
-    bench.hear(NEIGHBOUR_2_AT_0_8)
-    bench.mesh.send_heartbeat(0)  # never answered
-    bench.wait_until(0.9)
-    bench.antenna.dead = {2}
-    bench.wait_until(flies_at_s - 0.1)
-    assert bench.engine.goals == []
-    bench.wait_until(flies_at_s + 0.1)
-    assert bench.engine.goals == [NEIGHBOUR_PLACE]
+    rig = Rig(timing=timing)
+    rig.connect_through(2)
+    rig.hear(NEIGHBOUR_2_AT_0_8)
+    rig.mesh.send_heartbeat(0)  # never answered
+    rig.wait_until(0.9)
+    rig.antenna.dead = {2}
+    rig.wait_until(flies_at_s - 0.1)
+    assert rig.engine.goals == []
+    rig.wait_until(flies_at_s + 0.1)
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_the_timer_is_off_when_a_gateway_answers():
-    bench = lone_bench()
-    bench.wait_until(34.0)
-    assert not bench.mesh.get_connected_to_gateway()
-    bench.hear("00 03 04 01 01 01 00 04")
-    bench.mesh.send_heartbeat(0)  # taken, but never answered
-    bench.wait_until(44.9)  # lost again at the check at 35 s
-    bench.antenna.dead = {2, 3}
-    bench.wait_until(64.9)
-    assert bench.engine.goals == []
-    bench.wait_until(65.1)
-    assert len(bench.engine.goals) == 1
+    rig = lone_rig()
+    rig.wait_until(34.0)
+    assert not rig.mesh.get_connected_to_gateway()
+    rig.hear("00 03 04 01 01 01 00 04")
+    rig.mesh.send_heartbeat(0)  # taken, but never answered
+    rig.wait_until(44.9)  # lost again at the check at 35 s
+    rig.antenna.dead = {2, 3}
+    rig.wait_until(64.9)
+    assert rig.engine.goals == []
+    rig.wait_until(65.1)
+    assert len(rig.engine.goals) == 1
 
 
 # Emergency without neighbours ----------------------------------------------------------------
 
 
 def test_who_has_no_neighbours_flies_to_the_place_to_step_back_to():
-    bench = lone_bench()
-    bench.wait_until(60.0)
-    assert bench.engine.goals[:1] == [NEIGHBOUR_PLACE]
-    assert bench.kinds().count("EMERGENCY") == 1
-    assert bench.mesh.get_last_good_known_location_id() == 0
+    rig = lone_rig()
+    rig.wait_until(60.0)
+    assert rig.engine.goals[:1] == [NEIGHBOUR_PLACE]
+    assert rig.kinds().count("EMERGENCY") == 1
+    assert rig.mesh.get_last_good_known_location_id() == 0
 
 
 def test_who_knows_no_other_place_flies_to_the_gateway():
-    bench = Bench()
-    bench.engine.place = Location(12.0, 0.0, 0.0)
-    bench.connect_through(2)
-    bench.hear("00 02 01 01 01 00 00 80 40")
-    assert bench.mesh.get_last_good_known_location_id() == 255
-    bench.antenna.dead = {2}
-    bench.wait_until(60.0)
-    assert bench.engine.goals[:1] == [GATEWAY_PLACE]
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 40")
+    assert rig.mesh.get_last_good_known_location_id() == 255
+    rig.antenna.dead = {2}
+    rig.wait_until(60.0)
+    assert rig.engine.goals[:1] == [GATEWAY_PLACE]
 
 
 def test_after_one_step_back_the_next_one_is_to_the_gateway():
-    bench = lone_bench()
-    bench.wait_until(46.0)
-    fly(bench, NEIGHBOUR_PLACE)
-    bench.wait_until(120.0)
-    assert bench.engine.goals[:2] == [NEIGHBOUR_PLACE, GATEWAY_PLACE]
+    rig = lone_rig()
+    rig.wait_until(46.0)
+    fly(rig, NEIGHBOUR_PLACE)
+    rig.wait_until(120.0)
+    assert rig.engine.goals[:2] == [NEIGHBOUR_PLACE, GATEWAY_PLACE]
 
 
 def test_who_knows_no_place_at_all_stays():
-    bench = Bench()
-    bench.wait_until(200.0)
-    assert bench.engine.goals == []
-    assert bench.kinds().count("EMERGENCY") > 1
+    rig = Rig()
+    rig.wait_until(200.0)
+    assert rig.engine.goals == []
+    assert rig.kinds().count("EMERGENCY") > 1
 
 
 @pytest.mark.parametrize(
@@ -346,33 +346,33 @@ def test_who_knows_no_place_at_all_stays():
 )
 def test_a_place_where_no_drone_may_go_is_nowhere_to_fly(place):
     """Anybody can say anything of where he is."""
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear(f"00 02 01 01 01 {place}", f"02 02 01 01 01 {place}")
-    bench.antenna.dead = {2}
-    bench.wait_until(100.0)
-    assert bench.engine.goals == []
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(f"00 02 01 01 01 {place}", f"02 02 01 01 01 {place}")
+    rig.antenna.dead = {2}
+    rig.wait_until(100.0)
+    assert rig.engine.goals == []
 
 
 def test_a_next_hop_that_says_nonsense_does_not_hide_the_place_of_the_gateway():
-    bench = lone_bench()
-    bench.hear("02 02 01 01 01 00 60 9c 45")
-    bench.antenna.dead = {2}
-    bench.wait_until(60.0)
-    assert bench.engine.goals[:1] == [GATEWAY_PLACE]
+    rig = lone_rig()
+    rig.hear("02 02 01 01 01 00 60 9c 45")
+    rig.antenna.dead = {2}
+    rig.wait_until(60.0)
+    assert rig.engine.goals[:1] == [GATEWAY_PLACE]
 
 
 # Negotiation ---------------------------------------------------------------------------------
 
 
 def test_with_neighbours_it_bids_its_distance_to_the_gateway_in_three_dimensions():
-    bench = group_bench(3, 4)
-    bench.engine.place = Location(12.0, 8.0, 1.0)  # 8, 8 and 1 m away: the root of 129
-    bench.wait_until(EMERGENCY_S - 0.1)
-    assert bench.sent(BID) == []
-    bench.wait_until(EMERGENCY_S + 0.1)
-    assert bench.sent(BID) == [own_bid(3, 129**0.5), own_bid(4, 129**0.5)]
-    assert bench.engine.goals == []
+    rig = group_rig(3, 4)
+    rig.engine.place = Location(12.0, 8.0, 1.0)  # 8, 8 and 1 m away: the root of 129
+    rig.wait_until(EMERGENCY_S - 0.1)
+    assert rig.sent(BID) == []
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert rig.sent(BID) == [own_bid(3, 129**0.5), own_bid(4, 129**0.5)]
+    assert rig.engine.goals == []
 
 
 @pytest.mark.parametrize(
@@ -385,223 +385,221 @@ def test_with_neighbours_it_bids_its_distance_to_the_gateway_in_three_dimensions
     ],
 )
 def test_the_highest_score_flies(bids, flies):
-    bench = group_bench(3, 4)
-    bench.wait_until(EMERGENCY_S + 0.1)  # its own score is 8
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S + 0.1)  # its own score is 8
     for neighbour, score in bids:
-        assert bench.engine.goals == []
-        bench.hear(bid(neighbour, score))
-    assert bench.engine.goals == ([NEIGHBOUR_PLACE] if flies else [])
-    assert bench.kinds().count("NEGOTIATION_ENDED") == 1
+        assert rig.engine.goals == []
+        rig.hear(bid(neighbour, score))
+    assert rig.engine.goals == ([NEIGHBOUR_PLACE] if flies else [])
+    assert rig.kinds().count("NEGOTIATION_ENDED") == 1
 
 
 def test_of_equal_scores_the_lowest_id_flies():
-    bench = Bench(node_id=5)
-    bench.engine.place = Location(12.0, 0.0, 0.0)
-    bench.hear(
-        "00 02 04 05 05 01 00 01", "00 02 01 05 05 00 00 80 40", "02 02 01 05 05 00 00 00 41"
-    )
-    bench.antenna.dead = {2}
-    bench.hear("03 03 00 05 05")
-    bench.wait_until(35.1)
-    bench.hear("03 03 07 05 05 00 00 00 41")
-    assert bench.engine.goals == []
-    assert bench.events[-1].peer == 3
+    rig = Rig(node_id=5)
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.hear("00 02 04 05 05 01 00 01", "00 02 01 05 05 00 00 80 40", "02 02 01 05 05 00 00 00 41")
+    rig.antenna.dead = {2}
+    rig.hear("03 03 00 05 05")
+    rig.wait_until(35.1)
+    rig.hear("03 03 07 05 05 00 00 00 41")
+    assert rig.engine.goals == []
+    assert rig.events[-1].peer == 3
 
 
 def test_scores_are_compared_as_they_are_on_the_air():
     """Two drones at one place: rounded to a float32, each bid looks higher than one's own."""
-    bench = group_bench(3)
-    bench.engine.place = Location(4.0, 10.1, 0.0)  # 10.1 is 10.10000038 as a float32
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear(bid(3, 10.1))
-    assert bench.engine.goals == [NEIGHBOUR_PLACE]
+    rig = group_rig(3)
+    rig.engine.place = Location(4.0, 10.1, 0.0)  # 10.1 is 10.10000038 as a float32
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear(bid(3, 10.1))
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_nobody_flies_when_nobody_bids():
-    bench = Bench()
-    bench.know_neighbour(3)
-    bench.wait_until(35.1)
-    assert bench.sent(BID) == [own_bid(3, -1.0)]
-    bench.hear(bid(3, -1.0))
-    assert bench.engine.goals == []
-    assert bench.events[-1].peer == NO_ROUTE
+    rig = Rig()
+    rig.know_neighbour(3)
+    rig.wait_until(35.1)
+    assert rig.sent(BID) == [own_bid(3, -1.0)]
+    rig.hear(bid(3, -1.0))
+    assert rig.engine.goals == []
+    assert rig.events[-1].peer == NO_ROUTE
 
 
 def test_who_would_take_the_place_of_a_neighbour_does_not_bid():
-    bench = group_bench(2, 3)
-    bench.antenna.dead = set()  # it takes the heartbeats for the gateway, and no answer comes
-    bench.wait_until(EMERGENCY_S + 0.1)
-    assert own_bid(3, -1.0) in bench.sent(BID)
+    rig = group_rig(2, 3)
+    rig.antenna.dead = set()  # it takes the heartbeats for the gateway, and no answer comes
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert own_bid(3, -1.0) in rig.sent(BID)
 
 
 def test_who_knows_no_gateway_location_does_not_bid():
-    bench = Bench()
-    bench.hear(NEIGHBOUR_2_AT_0_8)
-    bench.antenna.dead = {2}
-    bench.know_neighbour(3)
-    bench.wait_until(35.1)
-    assert bench.sent(BID) == [own_bid(3, -1.0)]
+    rig = Rig()
+    rig.hear(NEIGHBOUR_2_AT_0_8)
+    rig.antenna.dead = {2}
+    rig.know_neighbour(3)
+    rig.wait_until(35.1)
+    assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
 def test_who_knows_the_place_of_the_gateway_alone_bids_for_flying_there():
     """Else a group of such drones would stay for ever (the place to fly to without neighbours)."""
-    bench = Bench()
-    bench.engine.place = Location(12.0, 0.0, 0.0)
-    bench.connect_through(2)
-    bench.hear("00 02 01 01 01 00 00 80 40")
-    bench.antenna.dead = {2}
-    bench.know_neighbour(3)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    assert bench.sent(BID) == [own_bid(3, 8.0)]
-    bench.hear(bid(3, 1.0))
-    assert bench.engine.goals == [GATEWAY_PLACE]
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 40")
+    rig.antenna.dead = {2}
+    rig.know_neighbour(3)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert rig.sent(BID) == [own_bid(3, 8.0)]
+    rig.hear(bid(3, 1.0))
+    assert rig.engine.goals == [GATEWAY_PLACE]
 
 
 def test_who_does_not_know_where_it_is_does_not_bid():
-    bench = group_bench(3)
-    bench.engine.place = None
-    bench.wait_until(EMERGENCY_S + 0.1)
-    assert bench.sent(BID) == [own_bid(3, -1.0)]
+    rig = group_rig(3)
+    rig.engine.place = None
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
 def test_a_gateway_that_says_it_is_beyond_all_bounds_does_not_break_the_bids():
-    bench = group_bench(3)
-    bench.hear("00 03 01 01 01 ff ff 7f 7f ff ff 7f 7f", "00 03 04 01 01 01 00 05")
-    bench.wait_until(100.0)
-    assert len(bench.sent(BID)) >= 1
+    rig = group_rig(3)
+    rig.hear("00 03 01 01 01 ff ff 7f 7f ff ff 7f 7f", "00 03 04 01 01 01 00 05")
+    rig.wait_until(100.0)
+    assert len(rig.sent(BID)) >= 1
 
 
 def test_a_neighbour_that_does_not_bid_is_waited_for_no_longer_than_a_period():
-    bench = group_bench(3, 4)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear(bid(3, 1.0))
-    bench.wait_until(EMERGENCY_S + 9.9)
-    assert bench.engine.goals == []
-    bench.wait_until(EMERGENCY_S + 10.1)
-    assert bench.engine.goals == [NEIGHBOUR_PLACE]
-    assert bench.kinds().count("EMERGENCY") == 1
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear(bid(3, 1.0))
+    rig.wait_until(EMERGENCY_S + 9.9)
+    assert rig.engine.goals == []
+    rig.wait_until(EMERGENCY_S + 10.1)
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
+    assert rig.kinds().count("EMERGENCY") == 1
 
 
 def test_a_neighbour_that_dies_in_the_middle_is_not_waited_for():
-    bench = group_bench(3, 4)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear(bid(3, 1.0))
-    bench.antenna.dead = {2, 4}
-    bench.mesh.send_heartbeat(4)
-    bench.wait(0.1)
-    assert bench.engine.goals == [NEIGHBOUR_PLACE]
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear(bid(3, 1.0))
+    rig.antenna.dead = {2, 4}
+    rig.mesh.send_heartbeat(4)
+    rig.wait(0.1)
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_a_neighbour_that_dies_as_it_is_told_the_bid_is_not_waited_for():
-    bench = group_bench(3)
-    bench.antenna.gets_lost = lambda payload: payload[2] == BID
-    bench.wait_until(EMERGENCY_S + 0.1)
-    assert bench.engine.goals == [NEIGHBOUR_PLACE]
+    rig = group_rig(3)
+    rig.antenna.gets_lost = lambda payload: payload[2] == BID
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_bids_that_came_before_the_emergency_count():
-    bench = group_bench(3, 4)
-    bench.wait_until(14.0)  # its timer starts at 15 s
-    bench.hear(bid(3, 9.0))
-    assert bench.sent(BID) == []
-    bench.wait_until(16.0)
-    bench.hear(bid(4, 1.0))
-    assert bench.events[-1].kind.name == "NEGOTIATION_ENDED"
-    assert bench.events[-1].peer == 3
+    rig = group_rig(3, 4)
+    rig.wait_until(14.0)  # its timer starts at 15 s
+    rig.hear(bid(3, 9.0))
+    assert rig.sent(BID) == []
+    rig.wait_until(16.0)
+    rig.hear(bid(4, 1.0))
+    assert rig.events[-1].kind.name == "NEGOTIATION_ENDED"
+    assert rig.events[-1].peer == 3
 
 
 def test_a_bid_makes_an_unconnected_node_with_a_running_timer_join_at_once():
-    bench = group_bench(3, 4)
-    bench.wait_until(20.0)
-    bench.hear(bid(3, 1.0))
-    assert bench.sent(BID) == [own_bid(3, 8.0), own_bid(4, 8.0)]
-    bench.hear(bid(4, 2.0))
-    assert bench.engine.goals == [NEIGHBOUR_PLACE]
+    rig = group_rig(3, 4)
+    rig.wait_until(20.0)
+    rig.hear(bid(3, 1.0))
+    assert rig.sent(BID) == [own_bid(3, 8.0), own_bid(4, 8.0)]
+    rig.hear(bid(4, 2.0))
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_a_bid_before_the_timer_runs_is_kept_and_not_answered():
-    bench = group_bench(3)
-    bench.mesh.send_heartbeat(0)
-    bench.wait(0.6)
-    bench.hear(bid(3, 9.0))
-    assert bench.sent(BID) == []
+    rig = group_rig(3)
+    rig.mesh.send_heartbeat(0)
+    rig.wait(0.6)
+    rig.hear(bid(3, 9.0))
+    assert rig.sent(BID) == []
 
 
 def test_a_connected_node_does_not_negotiate():
-    bench = Bench()
-    bench.connect_through(2)
-    bench.hear(NEIGHBOUR_2_AT_0_8, bid(3, 9.0))
-    bench.wait(1.0)
-    assert bench.sent(BID) == []
-    assert "NEGOTIATION_STARTED" not in bench.kinds()
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(NEIGHBOUR_2_AT_0_8, bid(3, 9.0))
+    rig.wait(1.0)
+    assert rig.sent(BID) == []
+    assert "NEGOTIATION_STARTED" not in rig.kinds()
 
 
 def test_switching_the_antenna_off_ends_a_negotiation():
-    bench = group_bench(3, 4)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.antenna.powered = False
-    bench.mesh.on_antenna_power(False, bench.now_s)
-    bench.wait(12.0)
-    assert bench.engine.goals == []
-    assert "NEGOTIATION_ENDED" not in bench.kinds()
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.antenna.powered = False
+    rig.mesh.on_antenna_power(False, rig.now_s)
+    rig.wait(12.0)
+    assert rig.engine.goals == []
+    assert "NEGOTIATION_ENDED" not in rig.kinds()
 
 
 def test_becoming_connected_ends_a_negotiation():
-    bench = group_bench(3, 4)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear("00 03 04 01 01 01 00 03", bid(3, 1.0), bid(4, 1.0))
-    bench.wait(12.0)
-    assert bench.engine.goals == []
-    assert "NEGOTIATION_ENDED" not in bench.kinds()
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear("00 03 04 01 01 01 00 03", bid(3, 1.0), bid(4, 1.0))
+    rig.wait(12.0)
+    assert rig.engine.goals == []
+    assert "NEGOTIATION_ENDED" not in rig.kinds()
 
 
 def test_old_bids_do_not_count():
     """Node 4 bid more once, and is not there any more."""
-    bench = group_bench(3)
-    bench.mesh.on_msg(packet(bid(4, 99.0)), bench.now_s)
-    bench.antenna.dead = {2, 4}
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear(bid(3, 1.0))
-    assert bench.engine.goals == [NEIGHBOUR_PLACE]
+    rig = group_rig(3)
+    rig.mesh.on_msg(packet(bid(4, 99.0)), rig.now_s)
+    rig.antenna.dead = {2, 4}
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear(bid(3, 1.0))
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_the_list_is_cleared_after_a_negotiation():
-    bench = group_bench(3, 4)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear(bid(3, 99.0), bid(4, 1.0))
-    assert bench.kinds().count("NEGOTIATION_ENDED") == 1
-    bench.wait_until(EMERGENCY_S + 10.05)  # the timer runs again
-    bench.hear(bid(4, 1.0))
-    assert bench.kinds().count("NEGOTIATION_STARTED") == 2
-    assert bench.kinds().count("NEGOTIATION_ENDED") == 1  # what 3 bids now is not known
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear(bid(3, 99.0), bid(4, 1.0))
+    assert rig.kinds().count("NEGOTIATION_ENDED") == 1
+    rig.wait_until(EMERGENCY_S + 10.05)  # the timer runs again
+    rig.hear(bid(4, 1.0))
+    assert rig.kinds().count("NEGOTIATION_STARTED") == 2
+    assert rig.kinds().count("NEGOTIATION_ENDED") == 1  # what 3 bids now is not known
 
 
 def test_a_late_bid_does_not_start_the_same_negotiation_again():
-    bench = group_bench(3, 4)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear(bid(3, 99.0), bid(4, 1.0))
-    bench.forget()
-    bench.hear(bid(4, 2.0))
-    assert bench.sent(BID) == []
-    assert bench.engine.goals == []
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear(bid(3, 99.0), bid(4, 1.0))
+    rig.forget()
+    rig.hear(bid(4, 2.0))
+    assert rig.sent(BID) == []
+    assert rig.engine.goals == []
 
 
 def test_an_emergency_flight_forgets_the_routes_when_it_starts():
-    bench = group_bench(3)
-    bench.wait_until(EMERGENCY_S + 0.1)
-    bench.hear(bid(3, 1.0))
-    assert bench.routing.empty()
-    assert bench.mesh.get_neighbours() == {}
-    assert "FLIGHT_DECIDED" in bench.kinds()
+    rig = group_rig(3)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.hear(bid(3, 1.0))
+    assert rig.routing.empty()
+    assert rig.mesh.get_neighbours() == {}
+    assert "FLIGHT_DECIDED" in rig.kinds()
 
 
 def test_a_node_in_flight_does_not_negotiate():
-    bench = Bench()
-    bench.connect_to_gateway()
-    bench.hear(GATEWAY_AT_0_4, "00 00 06 01 01 00 00 fa 43")
-    bench.forget()
+    rig = Rig()
+    rig.connect_to_gateway()
+    rig.hear(GATEWAY_AT_0_4, "00 00 06 01 01 00 00 fa 43")
+    rig.forget()
     for second in range(1, 60):
-        fly(bench, Location(2.0 * second, 0.0, 0.0))
-        bench.hear(bid(3, 9.0))
-    assert bench.sent(BID) == []
-    assert len(bench.engine.goals) == 1
+        fly(rig, Location(2.0 * second, 0.0, 0.0))
+        rig.hear(bid(3, 9.0))
+    assert rig.sent(BID) == []
+    assert len(rig.engine.goals) == 1

@@ -1,4 +1,4 @@
-"""Routing techniques are chosen by name (reference, section 8)."""
+"""Routing techniques are chosen by name."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ def test_a_class_of_any_module_can_be_named():
 
 @pytest.mark.parametrize("name", ["", "child_table_three", "ChildTableTree"])
 def test_an_unknown_name_is_refused_with_a_list_of_what_is_known(name):
-    with pytest.raises(ConfigurationError, match=f"{name!r} is not known: use one of .*child_tab"):
+    with pytest.raises(
+        ConfigurationError, match=f"technique {name!r}: use one of .*child_tab"
+    ):
         create_routing_technique(name)
 
 

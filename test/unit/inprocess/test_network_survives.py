@@ -41,12 +41,12 @@ def alive(network):
 
 
 def nowhere_to_fly(network, node):
-    """Whether a router knows no place at all (14.7) and is out of everybody's reach."""
+    """Whether a router knows no place at all and has no node in reach."""
     component = network.nodes[node].component
     return (
         node not in network.shortest_hops()
         and component.get_last_good_known_location_id() == 255
-        and component._gateway_location is None
+        and component.places.gateway is None
     )
 
 
@@ -114,7 +114,7 @@ def test_a_hundred_kill_sequences_end_without_a_deadlock_and_without_circling_pa
     assert happened["switched on again"] > 0
 
 
-# Packets that would circulate (14.10) --------------------------------------------------------
+# Packets that would circulate ----------------------------------------------------------------
 
 
 def ring():

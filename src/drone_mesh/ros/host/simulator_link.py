@@ -9,7 +9,7 @@ from typing import Callable, NamedTuple, Protocol, Sequence
 
 import rospy
 
-from drone_mesh.communication.messages import FROM, TO, MessageType, packet
+from drone_mesh.communication.messages import MessageType, packet, receiver, sender
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names
@@ -54,7 +54,7 @@ def probe_of(node_id: int) -> bytes:
 
 def _hand_over(services: _Services, payload: bytes) -> bool:
     """Call `message`: the fields of its request and response, which are bytes all of them."""
-    fields = payload[FROM : FROM + 1] + payload[TO : TO + 1] + payload
+    fields = bytes((sender(payload), receiver(payload))) + payload
     return services.message.call_bytes(fields) != b"\0"
 
 
@@ -168,7 +168,7 @@ class SimulatorLink(rospy.SubscribeListener):
             return [self.send(payload) for payload in payloads]
         packets = b"".join(payloads)
         # The fields of a WirelessMessagesRequest.
-        fields = payloads[0][FROM : FROM + 1] + _LENGTH.pack(len(packets)) + packets
+        fields = bytes((sender(payloads[0]),)) + _LENGTH.pack(len(packets)) + packets
         try:
             answer = services.messages.call_bytes(fields)
         except ServiceRefused as error:
@@ -189,7 +189,7 @@ class SimulatorLink(rospy.SubscribeListener):
             return
         try:
             # The fields of a BroadcastRequest.
-            services.broadcast.call_bytes(payload[FROM : FROM + 1] + payload)
+            services.broadcast.call_bytes(bytes((sender(payload),)) + payload)
         except ServiceRefused:
             # The simulator is new, and will hear of this antenna in a moment: no line in the log.
             self._complaints.counts["broadcast refused"] += 1

@@ -6,12 +6,9 @@ import abc
 import random
 from dataclasses import dataclass
 
-from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import MeshObserver
-from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.execution import Seat
 from drone_mesh.internet import DEFAULT_PORT
@@ -46,12 +43,20 @@ class VirtualRaspberryPi(abc.ABC):
         """Raises ConfigurationError for a routing technique that does not exist."""
         self.node_id = node_id
         self.settings = settings
-        self.routing = create_routing_technique(settings.routing)
         self.engine = RosDroneEngineConnector(node_id)
         self.antenna = antenna
-        self.rng = random.Random(f"{settings.seed}/{node_id}")
         self.seat = seat
-        self.component = self._make_component()
+        self.component = assemble_component(
+            node_id,
+            antenna,
+            self.engine,
+            random.Random(f"{settings.seed}/{node_id}"),
+            internet=self._make_internet(),
+            routing=settings.routing,
+            timing=settings.timing,
+            observer=settings.observer,
+            debug=settings.debug,
+        )
 
     def start(self, now_s: float) -> None:
         """Switch on."""
@@ -64,41 +69,19 @@ class VirtualRaspberryPi(abc.ABC):
         self.component.stop()
 
     @abc.abstractmethod
-    def _make_component(self) -> MeshnetworkComponent:
-        """The mesh software."""
+    def _make_internet(self) -> IInternetConnection | None:
+        """A gateway's internet side; None for a router."""
 
 
 class VirtualRaspberryPiRouter(VirtualRaspberryPi):
     """Runs a router."""
 
-    def _make_component(self) -> MeshnetworkComponent:
-        return MeshnetworkRouter(
-            self.node_id,
-            self.antenna,
-            self.engine,
-            self.routing,
-            rng=self.rng,
-            timing=self.settings.timing,
-            observer=self.settings.observer,
-            debug=self.settings.debug,
-        )
+    def _make_internet(self) -> None:
+        return None
 
 
 class VirtualRaspberryPiGateway(VirtualRaspberryPi):
     """Runs a gateway."""
-
-    def _make_component(self) -> MeshnetworkComponent:
-        return MeshnetworkGateway(
-            self.node_id,
-            self.antenna,
-            self.engine,
-            self.routing,
-            self._make_internet(),
-            rng=self.rng,
-            timing=self.settings.timing,
-            observer=self.settings.observer,
-            debug=self.settings.debug,
-        )
 
     def _make_internet(self) -> IInternetConnection:
         mock = RosInternetMock(self.node_id, self.seat)

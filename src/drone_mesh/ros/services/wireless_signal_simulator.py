@@ -14,7 +14,7 @@ from rospy.impl.transport import Transport
 from drone_mesh.air.node import AirError
 from drone_mesh.air.node_table import NodeTable
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
-from drone_mesh.communication.messages import TO
+from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
@@ -170,7 +170,7 @@ class WirelessSignalSimulator:
             )
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:
-            topics = [self._nodes.link(request.from_, packet[TO]) for packet in packets]
+            topics = [self._nodes.link(request.from_, receiver(packet)) for packet in packets]
         return WirelessMessagesResponse(
             [
                 topic is not None and self._carry(topic, NRF24(packet))
@@ -183,12 +183,11 @@ class WirelessSignalSimulator:
             nodes = self._in_range(request.from_)
             topics = [self._nodes.link(request.from_, node) for node in nodes]
         packet = request.message.payload
-        before, after = packet[:TO], packet[TO + 1 :]
         return BroadcastResponse(
             [
                 node
                 for node, topic in zip(nodes, topics)
-                if topic is not None and self._carry(topic, NRF24(before + bytes((node,)) + after))
+                if topic is not None and self._carry(topic, NRF24(readdressed(packet, node)))
             ]
         )
 

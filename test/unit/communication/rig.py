@@ -1,4 +1,4 @@
-"""One mesh component on a bench: literal packets in, literal packets out.
+"""One mesh component in a test rig: literal packets in, literal packets out.
 
 Packets are written as hex: creator, from, type, to, forward, body; zeros at the end are left out.
 """
@@ -68,7 +68,7 @@ class RecordingAntenna(IWirelessCommunication):
         return self.powered
 
 
-class BenchEngine(IDroneEngine):
+class RigEngine(IDroneEngine):
     """A drone that is where the test puts it. `place` None: it cannot say."""
 
     def __init__(self):
@@ -84,7 +84,7 @@ class BenchEngine(IDroneEngine):
         return self.place
 
 
-class BenchInternet(IInternetConnection):
+class RigInternet(IInternetConnection):
     """Keeps the calls."""
 
     def __init__(self):
@@ -104,14 +104,14 @@ class AlwaysHalf(random.Random):
         return 0.5
 
 
-class Bench:
+class Rig:
     """A started component, its antenna and its drone, and the time they live in."""
 
     def __init__(self, node_id=1, gateway=False, timing=None, debug=True):
         self.now_s = 0.0
         self.antenna = RecordingAntenna()
-        self.engine = BenchEngine()
-        self.internet = BenchInternet()
+        self.engine = RigEngine()
+        self.internet = RigInternet()
         self.routing = ChildTableTree()
         self.events = []
         carried = (self.antenna, self.engine, self.routing)

@@ -1,0 +1,39 @@
+"""How a mesh component is put together, the same way on every host."""
+
+from __future__ import annotations
+
+import random
+
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.observer import MeshObserver, ignore_events
+from drone_mesh.communication.router import MeshnetworkRouter
+from drone_mesh.communication.routing import DEFAULT_ROUTING, create_routing_technique
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.interfaces import IDroneEngine
+
+
+def assemble_component(
+    node_id: int,
+    antenna: IWirelessCommunication,
+    engine: IDroneEngine,
+    rng: random.Random,
+    *,
+    internet: IInternetConnection | None = None,
+    routing: str = DEFAULT_ROUTING,
+    timing: MeshTiming | None = None,
+    observer: MeshObserver = ignore_events,
+    debug: bool = True,
+) -> MeshnetworkComponent:
+    """A gateway if it has an `internet` side, else a router; not started yet.
+
+    `routing` names the routing technique. Raises ConfigurationError for an unknown technique and
+    ValueError for a node id outside 0..253.
+    """
+    technique = create_routing_technique(routing)
+    if internet is None:
+        return MeshnetworkRouter(node_id, antenna, engine, technique, rng, timing, observer, debug)
+    return MeshnetworkGateway(
+        node_id, antenna, engine, technique, internet, rng, timing, observer, debug
+    )

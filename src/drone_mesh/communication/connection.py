@@ -1,0 +1,185 @@
+"""GatewayConnection: how a router finds, keeps and judges its gateway.
+
+docs/protocol.md, "Connection" and "Places to step back to".
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Callable, NamedTuple
+
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
+from drone_mesh.communication.messages import HeartbeatMessage, Message, MessageType
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.router_states import Link, RouterEvent, RouterStates
+from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S
+
+
+class Shortcut(NamedTuple):
+    """A neighbour that presented itself with fewer hops than the route in use."""
+
+    neighbour: int
+    hops: int
+
+
+class GatewayConnection:
+    """The preferred gateway of one router, the hops to it, and whether it answers.
+
+    It moves the `Link` of the router's states.
+    """
+
+    def __init__(
+        self, parts: NodeParts, states: RouterStates, introduce: Callable[[], None]
+    ) -> None:
+        """`introduce` broadcasts a PRESENT."""
+        self.gateway = NO_ROUTE  # the preferred one
+        self.hops = NO_ROUTE
+        self._parts = parts
+        self._states = states
+        self._introduce = introduce
+        self._heartbeat_sent_s = -math.inf
+        self._answered_s = -math.inf
+        self._shown_connected = False
+        self._shortcut: Shortcut | None = None
+
+    def next_hop(self) -> int:
+        """The neighbour that leads to the preferred gateway, or NO_ROUTE."""
+        if self.gateway == NO_ROUTE:
+            return NO_ROUTE
+        return self._parts.routing.get_direction_to_node(self.gateway)
+
+    # Heartbeats out --------------------------------------------------------------------------
+
+    def send_heartbeat(self) -> bool:
+        """A heartbeat to the preferred gateway, unless one is under way. False: not sent."""
+        now_s, me, gateway = self._parts.now_s, self._parts.node_id, self.gateway
+        if now_s - self._heartbeat_sent_s < HEARTBEAT_ANSWER_S:
+            return True
+        heartbeat = HeartbeatMessage(me, me, gateway, gateway, self._states.connected, gateway, 0)
+        self._states.happened(RouterEvent.HEARTBEAT_SENT)
+        self._parts.deadlines.set(Due.ANSWER, now_s + HEARTBEAT_ANSWER_S)
+        self._heartbeat_sent_s = now_s
+        if self._sent_over_shortcut(heartbeat) or self._parts.delivery.send_own(
+            heartbeat.to_payload()
+        ):
+            return True
+        self._heartbeat_sent_s = -math.inf
+        self.answer_missed()
+        return False
+
+    def _sent_over_shortcut(self, heartbeat: HeartbeatMessage) -> bool:
+        """Send the heartbeat through a neighbour with fewer hops; True if it suffices.
+
+        Fewer hops may be those to another gateway: then the neighbour's gateway is asked as well,
+        and its answer decides. The neighbour might send a heartbeat for this node's gateway
+        straight back.
+        """
+        shortcut, self._shortcut = self._shortcut, None
+        if shortcut is None or shortcut.hops + 1 >= self.hops:
+            return False
+        to = shortcut.neighbour
+        its_gateway = self._parts.neighbours.gateway_of(to)
+        if its_gateway == NO_ROUTE:
+            its_gateway = self.gateway
+        me = self._parts.node_id
+        packet = HeartbeatMessage(
+            me, me, to, its_gateway, heartbeat.know_gateway, heartbeat.preferred_gateway, 0
+        ).to_payload()
+        return self._parts.delivery.send(packet, to) and its_gateway == self.gateway
+
+    def answer_missed(self) -> None:
+        """The time for the gateway's answer is over."""
+        self._states.happened(RouterEvent.ANSWER_MISSED)
+        self._show()
+
+    # What neighbours and gateways say --------------------------------------------------------
+
+    def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
+        """A neighbour introduced itself. True if it should be sent a heartbeat."""
+        connected = self._states.connected
+        if know_gateway != connected:
+            return connected or not self._states.awaiting
+        if (
+            connected
+            and hops + 1 < self.hops
+            and (self._shortcut is None or hops < self._shortcut.hops)
+            and self._parts.routing.get_direction_to_node(neighbour) == neighbour
+        ):
+            self._shortcut = Shortcut(neighbour, hops)
+        return False
+
+    def on_gateway_heartbeat(self, gateway: int, hops: int) -> bool:
+        """A gateway is `hops` away. True if that made the router connected."""
+        now_s = self._parts.now_s
+        if gateway != self.gateway:
+            recent = now_s - self._answered_s <= self._parts.timing.check_period_s
+            if (self._states.connected or recent) and hops >= self.hops:
+                return False
+            self._prefer(gateway)
+        is_new = not self._states.connected
+        self._states.happened(RouterEvent.GATEWAY_ANSWERED)
+        self.hops = min(hops, NO_ROUTE)
+        self._answered_s = now_s
+        self._show()
+        if is_new:
+            self._introduce()
+            self.ask_for_places()
+        return is_new
+
+    def take_gateway_of(self, neighbour: int, gateway: int) -> None:
+        """Try the gateway of a neighbour; other routes to it did not work."""
+        if gateway > MAX_NODE_ID or gateway == self._parts.node_id:
+            return
+        self._prefer(gateway)
+        self._parts.delivery.drop_routes_to(gateway)
+        self._parts.routing.other_can_communicate_with_node(neighbour, gateway)
+        self.send_heartbeat()
+
+    def ask_for_places(self) -> None:
+        """Ask the next hop where it is, and the gateway if that is unknown or may have moved."""
+        next_hop = self.next_hop()
+        if self._parts.places.gateway is None or next_hop == self.gateway:
+            self._ask_for_place(self.gateway)
+        if next_hop not in (self.gateway, NO_ROUTE):
+            self._ask_for_place(next_hop)
+
+    # The end of a connection -----------------------------------------------------------------
+
+    def end(self, event: RouterEvent) -> None:
+        """Not connected, because of `event`; earlier hop counts are void."""
+        self._states.happened(event)
+        self.hops = NO_ROUTE
+        self._shortcut = None
+        self._heartbeat_sent_s = self._answered_s = -math.inf
+        self._show()
+
+    def give_up_routes(self) -> None:
+        """Forget each route to the gateway, and inform the neighbours."""
+        if self.gateway != NO_ROUTE:
+            self._parts.delivery.drop_routes_to(self.gateway)
+            self._parts.delivery.tell_missing(self.gateway)
+
+    def _ask_for_place(self, node: int) -> None:
+        me = self._parts.node_id
+        self._parts.delivery.send_own(
+            Message(me, me, MessageType.REQUESTLOCATION, node, node).to_payload()
+        )
+
+    def _prefer(self, gateway: int) -> None:
+        if gateway != self.gateway:
+            if self.gateway != NO_ROUTE:
+                self._parts.report(MeshEventKind.GATEWAY_CHANGED, gateway)
+            self.gateway = gateway
+            self._parts.places.forget_gateway()
+
+    def _show(self) -> None:
+        """Report a change of the connection; wait for an answer no longer than is needed."""
+        if self._states.link in (Link.SEARCHING, Link.CONNECTED):
+            self._parts.deadlines.set(Due.ANSWER, math.inf)
+        connected = self._states.connected
+        if connected != self._shown_connected:
+            self._shown_connected = connected
+            kind = MeshEventKind.CONNECTED if connected else MeshEventKind.DISCONNECTED
+            self._parts.report(kind, self.gateway, f"{self.hops} hops" if connected else "")

@@ -1,0 +1,34 @@
+"""NodeParts: what the objects that make up one mesh component share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drone_mesh.communication.deadlines import Deadlines
+from drone_mesh.communication.delivery import Delivery
+from drone_mesh.communication.flight import Pilot
+from drone_mesh.communication.interfaces import IRoutingTechnique
+from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.observer import Reporter
+from drone_mesh.communication.places import KnownPlaces
+from drone_mesh.communication.timing import MeshTiming
+
+
+@dataclass(frozen=True)
+class NodeParts:
+    """The parts of one node. All of them belong to the thread that works in its component."""
+
+    node_id: int
+    timing: MeshTiming
+    deadlines: Deadlines
+    report: Reporter
+    routing: IRoutingTechnique
+    neighbours: Neighbours
+    delivery: Delivery
+    places: KnownPlaces
+    pilot: Pilot
+
+    @property
+    def now_s(self) -> float:
+        """The time that the component was last told."""
+        return self.deadlines.now_s

@@ -1,0 +1,125 @@
+"""The states of a router, and every transition between them.
+
+A router is in two states at once, as an h11 connection is in the states of its two sides. They
+overlap: a lost router still tries the gateways that its neighbours offer, and a flying one may
+be answered on the way.
+
+* `Link`: whether a gateway answers.
+* `Repair`: what the router does about a lost connection.
+
+An event that has no entry for the present state is a bug and raises RuntimeError.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Mapping
+
+
+class Link(enum.Enum):
+    """The connection to the preferred gateway."""
+
+    SEARCHING = "searching"  # not connected
+    AWAITING_FIRST_ANSWER = "awaiting the first answer"  # a heartbeat is under way
+    CONNECTED = "connected"
+    AWAITING_ANSWER = "awaiting an answer"  # connected; a heartbeat is under way
+
+
+class Repair(enum.Enum):
+    """What the router does about a lost connection."""
+
+    AT_REST = "at rest"  # nothing: it is connected, or no check has noticed the loss
+    LOST = "lost"  # waits for a gateway until the time is up
+    NEGOTIATING = "negotiating"  # has bid, and waits for the bids of its neighbours
+    FLYING = "flying"
+
+
+class RouterEvent(enum.Enum):
+    """What moves a router from state to state."""
+
+    HEARTBEAT_SENT = "a heartbeat to the gateway leaves"
+    ANSWER_MISSED = "the gateway did not answer in time, or the heartbeat could not be sent"
+    GATEWAY_ANSWERED = "a heartbeat of the gateway arrives"
+    LOSS_NOTICED = "a check finds the router unconnected"
+    BID = "the router bids for the flight"
+    BIDS_COUNTED = "the negotiation is decided"
+    NO_NEIGHBOURS = "the time is up and there is no neighbour to negotiate with"
+    TOOK_OFF = "a flight starts, or changes its goal"
+    LANDED = "the flight is over"
+    ANTENNA_OFF = "the antenna has no power"
+
+
+CONNECTED_LINKS = frozenset((Link.CONNECTED, Link.AWAITING_ANSWER))
+
+_ALL_TO_SEARCHING = {state: Link.SEARCHING for state in Link}
+_ALL_BUT_FLYING_TO_REST = {
+    Repair.AT_REST: Repair.AT_REST,
+    Repair.LOST: Repair.AT_REST,
+    Repair.NEGOTIATING: Repair.AT_REST,
+    Repair.FLYING: Repair.FLYING,
+}
+
+LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[Link, Link]] = {
+    RouterEvent.HEARTBEAT_SENT: {
+        Link.SEARCHING: Link.AWAITING_FIRST_ANSWER,
+        Link.AWAITING_FIRST_ANSWER: Link.AWAITING_FIRST_ANSWER,
+        Link.CONNECTED: Link.AWAITING_ANSWER,
+        Link.AWAITING_ANSWER: Link.AWAITING_ANSWER,
+    },
+    RouterEvent.ANSWER_MISSED: {
+        Link.AWAITING_FIRST_ANSWER: Link.SEARCHING,
+        Link.AWAITING_ANSWER: Link.SEARCHING,
+    },
+    RouterEvent.GATEWAY_ANSWERED: {state: Link.CONNECTED for state in Link},
+    RouterEvent.LOSS_NOTICED: {
+        Link.SEARCHING: Link.SEARCHING,
+        Link.AWAITING_FIRST_ANSWER: Link.SEARCHING,
+    },
+    RouterEvent.TOOK_OFF: _ALL_TO_SEARCHING,
+    RouterEvent.LANDED: _ALL_TO_SEARCHING,
+    RouterEvent.ANTENNA_OFF: _ALL_TO_SEARCHING,
+}
+"""An event that is missing here leaves the link as it is."""
+
+REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[Repair, Repair]] = {
+    RouterEvent.GATEWAY_ANSWERED: _ALL_BUT_FLYING_TO_REST,
+    RouterEvent.LOSS_NOTICED: {Repair.AT_REST: Repair.LOST},
+    RouterEvent.BID: {Repair.LOST: Repair.NEGOTIATING},
+    RouterEvent.BIDS_COUNTED: {Repair.NEGOTIATING: Repair.AT_REST},
+    RouterEvent.NO_NEIGHBOURS: {Repair.LOST: Repair.AT_REST},
+    RouterEvent.TOOK_OFF: {state: Repair.FLYING for state in Repair},
+    RouterEvent.LANDED: {Repair.FLYING: Repair.AT_REST},
+    RouterEvent.ANTENNA_OFF: _ALL_BUT_FLYING_TO_REST,
+}
+"""An event that is missing here leaves the repair as it is."""
+
+
+class RouterStates:
+    """The present states of one router."""
+
+    def __init__(self) -> None:
+        self.link = Link.SEARCHING
+        self.repair = Repair.AT_REST
+
+    @property
+    def connected(self) -> bool:
+        """Whether the gateway answered the last heartbeat, or may still answer it."""
+        return self.link in CONNECTED_LINKS
+
+    @property
+    def awaiting(self) -> bool:
+        """Whether a heartbeat to the gateway is under way."""
+        return self.link in (Link.AWAITING_FIRST_ANSWER, Link.AWAITING_ANSWER)
+
+    def happened(self, event: RouterEvent) -> None:
+        """Move on. Raises RuntimeError, and changes nothing, if `event` cannot happen now."""
+        links, repairs = LINK_TRANSITIONS.get(event), REPAIR_TRANSITIONS.get(event)
+        try:
+            link = self.link if links is None else links[self.link]
+            repair = self.repair if repairs is None else repairs[self.repair]
+        except KeyError:
+            raise RuntimeError(
+                f"{event.name} cannot happen to a router that is {self.link.value} "
+                f"and {self.repair.value}"
+            ) from None
+        self.link, self.repair = link, repair
