@@ -46,9 +46,7 @@ def plan_fleet(
         StartPlace(i, Role.GATEWAY, GATEWAY_COLUMN_M, float(i)) for i in range(gateways)
     ]
     router_places = [
-        StartPlace(
-            gateways + k, Role.ROUTER, spacing * (k % gridsize), spacing * (k // gridsize)
-        )
+        StartPlace(gateways + k, Role.ROUTER, spacing * (k % gridsize), spacing * (k // gridsize))
         for k in range(routers)
     ]
     return tuple(gateway_places + router_places)

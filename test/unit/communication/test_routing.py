@@ -34,9 +34,7 @@ def test_a_class_of_any_module_can_be_named():
 
 @pytest.mark.parametrize("name", ["", "child_table_three", "ChildTableTree"])
 def test_an_unknown_name_is_refused_with_a_list_of_what_is_known(name):
-    with pytest.raises(
-        ConfigurationError, match=f"technique {name!r}: use one of .*child_tab"
-    ):
+    with pytest.raises(ConfigurationError, match=f"technique {name!r}: use one of .*child_tab"):
         create_routing_technique(name)
 
 

@@ -202,7 +202,7 @@ def test_another_routing_technique_is_used_by_all_when_it_is_named():
 
 def test_an_id_is_given_once():
     network = line(1)
-    with pytest.raises(ValueError, match="node 1 is there already"):
+    with pytest.raises(ValueError, match="node 1 already exists"):
         network.add_router(1, 0.0, 0.0)
 
 
