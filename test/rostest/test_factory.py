@@ -60,7 +60,7 @@ class FactoryTest(unittest.TestCase):
         self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 0.0).success)
         wait_for("the clock did not go on", 10, lambda: rospy.get_time() > stopped_s + 1.0)
 
-    def test_drones_start_where_the_reference_says(self) -> None:
+    def test_drones_start_where_the_protocol_says(self) -> None:
         self.assertEqual(self.start_places, [(-1.0, 0.0, 0), (0.0, 0.0, 0), (1.0, 0.0, 0)])
 
     def test_a_goal_is_flown_to_and_told_at_most_20_times_a_second(self) -> None:

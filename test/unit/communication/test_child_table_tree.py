@@ -165,7 +165,7 @@ def test_a_proven_path_leaves_a_child_a_child():
 
 
 class Naive(IRoutingTechnique):
-    """The words of section 8, with nothing made fast. `proven_path_to_node` is the interface's."""
+    """The rules as written, without optimisation. `proven_path_to_node` is the interface's."""
 
     def __init__(self):
         self.sets = {}

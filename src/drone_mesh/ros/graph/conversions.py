@@ -32,5 +32,5 @@ def gps_response(location: Location) -> RequestGPSResponse:
 
 
 def engine_info(node_id: int, position: Vector) -> DroneInfo:
-    """What an engine tells the simulator: where it is, never a topic (reference 14.1)."""
+    """The DroneInfo of an engine (docs/protocol.md, "Who speaks in DroneInfo")."""
     return DroneInfo(nodeID=node_id, position=position, sub="", on=True)

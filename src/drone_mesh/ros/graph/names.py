@@ -1,4 +1,4 @@
-"""Names of the ROS graph: the wire contract (reference, section 4), and what we added to it."""
+"""Names of the ROS graph (docs/protocol.md, "ROS interface"), and the names that we added."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from drone_mesh.msg import NodeDebugInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.srv import PowerSwitch, PowerSwitchResponse
 
-DEBUG_PERIOD_S = 1.0  # reference, section 4: 1 Hz
+DEBUG_PERIOD_S = 1.0  # docs/protocol.md, "Topics"
 SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers at the latest after this (wall) time
 _MAX_UINT16 = 0xFFFF
 

@@ -19,7 +19,7 @@ from drone_mesh.srv import Broadcast, WirelessMessage, WirelessMessages
 
 LOOK_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
 ANNOUNCE_AGAIN_AFTER = 20  # looks; our choice: an antenna not yet registered speaks up again
-_NO_PLACE = (0.0, 0.0, 0.0)  # an antenna never gives a position, reference 14.1
+_NO_PLACE = (0.0, 0.0, 0.0)  # an antenna sends no position (docs/protocol.md, "Virtual antenna")
 
 _LENGTH = struct.Struct("<I")  # of an array, as ROS serialises it
 

@@ -1,4 +1,4 @@
-"""VirtualNRF24: an antenna in the simulated air (reference, section 7)."""
+"""VirtualNRF24: an antenna in the simulated air (docs/protocol.md, "Virtual antenna")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""VirtualRaspberryPi: the computer that a simulated drone carries (reference, section 11)."""
+"""VirtualRaspberryPi, a simulated drone's computer (docs/protocol.md, "Virtual Raspberry Pi")."""
 
 from __future__ import annotations
 

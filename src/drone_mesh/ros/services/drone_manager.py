@@ -1,4 +1,4 @@
-"""DroneManager: orders from people to drones, by way of the gateways (reference, section 12)."""
+"""DroneManager: orders to drones, through the gateways (docs/protocol.md, "Drone manager")."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from drone_mesh.srv import (
     RequestDroneFlightResponse,
 )
 
-WAIT_FOR_GATEWAY_S = 3.0  # reference, section 12; wall seconds, for people wait
+WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/protocol.md, "Drone manager")
 LOOK_PERIOD_S = 0.05
 ORDERS_IN_QUEUE = 512  # two whole fleets
 

@@ -1,4 +1,7 @@
-"""WirelessSignalSimulator: the simulated air as a ROS node (reference, sections 6 and 14.1)."""
+"""WirelessSignalSimulator: the simulated air as a ROS node.
+
+docs/protocol.md, "Wireless signal simulator".
+"""
 
 from __future__ import annotations
 

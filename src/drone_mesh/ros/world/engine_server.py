@@ -1,4 +1,4 @@
-"""EngineServer: the ROS side of a drone's engine (reference, section 11)."""
+"""EngineServer: the ROS side of a drone's engine (docs/protocol.md, "World and flights")."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drone_mesh.srv import RequestGPS, RequestGPSResponse
 from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
 
-INFO_PERIOD_S = 0.05  # at most 20 DroneInfo per simulated second, reference, section 11
+INFO_PERIOD_S = 0.05  # at most 20 DroneInfo per simulated second
 _ROUNDING_S = 1e-6  # simulated time comes in hundredths, which floats do not hold exactly
 
 _log = logging.getLogger(__name__)
