@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Callable, Iterator
 
 import rospy
-from drone_mesh.msg import MeshState
 from PIL import ImageGrab
 from playwright.sync_api import Browser, sync_playwright
 
+from drone_mesh.msg import MeshState
 from drone_mesh.ros.views.console_controls import RosControls
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

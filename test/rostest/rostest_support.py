@@ -11,9 +11,10 @@ from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rospy
+from rosgraph_msgs.msg import Log
+
 from drone_mesh.msg import NRF24, DroneInfo, NodeDebugInfo
 from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
-from rosgraph_msgs.msg import Log
 
 PAYLOAD_BYTES = 32
 STANDSTILL_S = 20.0  # wall: time that does not move means that the world has died

@@ -10,8 +10,9 @@ import urllib.request
 
 import rospy
 import rostest
-from drone_mesh.msg import NRF24
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, wait_for
+
+from drone_mesh.msg import NRF24
 
 GATEWAY_URL = "http://127.0.0.1:9080"
 ANSWER_WITHIN_S = 5.0

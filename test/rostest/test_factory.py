@@ -10,10 +10,11 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from drone_mesh.msg import DroneInfo, Location, MeshState
-from drone_mesh.srv import SetSpeed
 from rosgraph_msgs.msg import Clock
 from rostest_support import LogWatch, MeshWatch, call, wait_for
+
+from drone_mesh.msg import DroneInfo, Location, MeshState
+from drone_mesh.srv import SetSpeed
 
 
 class FactoryTest(unittest.TestCase):

@@ -7,8 +7,9 @@ import unittest
 
 import rospy
 import rostest
-from drone_mesh.msg import Location
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch
+
+from drone_mesh.msg import Location
 
 PLACES = {  # longitude, latitude: data of the project plan's field case
     1: (-13, 24), 2: (-11, 20), 3: (-12, 14), 4: (-7, 16), 5: (-12, 7), 6: (-7, 12),

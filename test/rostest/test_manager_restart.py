@@ -7,8 +7,9 @@ import unittest
 
 import rospy
 import rostest
-from drone_mesh.srv import RequestDroneFlight
 from rostest_support import LogWatch, MeshWatch, call, kill_and_wait_for_respawn
+
+from drone_mesh.srv import RequestDroneFlight
 
 
 class ManagerRestartTest(unittest.TestCase):

@@ -12,10 +12,11 @@ import rosgraph
 import rospkg
 import rospy
 import rostest
-from drone_mesh.srv import PowerSwitch
 from rostest_support import WALL_LIMIT_S, call, wait_for
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
+
+from drone_mesh.srv import PowerSwitch
 
 RVIZ_LIMIT_S = 40.0  # software rendering takes its time
 

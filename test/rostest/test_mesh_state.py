@@ -9,9 +9,10 @@ import rosgraph
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
+from rostest_support import WALL_LIMIT_S, LogWatch, call, wait_for
+
 from drone_mesh.msg import MeshEvent, MeshState
 from drone_mesh.srv import PowerSwitch, RequestDroneFlight, SetSpeed
-from rostest_support import WALL_LIMIT_S, LogWatch, call, wait_for
 
 
 class MeshStateTest(unittest.TestCase):

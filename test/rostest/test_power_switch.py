@@ -7,8 +7,9 @@ import unittest
 
 import rospy
 import rostest
-from drone_mesh.srv import AreaScan
 from rostest_support import LogWatch, MeshWatch, call
+
+from drone_mesh.srv import AreaScan
 
 
 def near(node_id: int) -> list[int]:

@@ -15,9 +15,10 @@ import rosgraph
 import rospkg
 import rospy
 import rostest
+from rostest_support import WALL_LIMIT_S, call, wait_for
+
 from drone_mesh.msg import MeshState
 from drone_mesh.srv import PowerSwitch
-from rostest_support import WALL_LIMIT_S, call, wait_for
 
 TOOLS = ("status", "snapshot", "report")
 NODES = (

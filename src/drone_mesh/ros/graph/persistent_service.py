@@ -6,6 +6,7 @@ import io
 import select
 import socket
 import struct
+from typing import Generic, Protocol, TypeVar
 
 import rosgraph
 import rospy
@@ -34,7 +35,18 @@ class ServiceRefused(MeshError):
     """The service is there and answered with an error; the message is what it said."""
 
 
-class PersistentService:
+Request = TypeVar("Request", bound=Message)
+Response = TypeVar("Response", bound=Message)
+
+
+class ServiceClass(Protocol[Request, Response]):
+    """What genpy makes of a .srv file."""
+
+    _request_class: type[Request]
+    _response_class: type[Response]
+
+
+class PersistentService(Generic[Request, Response]):
     """One connection to one service.
 
     rospy's ServiceProxy makes the connection, but has no timeout for calls, says only in words
@@ -43,7 +55,12 @@ class PersistentService:
     `connect` and `close` may be called by another thread than `call`, but not during a call.
     """
 
-    def __init__(self, name: str, service_class: type, timeout_s: int = CALL_TIMEOUT_S) -> None:
+    def __init__(
+        self,
+        name: str,
+        service_class: ServiceClass[Request, Response],
+        timeout_s: int = CALL_TIMEOUT_S,
+    ) -> None:
         """`timeout_s`: whole wall seconds to wait for an answer."""
         self.name = name
         self._timeval = struct.pack("@ll", timeout_s, 0)
@@ -75,7 +92,7 @@ class PersistentService:
             raise ServiceGone(f"{self.name}: {error}") from error
         self._transport = transport
 
-    def call(self, request: Message) -> Message:
+    def call(self, request: Request) -> Response:
         """The answer. Raises ServiceGone without a connection and ServiceRefused for an error."""
         fields = io.BytesIO()
         request.serialize(fields)

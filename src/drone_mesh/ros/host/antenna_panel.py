@@ -12,7 +12,7 @@ from drone_mesh.communication.interfaces import IMeshDebugInfo
 from drone_mesh.execution import Seat
 from drone_mesh.msg import NodeDebugInfo
 from drone_mesh.ros.graph import names
-from drone_mesh.srv import PowerSwitch, PowerSwitchResponse
+from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
 
 DEBUG_PERIOD_S = 1.0  # docs/protocol.md, "Topics"
 SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers at the latest after this (wall) time
@@ -81,7 +81,7 @@ class AntennaPanel:
             prefLoc=info.get_last_good_known_location_id(),
         )
 
-    def _power_switched(self, request: PowerSwitch) -> PowerSwitchResponse:
+    def _power_switched(self, request: PowerSwitchRequest) -> PowerSwitchResponse:
         if request.power != self._is_on():
             self._switch(request.power)
             done = threading.Event()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import random
 from typing import Iterable
@@ -25,6 +26,7 @@ from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.host.antenna_panel import AntennaPanel
 from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.world.engine import DroneState
 
 _RECEIVED_QUEUE = 32  # packets that a slow reader of /Node/<id> may be behind
 
@@ -88,6 +90,10 @@ class EmulatedNRF24(IWirelessCommunication):
             self._received.publish(NRF24(payload))
 
 
+def _carry(chip: EmulatedChip, state: DroneState) -> None:
+    chip.position = state.position
+
+
 class EmulatedRadios:
     """One emulated air in the time of the wall, and a chip at the place of each drone.
 
@@ -105,7 +111,7 @@ class EmulatedRadios:
         for drone in drones:
             engine = drone.engine
             chip = EmulatedChip(air, f"node {drone.node_id}", engine.state.position)
-            engine.add_listener(lambda state, chip=chip: setattr(chip, "position", state.position))
+            engine.add_listener(functools.partial(_carry, chip))
             self._chips[drone.node_id] = chip
         _log.info(
             "radio nrf24: the real driver on %d emulated chips, edge of the range at %g m",

@@ -15,7 +15,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_msg
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
-from drone_mesh.srv import RequestGPS, RequestGPSRequest
+from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
 
 CONNECT_AGAIN_AFTER_S = 1.0  # our choice: wall seconds; asking costs the worker's time
 
@@ -58,7 +58,7 @@ class RosDroneEngineConnector(IDroneEngine):
             raise LocationUnknown(str(error)) from error
         return Location(answer.latitude, answer.longitude, float(answer.height))
 
-    def _ask(self) -> Location:
+    def _ask(self) -> RequestGPSResponse:
         if not self._gps.is_connected():
             if time.monotonic() < self._gone_until_s:
                 raise ServiceGone(f"{self._gps.name}: nobody answered a moment ago")

@@ -20,8 +20,10 @@ from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import file_parameter, or_stop
 from drone_mesh.srv import (
     Casus,
+    CasusRequest,
     CasusResponse,
     RequestDroneFlight,
+    RequestDroneFlightRequest,
     RequestDroneFlightResponse,
 )
 
@@ -54,7 +56,7 @@ class DroneManager:
         rospy.Service(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, self._request_movement)
         rospy.Service(names.SET_TO_CASUS_SERVICE, Casus, self._set_to_casus)
 
-    def _request_movement(self, request: RequestDroneFlight) -> RequestDroneFlightResponse:
+    def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
         """Status 1: at least one gateway got the order; 0: there is none."""
         goal = Location(request.latitude, request.longitude, request.height)
         try:
@@ -69,7 +71,7 @@ class DroneManager:
         self._order(request.ID, goal)
         return RequestDroneFlightResponse(status=1)
 
-    def _set_to_casus(self, request: Casus) -> CasusResponse:
+    def _set_to_casus(self, request: CasusRequest) -> CasusResponse:
         try:
             orders = self._layouts.orders(request.caseID)
         except UnknownCase as error:

@@ -26,12 +26,16 @@ from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import factory_configuration, or_stop
 from drone_mesh.srv import (
     AreaScan,
+    AreaScanRequest,
     AreaScanResponse,
     Broadcast,
+    BroadcastRequest,
     BroadcastResponse,
     WirelessMessage,
+    WirelessMessageRequest,
     WirelessMessageResponse,
     WirelessMessages,
+    WirelessMessagesRequest,
     WirelessMessagesResponse,
 )
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
@@ -153,7 +157,7 @@ class WirelessSignalSimulator:
             if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
                 raise AirError(f"node {info.nodeID}: {info.sub[:60]} is a topic of {kind}")
 
-    def _message(self, request: WirelessMessage) -> WirelessMessageResponse:
+    def _message(self, request: WirelessMessageRequest) -> WirelessMessageResponse:
         with self._lock:
             topic = self._nodes.link(request.from_, request.to)
         if topic is None:
@@ -165,7 +169,7 @@ class WirelessSignalSimulator:
             )
         return WirelessMessageResponse(self._carry(topic, request.message))
 
-    def _messages(self, request: WirelessMessages) -> WirelessMessagesResponse:
+    def _messages(self, request: WirelessMessagesRequest) -> WirelessMessagesResponse:
         joined = request.packets
         if len(joined) % PAYLOAD_BYTES:
             raise rospy.ServiceException(
@@ -181,7 +185,7 @@ class WirelessSignalSimulator:
             ]
         )
 
-    def _broadcast(self, request: Broadcast) -> BroadcastResponse:
+    def _broadcast(self, request: BroadcastRequest) -> BroadcastResponse:
         with self._lock:
             nodes = self._in_range(request.from_)
             topics = [self._nodes.link(request.from_, node) for node in nodes]
@@ -194,7 +198,7 @@ class WirelessSignalSimulator:
             ]
         )
 
-    def _others_in_range(self, request: AreaScan) -> AreaScanResponse:
+    def _others_in_range(self, request: AreaScanRequest) -> AreaScanResponse:
         with self._lock:
             nodes = self._in_range(request.id)
             topics = [self._nodes.link(request.id, node) for node in nodes]

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import logging
 
-from genpy import Message
-
 from drone_mesh.console.orders import OrderRefused
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
+from drone_mesh.ros.graph.persistent_service import (
+    PersistentService,
+    Request,
+    Response,
+    ServiceClass,
+    ServiceGone,
+    ServiceRefused,
+)
 from drone_mesh.srv import (
     Casus,
     CasusRequest,
@@ -57,7 +62,7 @@ class RosControls:
         return f"time runs {factor:g} times as fast as on the wall" if factor else "time goes on"
 
 
-def _call(name: str, service_class: type, request: Message) -> Message:
+def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
     service = PersistentService(name, service_class, ORDER_TIMEOUT_S)
     try:
         service.connect()

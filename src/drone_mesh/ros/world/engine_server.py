@@ -13,7 +13,7 @@ from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import engine_info, gps_response
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.srv import RequestGPS, RequestGPSResponse
+from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
 from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
 
@@ -77,7 +77,7 @@ class EngineServer:
         except GoalRefused as error:
             self._complaints.warning(f"drone {self._node_id} refuses a goal", str(error))
 
-    def _gps(self, _request: RequestGPS) -> RequestGPSResponse:
+    def _gps(self, _request: RequestGPSRequest) -> RequestGPSResponse:
         return gps_response(self._engine.get_location())
 
     def _moved(self, state: DroneState) -> None:

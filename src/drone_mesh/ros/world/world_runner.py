@@ -13,7 +13,7 @@ from std_msgs.msg import Float32, Header
 
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
-from drone_mesh.srv import SetSpeed, SetSpeedResponse
+from drone_mesh.srv import SetSpeed, SetSpeedRequest, SetSpeedResponse
 from drone_mesh.world.interfaces import World
 from drone_mesh.world.pace import Pace
 
@@ -144,7 +144,7 @@ class WorldRunner:
         elif reached < _TOO_SLOW * self._wanted:
             _log.warning("real-time factor %.2f reached, %g asked for", reached, self._wanted)
 
-    def _set_speed(self, request: SetSpeed) -> SetSpeedResponse:
+    def _set_speed(self, request: SetSpeedRequest) -> SetSpeedResponse:
         factor = request.real_time_factor
         if not (math.isfinite(factor) and factor >= 0.0):
             return SetSpeedResponse(False, f"{factor} is no factor; want a number above 0")

@@ -1,0 +1,156 @@
+"""Written by scripts/message_stubs from the files in msg/."""
+
+from typing import Final, Sequence
+
+import rospy
+import std_msgs.msg
+from genpy import Message
+
+from drone_mesh.state.model import NodeStatus
+
+class DroneInfo(Message):
+    nodeID: int
+    position: Sequence[float]
+    sub: str
+    on: bool
+    def __init__(
+        self,
+        nodeID: int = ...,
+        position: Sequence[float] = ...,
+        sub: str = ...,
+        on: bool = ...,
+    ) -> None: ...
+
+class HostReport(Message):
+    header: std_msgs.msg.Header
+    host: str
+    nodes: list[NodeState]
+    events: list[MeshEvent]
+    def __init__(
+        self,
+        header: std_msgs.msg.Header = ...,
+        host: str = ...,
+        nodes: Sequence[NodeState] = ...,
+        events: Sequence[MeshEvent] = ...,
+    ) -> None: ...
+
+class Location(Message):
+    latitude: float
+    longitude: float
+    height: int
+    def __init__(
+        self,
+        latitude: float = ...,
+        longitude: float = ...,
+        height: int = ...,
+    ) -> None: ...
+
+class MeshEvent(Message):
+    stamp: rospy.Time
+    node: int
+    kind: str
+    peers: bytes
+    detail: str
+    def __init__(
+        self,
+        stamp: rospy.Time = ...,
+        node: int = ...,
+        kind: str = ...,
+        peers: bytes | Sequence[int] = ...,
+        detail: str = ...,
+    ) -> None: ...
+
+class MeshState(Message):
+    header: std_msgs.msg.Header
+    max_distance: float
+    real_time_factor: float
+    achieved_real_time_factor: float
+    paused: bool
+    nodes: list[NodeState]
+    def __init__(
+        self,
+        header: std_msgs.msg.Header = ...,
+        max_distance: float = ...,
+        real_time_factor: float = ...,
+        achieved_real_time_factor: float = ...,
+        paused: bool = ...,
+        nodes: Sequence[NodeState] = ...,
+    ) -> None: ...
+
+class NRF24(Message):
+    payload: bytes
+    def __init__(self, payload: bytes | Sequence[int] = ...) -> None: ...
+
+class NodeDebugInfo(Message):
+    nodeID: int
+    ConnectedWithGateway: bool
+    familySize: int
+    totalMessages: int
+    prefferedGateWay: int
+    on: bool
+    hops: int
+    prefLoc: int
+    def __init__(
+        self,
+        nodeID: int = ...,
+        ConnectedWithGateway: bool = ...,
+        familySize: int = ...,
+        totalMessages: int = ...,
+        prefferedGateWay: int = ...,
+        on: bool = ...,
+        hops: int = ...,
+        prefLoc: int = ...,
+    ) -> None: ...
+
+class NodeState(Message, NodeStatus):
+    ROUTER: Final = 0
+    GATEWAY: Final = 1
+    UNKNOWN: Final = 255
+    id: int
+    role: int
+    on: bool
+    connected: bool
+    gateway: int
+    hops: int
+    next_hop: int
+    pref_loc: int
+    known_nodes: int
+    total_messages: int
+    neighbours: bytes
+    neighbour_ages: bytes
+    route: bytes
+    position: Sequence[float]
+    path: Sequence[float]
+    report_age: float
+    def __init__(
+        self,
+        id: int = ...,
+        role: int = ...,
+        on: bool = ...,
+        connected: bool = ...,
+        gateway: int = ...,
+        hops: int = ...,
+        next_hop: int = ...,
+        pref_loc: int = ...,
+        known_nodes: int = ...,
+        total_messages: int = ...,
+        neighbours: bytes | Sequence[int] = ...,
+        neighbour_ages: bytes | Sequence[int] = ...,
+        route: bytes | Sequence[int] = ...,
+        position: Sequence[float] = ...,
+        path: Sequence[float] = ...,
+        report_age: float = ...,
+    ) -> None: ...
+
+class RequestGatewayDroneFlight(Message):
+    ID: int
+    latitude: float
+    longitude: float
+    height: int
+    def __init__(
+        self,
+        ID: int = ...,
+        latitude: float = ...,
+        longitude: float = ...,
+        height: int = ...,
+    ) -> None: ...

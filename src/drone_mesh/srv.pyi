@@ -1,0 +1,131 @@
+"""Written by scripts/message_stubs from the files in srv/."""
+
+from typing import Sequence
+
+from genpy import Message
+
+from drone_mesh.msg import NRF24
+
+class AreaScanRequest(Message):
+    id: int
+    def __init__(self, id: int = ...) -> None: ...
+
+class AreaScanResponse(Message):
+    near: bytes
+    def __init__(self, near: bytes | Sequence[int] = ...) -> None: ...
+
+class AreaScan:
+    _request_class = AreaScanRequest
+    _response_class = AreaScanResponse
+
+class BroadcastRequest(Message):
+    from_: int
+    message: NRF24
+    def __init__(self, from_: int = ..., message: NRF24 = ...) -> None: ...
+
+class BroadcastResponse(Message):
+    reached: bytes
+    def __init__(self, reached: bytes | Sequence[int] = ...) -> None: ...
+
+class Broadcast:
+    _request_class = BroadcastRequest
+    _response_class = BroadcastResponse
+
+class CasusRequest(Message):
+    caseID: int
+    def __init__(self, caseID: int = ...) -> None: ...
+
+class CasusResponse(Message): ...
+
+class Casus:
+    _request_class = CasusRequest
+    _response_class = CasusResponse
+
+class PowerSwitchRequest(Message):
+    power: bool
+    def __init__(self, power: bool = ...) -> None: ...
+
+class PowerSwitchResponse(Message): ...
+
+class PowerSwitch:
+    _request_class = PowerSwitchRequest
+    _response_class = PowerSwitchResponse
+
+class RequestDroneFlightRequest(Message):
+    ID: int
+    latitude: float
+    longitude: float
+    height: int
+    def __init__(
+        self,
+        ID: int = ...,
+        latitude: float = ...,
+        longitude: float = ...,
+        height: int = ...,
+    ) -> None: ...
+
+class RequestDroneFlightResponse(Message):
+    status: int
+    def __init__(self, status: int = ...) -> None: ...
+
+class RequestDroneFlight:
+    _request_class = RequestDroneFlightRequest
+    _response_class = RequestDroneFlightResponse
+
+class RequestGPSRequest(Message): ...
+
+class RequestGPSResponse(Message):
+    latitude: float
+    longitude: float
+    height: int
+    def __init__(
+        self,
+        latitude: float = ...,
+        longitude: float = ...,
+        height: int = ...,
+    ) -> None: ...
+
+class RequestGPS:
+    _request_class = RequestGPSRequest
+    _response_class = RequestGPSResponse
+
+class SetSpeedRequest(Message):
+    paused: bool
+    real_time_factor: float
+    def __init__(self, paused: bool = ..., real_time_factor: float = ...) -> None: ...
+
+class SetSpeedResponse(Message):
+    success: bool
+    message: str
+    def __init__(self, success: bool = ..., message: str = ...) -> None: ...
+
+class SetSpeed:
+    _request_class = SetSpeedRequest
+    _response_class = SetSpeedResponse
+
+class WirelessMessageRequest(Message):
+    from_: int
+    to: int
+    message: NRF24
+    def __init__(self, from_: int = ..., to: int = ..., message: NRF24 = ...) -> None: ...
+
+class WirelessMessageResponse(Message):
+    succes: bool
+    def __init__(self, succes: bool = ...) -> None: ...
+
+class WirelessMessage:
+    _request_class = WirelessMessageRequest
+    _response_class = WirelessMessageResponse
+
+class WirelessMessagesRequest(Message):
+    from_: int
+    packets: bytes
+    def __init__(self, from_: int = ..., packets: bytes | Sequence[int] = ...) -> None: ...
+
+class WirelessMessagesResponse(Message):
+    succes: Sequence[bool]
+    def __init__(self, succes: Sequence[bool] = ...) -> None: ...
+
+class WirelessMessages:
+    _request_class = WirelessMessagesRequest
+    _response_class = WirelessMessagesResponse

@@ -1,0 +1,9 @@
+from rospy import SubscribeListener
+from rospy.impl.transport import Transport
+
+# rospy.topics._TopicImpl in truth, which is not importable by a public name.
+class TopicImpl:
+    connections: list[Transport]
+    def add_subscriber_listener(self, listener: SubscribeListener) -> None: ...
+    def check(self) -> None: ...
+    def has_connections(self) -> bool: ...
