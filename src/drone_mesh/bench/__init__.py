@@ -1,1 +1,1 @@
-"""The benchmark command: starts the system by itself, measures it, and prints what it found."""
+"""The benchmark command: starts the system, measures it and prints the figures."""

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""python3 -m drone_mesh.bench: without ROS with --only inprocess."""
+"""python3 -m drone_mesh.bench; needs no ROS with --only inprocess."""
 
 from drone_mesh.bench.command import main
 

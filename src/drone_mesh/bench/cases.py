@@ -1,4 +1,4 @@
-"""What is measured: how many drones, how far apart, how fast their time runs."""
+"""The cases that are measured: number of drones, spacing, speed of simulated time."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ class Case:
 
     drones: int  # the gateway included
     spacing_m: float
-    real_time_factor: float = 1.0  # 0: as fast as it goes
+    real_time_factor: float = 1.0  # 0: as fast as possible
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError for a fleet that the factory would not make."""
+        """Raises ConfigurationError for a fleet that the factory would refuse."""
         plan_fleet(1, self.routers, self.gridsize, self.spacing_m)
         if not (math.isfinite(self.real_time_factor) and self.real_time_factor >= 0):
-            raise ConfigurationError(f"real-time factor: {self.real_time_factor} is below 0")
+            raise ConfigurationError(
+                f"invalid real-time factor {self.real_time_factor}: must be 0 or more"
+            )
 
     @classmethod
     def parse(cls, text: str) -> Case:
@@ -37,22 +39,22 @@ class Case:
             return cls(int(drones), float(spacing), float(factor) if at else 1.0)
         except ValueError:
             raise ConfigurationError(
-                f"{text!r} is no size: write DRONES/SPACING, such as 100/6 for 100 drones 6 m "
-                "apart, or DRONES/SPACING@FACTOR, such as 17/6@0 for 17 as fast as it goes"
+                f"invalid size {text!r}: write DRONES/SPACING, such as 100/6 for 100 drones 6 m "
+                "apart, or DRONES/SPACING@FACTOR, such as 17/6@0 for 17 as fast as possible"
             ) from None
 
     @property
     def routers(self) -> int:
-        """All but the gateway."""
+        """All drones except the gateway."""
         return self.drones - 1
 
     @property
     def gridsize(self) -> int:
-        """Routers in a row: as many as there are rows."""
+        """Routers in a row of a square grid."""
         return max(1, math.ceil(math.sqrt(self.routers)))
 
     def launch_args(self) -> list[str]:
-        """The fleet for factory.launch."""
+        """The arguments of factory.launch for this fleet."""
         return [
             "gateways:=1",
             f"routers:={self.routers}",

@@ -25,14 +25,14 @@ ROS, INPROCESS = "ros", "inprocess"
 EXIT_FAILED, EXIT_INTERRUPTED = 1, 130
 
 DESCRIPTION = """\
-Starts the system by itself, for one size after the other, measures it and prints tables.
-It brings its own ROS master on a free port and ends all that it started, also on Ctrl-C.
+Starts the simulation once per size, measures it and prints tables. Uses its own ROS master
+on a free port and stops everything that it started, also on Ctrl-C.
 """
 EPILOG = """\
 examples:
   rosrun drone_mesh bench --quick
   rosrun drone_mesh bench --sizes 100/6 100/1 --launch hosts:=2 --json result.json
-  rosrun drone_mesh bench --hours 1                    an hour of simulated time: does it grow?
+  rosrun drone_mesh bench --hours 1                    an hour: memory, threads, connections
   python3 -m drone_mesh.bench --only inprocess         needs no ROS
 """
 
@@ -40,7 +40,7 @@ examples:
 def _positive(text: str) -> float:
     value = float(text)
     if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+        raise argparse.ArgumentTypeError(f"invalid value {text}: must be above 0")
     return value
 
 
@@ -53,7 +53,7 @@ def _size(text: str) -> Case:
 
 def _launch_arg(text: str) -> str:
     if ":=" not in text:
-        raise argparse.ArgumentTypeError(f"{text!r} is no launch argument: write name:=value")
+        raise argparse.ArgumentTypeError(f"invalid launch argument {text!r}: write name:=value")
     return text
 
 
@@ -65,26 +65,28 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--quick", action="store_true", help="less of everything: under 2 minutes")
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer sizes and runs, under 2 minutes"
+    )
     parser.add_argument(
         "--sizes",
         nargs="+",
         type=_size,
         metavar="DRONES/SPACING[@FACTOR]",
-        help="what to start; default: " + " ".join(map(_in_short, cases.FULL)),
+        help="fleets to measure; default: " + " ".join(map(_in_short, cases.FULL)),
     )
-    parser.add_argument("--only", choices=(ROS, INPROCESS), help="leave the other half out")
+    parser.add_argument("--only", choices=(ROS, INPROCESS), help="measure only this half")
     parser.add_argument(
         "--seconds",
         type=_positive,
-        help=f"wall seconds that each size is measured; default: {WINDOW_S:g}",
+        help=f"wall seconds to measure each size; default: {WINDOW_S:g}",
     )
     parser.add_argument(
         "--hours",
         type=_positive,
         help="instead of the tables: run one size (default: "
-        f"{_in_short(cases.SOAK)}) for so many hours of simulated time, and see whether memory, "
-        "threads or connections grow",
+        f"{_in_short(cases.SOAK)}) for this many hours of simulated time and report whether "
+        "memory, threads or connections grow",
     )
     parser.add_argument(
         "--launch",
@@ -94,7 +96,9 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="NAME:=VALUE",
         help="further arguments for factory.launch",
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there, too")
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="also write all figures to this file"
+    )
     parser.add_argument("--port", type=int, help="of the ROS master; default: a free one")
     return parser
 
@@ -105,7 +109,7 @@ def _in_short(case: Case) -> str:
 
 
 class Benchmark:
-    """What was asked for, and what was found so far."""
+    """The options of one run, and the results so far."""
 
     def __init__(self, options: argparse.Namespace, progress: Progress) -> None:
         self._options = options
@@ -117,7 +121,7 @@ class Benchmark:
         self._soak: soak.SoakResult | None = None
 
     def run(self) -> int:
-        """Measure; returns the exit code. What was found is told even if it is interrupted."""
+        """Measure and return the exit code. An interrupted run prints its results so far."""
         options = self._options
         try:
             if options.hours is not None:
@@ -130,9 +134,9 @@ class Benchmark:
         except KeyboardInterrupt:
             self._progress.clear()
             print("interrupted", file=sys.stderr)
-            self._tell()
+            self._print_results()
             return EXIT_INTERRUPTED
-        self._tell()
+        self._print_results()
         grew = self._soak is not None and (verdict := self._soak.verdict()) and not verdict.steady
         return EXIT_FAILED if self._failed or grew else 0
 
@@ -183,7 +187,7 @@ class Benchmark:
         self._failed.append({"case": str(case), "reason": str(error)})
         print(f"bench: {case}: {error}", file=sys.stderr)
 
-    def _tell(self) -> None:
+    def _print_results(self) -> None:
         sections = [f"Measured on {self._machine}."]
         if self._ros:
             sections.append(report.ros_tables(self._ros))
@@ -212,12 +216,12 @@ class Benchmark:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command; exits with 0, or 1 when something failed, 130 when interrupted."""
+    """Run the command; exits with 0, with 1 after a failure, with 130 when interrupted."""
     options = make_parser().parse_args(arguments)
     if options.json is not None and not options.json.absolute().parent.is_dir():
-        sys.exit(f"bench: --json {options.json}: there is no such directory")
-    # So that a TERM ends what was started here, as Ctrl-C does; a shell's background job starts
-    # out deaf to the latter.
+        sys.exit(f"bench: --json {options.json}: no such directory")
+    # TERM and Ctrl-C both stop the processes started here. A background job of a shell starts
+    # with SIGINT ignored.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:

@@ -1,4 +1,4 @@
-"""How fast the in-process network runs."""
+"""Measures the speed of the in-process network."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIMULATED_S = 60.0  # six rounds of the default timing
 
 @dataclass(frozen=True)
 class InProcessResult:
-    """Several runs of one size: medians, and the best, which other work disturbed least."""
+    """Several runs of one size: medians, and the best run, which other load disturbed least."""
 
     drones: int
     spacing_m: float
@@ -30,7 +30,7 @@ class InProcessResult:
     running_per_cpu_s: float
     running_per_wall_s: float
     running_best_per_cpu_s: float
-    packets: int  # that arrived, in both phases of one run
+    packets: int  # delivered in both phases of one run
     all_connected: bool
 
 
@@ -53,9 +53,9 @@ def measure(
     say: Callable[[str], None],
     simulated_s: float = SIMULATED_S,
 ) -> InProcessResult:
-    """Start a network `runs` times, and let each run first from its start and then on.
+    """Start a network `runs` times and measure two phases of each run.
 
-    The start costs more: everybody meets everybody.
+    The first phase costs more, because the nodes find each other in it.
     """
     case = Case(drones, SPACING_M)
     starting: list[_Pace] = []

@@ -1,4 +1,4 @@
-"""One fleet, from its launch to the figures of its table row."""
+"""Measures one fleet, from its launch to the figures of its table row."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from drone_mesh.bench.system import BenchmarkError, System
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE, WORST_LAG
 
 ON_WITHIN_S = 180.0  # wall; our choice: six times what 254 drones may take
-CONNECTED_WITHIN_S = 120.0  # wall; as long as the original was given
-SETTLE_S = 5.0  # wall; the rush of the start is not what a second costs
+CONNECTED_WITHIN_S = 120.0  # wall; the same limit as for the original
+SETTLE_S = 5.0  # wall; the start costs more than a later second
 LOOK_WITHIN_S = 20.0  # wall
 MEGABYTE = 1e6
 
 
 @dataclass(frozen=True)
 class RosResult:
-    """What one fleet did. None: not known, as nobody counts it or as it never happened."""
+    """The figures of one fleet. None: not counted, or it never happened."""
 
     drones: int
     spacing_m: float
-    real_time_factor: float  # as asked for; 0: as fast as it goes
+    real_time_factor: float  # as requested; 0: as fast as possible
     on_after_wall_s: float  # from roslaunch to the moment all nodes are on
     connected_after_sim_s: float | None  # from the start of the last node to all connected
     connected_after_wall_s: float | None
     routers_connected: int  # at the end
-    window_wall_s: float  # in which all that follows was measured
+    window_wall_s: float  # the duration of the measurements below
     window_sim_s: float
     messages_per_wall_s: float  # counted as totalMessages: broadcasts are not
     messages_per_sim_s: float
     deliveries_per_wall_s: float | None  # packets that reached a node, broadcasts too
     lost_share: float | None  # of all packets for nodes in range
-    lost_before: float | None  # packets for nodes in range, most of them not quite there yet
+    lost_before: float | None  # lost before the window, while nodes were starting
     cpu_ms_per_message: float | None  # of all processes, the master's included
     cores: dict[str, float]  # by process
     links: int  # pairs of neighbours, at the end
@@ -54,14 +54,14 @@ class _Moment:
     look: Look
     use: Use
     delivered: float | None
-    delivered_s: float  # when that was told: once a second, and not with the look
+    delivered_s: float  # when `delivered` arrived: once a second, and not with the look
     lost: float | None
 
 
 def measure(
     case: Case, launch_args: list[str], port: int, window_s: float, progress: Progress
 ) -> RosResult:
-    """Start the fleet, wait until all are connected, watch it for `window_s` wall seconds, end it.
+    """Start a fleet, wait until all are connected, measure `window_s` wall seconds, stop it.
 
     Raises BenchmarkError when it does not start or ends by itself.
     """
@@ -77,20 +77,20 @@ def measure(
         if connected and watch.all_connected is not None:
             after_s = watch.all_connected.wall_s - watch.all_on.wall_s
             progress.say(f"all connected after {after_s:.1f} s")
-        _sleep(system, SETTLE_S, progress, "letting the start pass")
+        _sleep(system, SETTLE_S, progress, "waiting for the start to settle")
         first = _take_moment(system)
         system.order(REST)
         _sleep(system, window_s, progress, "measuring")
         system.order(WATCH)
         last = _take_moment(system)
         result = _result(case, system, first, last)
-        progress.say("ending it")
+        progress.say("stopping")
     progress.clear()
     return result
 
 
 def await_all_on(system: System, case: Case, progress: Progress) -> None:
-    """Return when all nodes of the fleet are on. Raises BenchmarkError when that takes too long."""
+    """Wait until all nodes of the fleet are on. Raises BenchmarkError after a time limit."""
     watch = system.watch
 
     def say() -> None:
@@ -103,7 +103,7 @@ def await_all_on(system: System, case: Case, progress: Progress) -> None:
 
 
 def _take_moment(system: System) -> _Moment:
-    """Figures of now. The state that is seen first may be an old one: the next is new."""
+    """The present figures. The first state may be an old one, so it waits for the second."""
     watch = system.watch
     seen = len(watch.looks)
     if not system.wait_for(lambda: len(watch.looks) >= seen + 2, LOOK_WITHIN_S, lambda: None):
@@ -113,7 +113,7 @@ def _take_moment(system: System) -> _Moment:
         look,
         system.use(),
         watch.total(DELIVERED),
-        watch.told_s(DELIVERED),
+        watch.received_s(DELIVERED),
         watch.total(LOST_IN_RANGE),
     )
 

@@ -1,4 +1,4 @@
-"""What the probe sees of a running system, and what that says about its start."""
+"""Observations of the probe, and what they say about the start of a fleet."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ STARTED = MeshEventKind.STARTED.value
 CONNECTED = MeshEventKind.CONNECTED.value
 DISCONNECTED = MeshEventKind.DISCONNECTED.value
 
-PROBE = "bench_probe"  # tells that it is there by figures without any
+PROBE = "bench_probe"  # it announces itself with empty figures
 
-WATCH, REST = "watch", "rest"  # orders to the probe: look at the state of the mesh, or do not
+WATCH, REST = "watch", "rest"  # orders to the probe: watch the state of the mesh, or rest
 
 
 @dataclass(frozen=True)
 class Look:
-    """One MeshState, in numbers."""
+    """One MeshState as numbers."""
 
     wall_s: float  # when it arrived, time.monotonic
     sim_s: float  # its stamp
     on: int  # nodes with power
     connected: int  # routers with power and a gateway
     messages: int  # sum of total_messages over all nodes
-    links: int  # pairs of nodes that know each other as neighbours
+    links: int  # pairs of neighbours
 
 
 @dataclass(frozen=True)
@@ -53,34 +53,34 @@ _KINDS = {kind.__name__: kind for kind in (Look, Happening, Figures)}
 
 
 def to_line(sight: Sight) -> str:
-    """As one line of text, for the pipe between probe and benchmark."""
+    """The sight as one line of text, for the pipe between probe and benchmark."""
     return json.dumps({"sight": type(sight).__name__, **asdict(sight)})
 
 
 def from_line(line: str) -> Sight:
-    """The other way round. Raises ValueError for a line that is none."""
+    """The sight in a line of `to_line`. Raises ValueError for any other line."""
     try:
         fields = json.loads(line)
         sight: Sight = _KINDS[fields.pop("sight")](**fields)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"not a line of the probe: {line[:80]!r}") from error
+        raise ValueError(f"invalid line of the probe: {line[:80]!r}") from error
     return sight
 
 
 class Watch:
-    """Gathers what is seen of one fleet. Belongs to one thread."""
+    """Collects the observations of one fleet. Belongs to one thread."""
 
     def __init__(self, drones: int) -> None:
         self._drones = drones
         self._happenings: list[Happening] = []
         self.looks: list[Look] = []
-        self.figures: dict[str, Figures] = {}  # the latest, by who tells them
-        self.worst: dict[str, float] = {}  # the largest value of each figure, whoever told it
-        self.all_on: Look | None = None  # the first in which they were
+        self.figures: dict[str, Figures] = {}  # the latest, by source
+        self.worst: dict[str, float] = {}  # the largest value of each figure, from any source
+        self.all_on: Look | None = None  # the first look with all nodes on
         self.all_connected: Look | None = None
 
     def see(self, sight: Sight) -> None:
-        """Take something in."""
+        """Add an observation."""
         if isinstance(sight, Happening):
             self._happenings.append(sight)
         elif isinstance(sight, Figures):
@@ -96,14 +96,14 @@ class Watch:
 
     @property
     def last(self) -> Look | None:
-        """The latest look, if there was one."""
+        """The latest look, or None."""
         return self.looks[-1] if self.looks else None
 
     def connected_after_s(self) -> float | None:
         """Simulated seconds from the start of the last node until all were connected; None: never.
 
-        From the stamps of the events where they tell it all. The first ones may have come before
-        the probe heard them: then from those of the states.
+        It uses the stamps of the events if they are complete. Events from before the probe
+        subscribed are missing; then it uses the stamps of the states.
         """
         if self.all_on is None or self.all_connected is None:
             return None
@@ -114,20 +114,20 @@ class Watch:
         return self.all_connected.sim_s - self.all_on.sim_s
 
     def total(self, name: str) -> float | None:
-        """The sum of a figure over all who tell it; None: nobody does."""
-        told = [figures.values[name] for figures in self._who_tell(name)]
-        return sum(told) if told else None
+        """The sum of a figure over all sources; None: no source publishes it."""
+        values = [figures.values[name] for figures in self._sources_of(name)]
+        return sum(values) if values else None
 
-    def told_s(self, name: str) -> float:
-        """When the latest of what `total` sums arrived, time.monotonic; 0: nobody tells it."""
-        return max((figures.wall_s for figures in self._who_tell(name)), default=0.0)
+    def received_s(self, name: str) -> float:
+        """When the latest value in `total` arrived, time.monotonic; 0: never."""
+        return max((figures.wall_s for figures in self._sources_of(name)), default=0.0)
 
-    def _who_tell(self, name: str) -> list[Figures]:
+    def _sources_of(self, name: str) -> list[Figures]:
         return [figures for figures in self.figures.values() if name in figures.values]
 
 
 def first_time_all_are_connected(happenings: Iterable[Happening], routers: int) -> float | None:
-    """The simulated second at which so many were connected at once; None: never."""
+    """The simulated second at which `routers` were connected at once; None: never."""
     connected = set()
     for happening in sorted(happenings, key=lambda happening: happening.sim_s):
         if happening.kind == CONNECTED:

@@ -1,4 +1,4 @@
-"""What processes cost: time on the processor, memory, threads, open files."""
+"""The cost of processes: processor time, memory, threads, open files."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class ProcessUse:
 
     name: str
     cpu_s: float  # since it started, user and system
-    pss_bytes: int  # memory, what it shares with others divided among them
+    pss_bytes: int  # memory; shared pages are divided among the processes
     rss_bytes: int
     threads: int
-    open_files: int  # sockets are files, too
+    open_files: int  # including sockets
 
 
 @dataclass(frozen=True)
@@ -32,27 +32,27 @@ class Use:
 
     @property
     def pss_bytes(self) -> int:
-        """Memory of all."""
+        """Memory of all processes, shared pages counted once."""
         return sum(process.pss_bytes for process in self.processes.values())
 
     @property
     def rss_bytes(self) -> int:
-        """Memory of all, what is shared counted for each."""
+        """Memory of all processes, shared pages counted once per process."""
         return sum(process.rss_bytes for process in self.processes.values())
 
     @property
     def threads(self) -> int:
-        """Threads of all."""
+        """Threads of all processes."""
         return sum(process.threads for process in self.processes.values())
 
     @property
     def open_files(self) -> int:
-        """Open files and connections of all."""
+        """Open files and connections of all processes."""
         return sum(process.open_files for process in self.processes.values())
 
 
 def family(pid: int) -> list[psutil.Process]:
-    """A process and all that descend from it; empty when it has ended."""
+    """A process and its descendants; empty if it has ended."""
     try:
         parent = psutil.Process(pid)
         return [parent, *parent.children(recursive=True)]
@@ -61,7 +61,7 @@ def family(pid: int) -> list[psutil.Process]:
 
 
 def name_of(arguments: list[str]) -> str:
-    """What people call a process: its ROS node, else the program, the interpreter left out."""
+    """The name of a process: its ROS node, else its program, without the interpreter."""
     for argument in arguments:
         if argument.startswith(_NODE_NAME):
             return argument[len(_NODE_NAME) :]
@@ -73,7 +73,7 @@ def name_of(arguments: list[str]) -> str:
 
 
 def take_use(processes: Iterable[psutil.Process], wall_s: float) -> Use:
-    """Look at each of them; one that has ended meanwhile is left out."""
+    """The present use of each process, except those that have ended meanwhile."""
     found: dict[int, ProcessUse] = {}
     for process in processes:
         try:
@@ -94,7 +94,7 @@ def take_use(processes: Iterable[psutil.Process], wall_s: float) -> Use:
 
 
 def cores_between(before: Use, after: Use) -> dict[str, float]:
-    """Cores used, by name of the process. One that is not in both is left out."""
+    """Cores used, by name, of the processes that are in both."""
     seconds = after.wall_s - before.wall_s
     cores: dict[str, float] = {}
     for pid, process in after.processes.items():

@@ -1,4 +1,4 @@
-"""The figures as tables for people. They are Markdown, so that a document can take them over."""
+"""The figures as Markdown tables."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from drone_mesh.bench.measurement import RosResult
 from drone_mesh.bench.soak import Sample, SoakResult
 
 UNKNOWN = "-"
-SMALL_CORES = 0.005  # a process that uses less has no column of its own
+SMALL_CORES = 0.005  # a process that uses less gets no column
 SIMULATOR = "WirelessSignalSimulator"
 
 
 @dataclass(frozen=True)
 class Machine:
-    """On what it was measured."""
+    """The machine of the measurement."""
 
     cores: int
     processor: str
     python: str
-    load_before: float  # of the last minute, before anything was started here
+    load_before: float  # of the last minute, before the start
 
     @classmethod
     def here(cls) -> Machine:
-        """This one, now."""
+        """This machine, now."""
         return cls(
             cores=len(os.sched_getaffinity(0)),
             processor=_processor(),
@@ -53,7 +53,7 @@ def _processor() -> str:
 
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table with columns of one width each."""
+    """A Markdown table with aligned columns."""
     widths = [max(len(row[column]) for row in (headings, *rows)) for column in range(len(headings))]
     lines = [headings, ["-" * width for width in widths], *rows]
     return "\n".join(
@@ -63,10 +63,11 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def ros_tables(results: Sequence[RosResult]) -> str:
-    """Three tables: how it starts, what is carried, what it costs."""
+    """Three tables: start, traffic, cost."""
     return "\n\n".join(
         (
-            "Start. Seconds; connected: from the last start to all connected.\n\n"
+            "Start, in seconds. Connected: from the start of the last node until all are "
+            "connected.\n\n"
             + table(
                 ("drones", "spacing", "speed", "all on (wall)", "connected (sim)", "(wall)"),
                 [
@@ -79,9 +80,9 @@ def ros_tables(results: Sequence[RosResult]) -> str:
                     for result in results
                 ],
             ),
-            "Traffic, per second of wall time; lost: of the packets for nodes in range, and how "
-            "many of them before the measurement, when not everybody was there; "
-            "the pace of simulated time.\n\n"
+            "Traffic per second of wall time. Lost: share of the packets for nodes in range, and "
+            "the number lost before the measurement, while nodes were starting. Speed of simulated "
+            "time.\n\n"
             + table(
                 (
                     "drones",
@@ -107,8 +108,8 @@ def ros_tables(results: Sequence[RosResult]) -> str:
                     for result in results
                 ],
             ),
-            "Cost. Cores used, by process; milliseconds of processor time of all of them per "
-            "message, and per simulated second and link; memory of all, in MB.\n\n"
+            "Cost. Cores used by each process and by all; milliseconds of processor time of all "
+            "per message, and per simulated second and link; memory of all, in MB.\n\n"
             + _cost_table(results),
         )
     )
@@ -116,7 +117,7 @@ def ros_tables(results: Sequence[RosResult]) -> str:
 
 def _fleet(result: RosResult) -> list[str]:
     factor = result.real_time_factor
-    speed = "as fast as it goes" if factor == 0 else f"{factor:g}"
+    speed = "as fast as possible" if factor == 0 else f"{factor:g}"
     return [str(result.drones), f"{result.spacing_m:g} m", speed]
 
 
@@ -159,13 +160,13 @@ def _cost_table(results: Sequence[RosResult]) -> str:
 
 
 def inprocess_table(results: Sequence[InProcessResult]) -> str:
-    """Simulated seconds per second."""
+    """A table of simulated seconds per second."""
     runs = results[0].runs
     period = f"{results[0].simulated_s:g} simulated seconds"
     return (
         f"In process, one core: simulated seconds per second of processor time (of wall time). "
-        f"Medians of {runs} runs and the best one, for the first {period} from the start and the "
-        f"{period} after.\n\n"
+        f"Medians of {runs} runs and the best run, for the first {period} and the {period} "
+        f"after them.\n\n"
         + table(
             ("nodes", "spacing", "from the start", "best", "after", "best", "all connected"),
             [
@@ -185,7 +186,7 @@ def inprocess_table(results: Sequence[InProcessResult]) -> str:
 
 
 def sample_line(sample: Sample) -> str:
-    """One line of a long run."""
+    """One line per sample of a long run."""
     return (
         f"{sample.sim_s / 60:6.0f} min simulated  {sample.wall_s / 60:5.1f} min wall  "
         f"PSS {sample.pss_mb:7.1f} MB  RSS {sample.rss_mb:7.1f} MB  {sample.threads:5d} threads  "
@@ -194,25 +195,25 @@ def sample_line(sample: Sample) -> str:
 
 
 def verdict_lines(result: SoakResult) -> str:
-    """What became more after the first ten minutes."""
+    """The verdict on growth after the first ten minutes."""
     verdict = result.verdict()
     if verdict is None:
         return (
-            "too short to tell whether anything grows: "
-            "it takes 13 simulated minutes and a minute and a half at least"
+            "too short for a verdict on growth: "
+            "it needs at least 13 simulated minutes and 90 s of wall time"
         )
     return "\n".join(
         (
-            f"memory: {verdict.memory_before_mb:.1f} MB early after the first ten minutes, "
+            f"memory: {verdict.memory_before_mb:.1f} MB soon after the first ten minutes, "
             f"{verdict.memory_after_mb:.1f} MB at the end: "
             + ("it grew" if verdict.memory_grew else "it did not grow"),
             f"threads: {_span(verdict.threads)}",
             f"open files and connections: {_span(verdict.open_files)}",
-            *([f"not always as many: {', '.join(verdict.changed)}"] if verdict.changed else []),
+            *([f"processes with changes: {', '.join(verdict.changed)}"] if verdict.changed else []),
         )
     )
 
 
 def _span(span: tuple[int, int]) -> str:
     least, most = span
-    return f"{most} all the time" if least == most else f"from {least} to {most}"
+    return f"{most} throughout" if least == most else f"from {least} to {most}"

@@ -1,4 +1,4 @@
-"""Hours of simulated time: does anything grow?"""
+"""Long runs in simulated time: do memory, threads or connections grow?"""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from drone_mesh.bench.progress import Progress
 from drone_mesh.bench.system import BenchmarkError, System
 
 SAMPLE_PERIOD_S = 60.0  # simulated
-WARM_UP_S = 600.0  # simulated; what grows before that is not held against anybody
-# Wall, after all are on. Nodes that rospy makes close a connection on which nothing came for 60 s;
-# the master keeps such connections from when the nodes registered.
+WARM_UP_S = 600.0  # simulated; growth before this is ignored
+# Wall, after all are on. rospy closes a connection that was idle for 60 s; the master opens such
+# connections when nodes register.
 IDLE_CONNECTIONS_CLOSED_S = 90.0
-MEMORY_TOLERANCE = 0.02  # our choice: how far the memory of a program in Python breathes
+MEMORY_TOLERANCE = 0.02  # our choice: normal variation of a Python program
 SAMPLE_WITHIN_S = 600.0  # wall
-FEWEST_SAMPLES = 3  # our choice; of one alone, all would be constant
+FEWEST_SAMPLES = 3  # our choice; a single sample is always constant
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Sample:
     pss_mb: float
     rss_mb: float
     threads: int
-    open_files: int  # connections are files, too
+    open_files: int  # including connections
     routers_connected: int
     threads_of: dict[str, int]  # by process
     open_files_of: dict[str, int]
@@ -38,20 +38,20 @@ class Sample:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became more after the first ten minutes.
+    """Growth after the first ten minutes.
 
-    Memory is RSS here: PSS also changes with other programs that share the same libraries.
+    Memory is RSS: PSS also changes with other programs that share the same libraries.
     """
 
     memory_before_mb: float  # median of the first third of the samples after the warm-up
     memory_after_mb: float  # median of the last third
     threads: tuple[int, int]  # least and most
     open_files: tuple[int, int]
-    changed: tuple[str, ...]  # the processes whose threads or files were not always as many
+    changed: tuple[str, ...]  # the processes whose number of threads or files changed
 
     @property
     def memory_grew(self) -> bool:
-        """Whether memory grew by more than it breathes."""
+        """Whether memory grew by more than the tolerance."""
         return self.memory_after_mb > self.memory_before_mb * (1 + MEMORY_TOLERANCE)
 
     @property
@@ -71,12 +71,12 @@ class SoakResult:
     samples: list[Sample]
 
     def verdict(self) -> Verdict | None:
-        """None while the run is too short for one."""
+        """The verdict; None if the run is too short for one."""
         return judge(self.samples)
 
 
 def judge(samples: Sequence[Sample]) -> Verdict | None:
-    """What became more; None for a run that was too short.
+    """The verdict on these samples; None if the run was too short.
 
     Three samples after the warm-up, and three after idle connections were closed, are enough.
     """
@@ -107,9 +107,9 @@ def soak(
     launch_args: list[str],
     port: int,
     progress: Progress,
-    tell: Callable[[Sample], None],
+    on_sample: Callable[[Sample], None],
 ) -> SoakResult:
-    """Run a fleet for so many hours of simulated time; `tell` is given each sample at once.
+    """Run a fleet for `hours` of simulated time; `on_sample` gets each sample at once.
 
     Raises BenchmarkError when it does not start, ends by itself or stands still.
     """
@@ -136,7 +136,7 @@ def soak(
             sample = _take_sample(system)
             result.samples.append(sample)
             progress.clear()
-            tell(sample)
+            on_sample(sample)
             next_s += SAMPLE_PERIOD_S
     progress.clear()
     return result
@@ -160,7 +160,7 @@ def _take_sample(system: System) -> Sample:
 
 
 def as_json(result: SoakResult) -> dict[str, object]:
-    """The samples, and what they say."""
+    """The samples and their verdict."""
     verdict = result.verdict()
     return {
         **asdict(result),

@@ -1,4 +1,4 @@
-"""A system of its own to measure: master, probe and drones are started here, and ended here."""
+"""Starts and stops the system that is measured: master, probe and fleet."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ LOOK_PERIOD_S = 0.05  # wall
 
 
 class BenchmarkError(MeshError):
-    """The system could not be started or measured. The message says why, and what to do."""
+    """The system could not be started or measured. The message gives the cause and the remedy."""
 
 
 def check_environment() -> None:
-    """Raises BenchmarkError unless ROS and the built package can be found."""
+    """Raise BenchmarkError unless ROS and the built package are available."""
     if shutil.which("roslaunch") is None or shutil.which("rospack") is None:
         raise BenchmarkError(
-            "no ROS here: source the setup.bash of the workspace first (scripts/env.bash does), "
+            "ROS not found: source the setup.bash of the workspace first (or scripts/env.bash), "
             "or measure without ROS: --only inprocess"
         )
     if _fails("rospack", "find", "drone_mesh"):
         raise BenchmarkError(
-            "ROS does not know the package drone_mesh: build it, then source devel/setup.bash "
+            "ROS does not find the package drone_mesh: build it, then source devel/setup.bash "
             "(scripts/bench does both)"
         )
     if _fails(sys.executable, "-c", "import drone_mesh.msg"):
@@ -57,7 +57,7 @@ def _fails(*command: str) -> bool:
 
 
 def free_port() -> int:
-    """A TCP port of the loopback interface that nobody listens on."""
+    """A free TCP port of the loopback interface."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         port: int = probe.getsockname()[1]
@@ -65,9 +65,9 @@ def free_port() -> int:
 
 
 class System:
-    """One master, one probe, one fleet. Use it in a `with`: whatever happens, all of it ends.
+    """One master, one probe, one fleet. A context manager, which always stops all three.
 
-    The probe's lines are taken in by a thread; the watch belongs to it, others read it.
+    A thread reads the lines of the probe. The watch belongs to it; others only read the watch.
     """
 
     def __init__(self, drones: int, launch_args: Sequence[str], port: int) -> None:
@@ -91,7 +91,7 @@ class System:
         self._seen: dict[int, psutil.Process] = {}
 
     def __enter__(self) -> System:
-        """Start it; returns as soon as the fleet is being launched."""
+        """Start everything; returns as soon as the fleet is being launched."""
         try:
             if self._master_answers():
                 raise BenchmarkError(f"port {self._port} is taken: use another one")
@@ -103,7 +103,7 @@ class System:
             self._reader = threading.Thread(target=self._read, args=(self._probe,), daemon=True)
             self._reader.start()
             self.order(WATCH)
-            # Before the fleet, which puts everybody who comes after it on simulated time.
+            # Before the fleet: nodes that start after it use simulated time.
             self._await("probe", lambda: PROBE in self.watch.figures)
             self.launched_s = time.monotonic()
             launch = ["roslaunch", "drone_mesh", "factory.launch", *self._launch_args]
@@ -122,10 +122,10 @@ class System:
         self.close()
 
     def order(self, order: str) -> None:
-        """Tell the probe to watch the state of the mesh, or to rest."""
+        """Order the probe to watch the state of the mesh, or to rest."""
         assert self._probe is not None
         assert self._probe.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # check() tells of it
+        with contextlib.suppress(BrokenPipeError):  # check() reports it
             self._probe.stdin.write(f"{order}\n".encode())
             self._probe.stdin.flush()
 
@@ -145,7 +145,7 @@ class System:
     def wait_for(
         self, condition: Callable[[], bool], within_s: float, progress: Callable[[], None]
     ) -> bool:
-        """True as soon as the condition is; False if it is not within so many wall seconds.
+        """True as soon as `condition` holds; False after `within_s` wall seconds without it.
 
         Raises BenchmarkError when a part of the system ends meanwhile.
         """
@@ -159,7 +159,7 @@ class System:
         return True
 
     def use(self) -> Use:
-        """What the fleet and the master cost so far; the probe is not counted."""
+        """The cost of fleet and master so far, without the probe."""
         processes = [
             process
             for started in (self._master, self._fleet)
@@ -170,11 +170,11 @@ class System:
         return take_use(processes, time.monotonic())
 
     def close(self) -> None:
-        """End what was started here, the fleet first. Calling it twice changes nothing.
+        """Stop everything that was started, the fleet first. A second call changes nothing.
 
-        Cannot be interrupted: something would stay behind.
+        Signals are ignored meanwhile; otherwise processes could be left behind.
         """
-        with _deaf():
+        with _signals_ignored():
             self._close()
 
     def _close(self) -> None:
@@ -187,7 +187,7 @@ class System:
         for started in (self._fleet, self._probe, self._master):
             if started is not None:
                 _end(started)
-        _end_what_is_left(self._seen.values())
+        _end_remaining(self._seen.values())
         if self._reader is not None:
             self._reader.join()
             self._reader = None
@@ -198,7 +198,7 @@ class System:
     def _start(
         self, name: str, command: Sequence[str], piped: bool = False
     ) -> subprocess.Popen[bytes]:
-        """In a session of its own: a Ctrl-C of the terminal comes to us alone."""
+        """Start it in a session of its own, so that Ctrl-C in the terminal reaches only us."""
         with self._log_path(name).open("wb") as log:
             return subprocess.Popen(
                 command,
@@ -221,7 +221,7 @@ class System:
     def _read(self, probe: subprocess.Popen[bytes]) -> None:
         assert probe.stdout is not None
         for line in probe.stdout:
-            with contextlib.suppress(ValueError):  # the last one may be cut off
+            with contextlib.suppress(ValueError):  # the last line may be incomplete
                 self.watch.see(from_line(line.decode()))
         probe.stdout.close()
 
@@ -234,8 +234,8 @@ class System:
 
 
 @contextlib.contextmanager
-def _deaf() -> Iterator[None]:
-    """Take no notice of Ctrl-C and TERM. Only the main thread can: elsewhere nothing changes."""
+def _signals_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C and TERM. Has no effect outside the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -250,22 +250,22 @@ def _deaf() -> Iterator[None]:
 
 
 def _end(started: subprocess.Popen[bytes]) -> None:
-    """Ask as Ctrl-C would, then insist."""
-    for insist in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+    """Send SIGINT, then stronger signals."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
         if started.poll() is not None:
             break
-        started.send_signal(insist)
+        started.send_signal(number)
         with contextlib.suppress(subprocess.TimeoutExpired):
             started.wait(END_WITHIN_S)
     started.wait()
 
 
-def _end_what_is_left(processes: Iterable[psutil.Process]) -> None:
-    left = [process for process in processes if process.is_running()]
-    for process in left:
+def _end_remaining(processes: Iterable[psutil.Process]) -> None:
+    remaining = [process for process in processes if process.is_running()]
+    for process in remaining:
         with contextlib.suppress(psutil.NoSuchProcess):
             process.terminate()
-    _gone, alive = psutil.wait_procs(left, timeout=2.0)
+    _gone, alive = psutil.wait_procs(remaining, timeout=2.0)
     for process in alive:
         with contextlib.suppress(psutil.NoSuchProcess):
             process.kill()

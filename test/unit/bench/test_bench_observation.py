@@ -101,7 +101,7 @@ def test_a_router_that_lost_its_connection_again_is_waited_for():
     assert first_time_all_are_connected(happenings[:3], routers=2) is None
 
 
-def test_figures_add_up_over_those_who_tell_them_and_the_worst_is_remembered():
+def test_figures_add_up_over_their_sources_and_the_worst_is_remembered():
     watch = watch_of(
         2,
         Figures("host a", 1.0, {"lag": 0.5, "sent": 1.0}),
@@ -110,6 +110,6 @@ def test_figures_add_up_over_those_who_tell_them_and_the_worst_is_remembered():
     )
     assert watch.total("sent") == 13.0
     assert watch.worst["lag"] == 0.5
-    assert watch.told_s("sent") == 3.0
+    assert watch.received_s("sent") == 3.0
     assert watch.total("unheard of") is None
-    assert watch.told_s("unheard of") == 0.0
+    assert watch.received_s("unheard of") == 0.0
