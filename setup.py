@@ -17,10 +17,11 @@ def requirements(name: str) -> list[str]:
     """The requirements in requirements/NAME.txt, and in the files that it includes."""
     found: list[str] = []
     for line in (HERE / "requirements" / f"{name}.txt").read_text(encoding="utf-8").splitlines():
-        if line.startswith("-r "):
-            found += requirements(line[3:].strip()[: -len(".txt")])
-        elif line and not line.startswith("#"):
-            found.append(line)
+        requirement = line.partition("#")[0].strip()
+        if requirement.startswith("-r "):
+            found += requirements(requirement[3:][: -len(".txt")])
+        elif requirement:
+            found.append(requirement)
     return found
 
 

@@ -4,174 +4,129 @@ from __future__ import annotations
 
 import difflib
 import logging
-import math
 import random
-from dataclasses import dataclass, fields
+import reprlib
 from pathlib import Path
-from typing import Any, Callable, Mapping, NamedTuple
+from typing import Any, Literal, Mapping, get_args
+
+from pydantic import ConfigDict, Field, ValidationError, field_validator
+from pydantic.dataclasses import dataclass
+from pydantic.fields import FieldInfo
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
+MAX_DRONES = MAX_NODE_ID + 1
+MAX_REAL_TIME_FACTOR = 1000.0  # our choice: beyond it the clock's steps are no longer seen
 MAX_SEED = 2**32 - 1
 RANDOM_SEED = "random"  # asks for a new seed where the file has a fixed one
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", str_strip_whitespace=True))
 class FactoryConfiguration:
-    """Everything a simulation can be told; config/factory.yaml documents the same defaults."""
+    """Every setting of a simulation; config/factory.yaml documents the same defaults.
 
-    seed: int  # of everything random; load_configuration chooses one where none is given
-    gateways: int = 1
-    routers: int = 17
-    gridsize: int = 6  # routers in a row
-    spacing: float = 1.0  # metres between routers
-    gui: bool = False
-    real_time_factor: float = 1.0  # 0: as fast as possible
-    max_distance: float = MAX_DISTANCE_M  # metres; in range is nearer than this
-    radio: str = "virtual"  # or "nrf24": the real driver on emulated chips
-    internet: str = "mock"  # or "http": gateways also take orders over HTTP
-    routing: str = "child_table_tree"
-    check_period: float = 10.0  # seconds
-    connection_lost_after: float = 30.0  # seconds
-    debug: bool = True
+    Values may be of their own type, or as text ("3", "true"), as launch arguments are. The
+    descriptions are what error messages say of a key.
+    """
+
+    # Of everything random; load_configuration chooses one where none is given.
+    seed: int = Field(ge=0, le=MAX_SEED, description="a whole number")
+    gateways: int = Field(1, ge=0, le=MAX_DRONES, description="a whole number of drones")
+    routers: int = Field(17, ge=0, le=MAX_DRONES, description="a whole number of drones")
+    gridsize: int = Field(6, ge=1, le=MAX_DRONES, description="a whole number of routers in a row")
+    spacing: float = Field(1.0, gt=0, le=1000, description="metres")  # between routers
+    gui: bool = Field(False)
+    real_time_factor: float = Field(
+        1.0, ge=0, le=MAX_REAL_TIME_FACTOR, description="a factor (0: as fast as possible)"
+    )
+    max_distance: float = Field(MAX_DISTANCE_M, gt=0, le=10_000, description="metres")
+    radio: Literal["virtual", "nrf24"] = Field("virtual")  # nrf24: the driver on emulated chips
+    internet: Literal["mock", "http"] = Field("mock")  # http: gateways also take HTTP orders
+    routing: str = Field(
+        "child_table_tree", min_length=1, description="the name of a routing technique"
+    )
+    check_period: float = Field(10.0, ge=0.1, le=3600, description="seconds")
+    connection_lost_after: float = Field(30.0, ge=0.1, le=3600, description="seconds")
+    debug: bool = Field(True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _not_a_switch_for_a_number(cls, value: object, info: Any) -> object:
+        if isinstance(value, bool) and info.field_name not in _SWITCHES:
+            raise ValueError("true and false are not numbers")
+        return value
+
+
+_SWITCHES = ("gui", "debug")
+_FIELDS: Mapping[str, FieldInfo] = vars(FactoryConfiguration)["__pydantic_fields__"]
 
 
 def load_configuration(
     path: str | Path, overrides: Mapping[str, object] | None = None
 ) -> FactoryConfiguration:
-    """The configuration in this file, overruled key by key.
+    """The configuration in this file, overridden key by key.
 
-    An override that is an empty string means "as in the file". Values may be what YAML or ROS made
-    of them or plain text ("3", "true"). Where no seed is given, one is chosen; it is logged anyway.
-    Raises ConfigurationError (one line: where, key, value, what is allowed).
+    An override that is an empty string means "as in the file". Where no seed is given, one is
+    chosen; the seed is logged in any case. Raises ConfigurationError (one line: file and line or
+    argument, key, value, what is allowed).
     """
+    file = read_mapping(path)
     given = {
         name: value
         for name, value in (overrides or {}).items()
         if not (isinstance(value, str) and not value.strip())
     }
-    from_file = read_mapping(path)
-    values: dict[str, Any] = {}
-    for source, content in ((f"{path}", from_file), ("argument", given)):
-        for name, value in content.items():
-            values[name] = _checked(source, name, value)
-    if values.get("seed") is None:
+    values = {**file.content, **given}
+    new_seed = values.get("seed") in (None, RANDOM_SEED)
+    if new_seed:
         values["seed"] = random.SystemRandom().randrange(MAX_SEED + 1)
-    _log.info("seed %d: seed:=%d repeats this run", values["seed"], values["seed"])
-    return FactoryConfiguration(**values)
 
+    def where(name: object) -> str:
+        return "argument" if name in given else file.where(name)
 
-class _Rule(NamedTuple):
-    """What a key may be."""
-
-    allowed: str  # for people
-    convert: Callable[[object], object]  # the value; raises ValueError where that is not allowed
-
-
-def _number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError
-    return number
-
-
-def _whole(lowest: int, highest: int, what: str) -> _Rule:
-    def convert(value: object) -> int:
-        number = _number(value)
-        if number != int(number) or not lowest <= number <= highest:
-            raise ValueError
-        return int(number)
-
-    return _Rule(f"{what}, {lowest}..{highest}", convert)
-
-
-def _at_least(lowest: float, highest: float, unit: str) -> _Rule:
-    def convert(value: object) -> float:
-        number = _number(value)
-        if not lowest <= number <= highest:
-            raise ValueError
-        return number
-
-    return _Rule(f"{unit}, {lowest:g}..{highest:g}", convert)
-
-
-def _above_zero(highest: float, unit: str) -> _Rule:
-    def convert(value: object) -> float:
-        number = _number(value)
-        if not 0 < number <= highest:
-            raise ValueError
-        return number
-
-    return _Rule(f"{unit}, above 0, at most {highest:g}", convert)
-
-
-def _switch(value: object) -> bool:
-    word = str(value).strip().lower()
-    if word not in ("true", "false", "1", "0"):  # an argument of 1 reaches us as a number
-        raise ValueError
-    return word in ("true", "1")
-
-
-def _name(value: object) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise ValueError
-    return value.strip()
-
-
-def _seed(value: object) -> int | None:
-    """None: to be chosen."""
-    if value is None or value == RANDOM_SEED:
-        return None
-    number = _number(value)
-    if number != int(number) or not 0 <= number <= MAX_SEED:
-        raise ValueError
-    return int(number)
-
-
-def _one_of(*words: str) -> _Rule:
-    def convert(value: object) -> str:
-        word = str(value).strip()
-        if word not in words:
-            raise ValueError
-        return word
-
-    return _Rule(" or ".join(words), convert)
-
-
-_SWITCH = _Rule("true or false", _switch)
-_RULES: dict[str, _Rule] = {
-    "gateways": _whole(0, 254, "a whole number of drones"),
-    "routers": _whole(0, 254, "a whole number of drones"),
-    "gridsize": _whole(1, 254, "a whole number of routers in a row"),
-    "spacing": _above_zero(1000.0, "metres"),
-    "gui": _SWITCH,
-    "real_time_factor": _at_least(0.0, 1000.0, "a factor (0: as fast as possible)"),
-    "max_distance": _above_zero(10_000.0, "metres"),
-    "radio": _one_of("virtual", "nrf24"),
-    "internet": _one_of("mock", "http"),
-    "routing": _Rule("the name of a routing technique", _name),
-    "check_period": _at_least(0.1, 3600.0, "seconds"),
-    "connection_lost_after": _at_least(0.1, 3600.0, "seconds"),
-    "debug": _SWITCH,
-    "seed": _Rule(f"a whole number, 0..{MAX_SEED}, or {RANDOM_SEED}", _seed),
-}
-assert set(_RULES) == {key.name for key in fields(FactoryConfiguration)}
-
-
-def _checked(source: str, name: object, value: object) -> object:
-    rule = _RULES.get(str(name))
-    if rule is None:
-        close = difflib.get_close_matches(str(name), _RULES, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"known are {', '.join(sorted(_RULES))}"
-        raise ConfigurationError(f"{source}: unknown key {name}; {hint}")
+    for name in values:
+        if name not in _FIELDS:
+            raise ConfigurationError(f"{where(name)}: unknown key {name}; {_hint(name)}")
     try:
-        return rule.convert(value)
-    except (ValueError, OverflowError):
-        shown = "nothing" if value is None else repr(value)
-        raise ConfigurationError(f"{source}: {name} is {shown}, want {rule.allowed}") from None
+        configuration = FactoryConfiguration(**values)
+    except ValidationError as error:
+        name = str(error.errors()[0]["loc"][0])
+        shown = "nothing" if values[name] is None else reprlib.repr(values[name])
+        raise ConfigurationError(
+            f"{where(name)}: {name} is {shown}, want {_allowed(name)}"
+        ) from None
+    _log.info("seed %d: seed:=%d repeats this run", configuration.seed, configuration.seed)
+    return configuration
+
+
+def _hint(name: object) -> str:
+    close = difflib.get_close_matches(str(name), _FIELDS, n=1)
+    return f"did you mean {close[0]}?" if close else f"known are {', '.join(sorted(_FIELDS))}"
+
+
+def _allowed(name: str) -> str:
+    """What a key may be, for people."""
+    field = _FIELDS[name]
+    if name in _SWITCHES:
+        return "true or false"
+    words = get_args(field.annotation)
+    if words:
+        return " or ".join(words)
+    text = field.description or ""
+    lowest, above, highest = (_bound(field, kind) for kind in ("ge", "gt", "le"))
+    if lowest is not None and highest is not None:
+        text += f", {lowest:.10g}..{highest:.10g}"
+    elif above is not None and highest is not None:
+        text += f", above {above:g}, at most {highest:g}"
+    return text + (f", or {RANDOM_SEED}" if name == "seed" else "")
+
+
+def _bound(field: FieldInfo, kind: str) -> float | None:
+    """The limit of this kind ("ge", "gt", "le") that the field was declared with."""
+    limits = (getattr(limit, kind, None) for limit in field.metadata)
+    return next((limit for limit in limits if limit is not None), None)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import reprlib
 from pathlib import Path
-from typing import Dict, Mapping, NamedTuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
 
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from typing_extensions import Annotated
+
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused, MeshError
-from drone_mesh.yaml_file import read_mapping
+from drone_mesh.yaml_file import YamlFile, read_mapping
 
 FIELD_CASE = 0
 GRID_CASE = 100
 MAX_CASE = 2**32 - 1  # Casus.srv: uint32 caseID
-MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
 
 _FIELD_PLACES = {  # node id -> longitude, latitude: the field case of the project plan
     1: (-13, 24),
@@ -66,15 +70,13 @@ class Layouts:
 
     @classmethod
     def load(cls, path: str | Path) -> Layouts:
-        """Read a file like config/casus.yaml. ConfigurationError: file, place and what is wrong."""
-        content = read_mapping(path)
-        unknown = [str(key) for key in content if key != "cases"]
-        if unknown:
-            raise ConfigurationError(f"{path}: unknown key {unknown[0]}; want only 'cases'")
-        cases = content.get("cases")
-        if not isinstance(cases, dict):
-            raise ConfigurationError(f"{path}: want 'cases:' with one layout for each case number")
-        return cls({_case_id(path, case): _layout(path, case, cases[case]) for case in cases})
+        """Read a file like config/casus.yaml. ConfigurationError: file, line and what is wrong."""
+        file = read_mapping(path)
+        try:
+            cases = _LayoutFile.model_validate(file.content).cases
+        except ValidationError as error:
+            raise _refusal(file, error.errors()) from None
+        return cls({case: _layout(file, case, places) for case, places in cases.items()})
 
     @property
     def cases(self) -> list[int]:
@@ -108,46 +110,62 @@ def _grid_layout() -> Layout:
     }
 
 
-def _is_id(value: object, highest: int) -> bool:
-    return type(value) is int and 0 <= value <= highest  # a bool is an int as well, but no id
+_Places = Dict[
+    Annotated[int, Field(ge=0, le=MAX_NODE_ID)],
+    Annotated[List[float], Field(min_length=3, max_length=3)],
+]
+_Cases = Dict[Annotated[int, Field(ge=0, le=MAX_CASE)], Annotated[_Places, Field(min_length=1)]]
 
 
-def _case_id(path: str | Path, case: object) -> int:
-    if not _is_id(case, MAX_CASE):
-        raise ConfigurationError(f"{path}: case {case!r} is not a whole number 0..{MAX_CASE}")
-    assert isinstance(case, int)
-    return case
+class _LayoutFile(BaseModel):
+    """The shape of a file like config/casus.yaml; `check_goal` judges the places."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)  # "1", 1.0 and true are not ids
+
+    cases: _Cases
 
 
-def _layout(path: str | Path, case: int, content: object) -> Layout:
-    where = f"{path}: case {case}"
-    if not isinstance(content, dict) or not content:
-        raise ConfigurationError(f"{where}: want 'node id: [longitude, latitude, height]' lines")
-    layout: Layout = {}
-    for node_id, place in content.items():
-        if not _is_id(node_id, MAX_NODE_ID):
-            raise ConfigurationError(
-                f"{where}: {node_id!r} is not a node id, want 0..{MAX_NODE_ID}"
-            )
-        layout[node_id] = _place(f"{where}, drone {node_id}", place)
-    return layout
-
-
-def _place(where: str, content: object) -> Location:
-    if (
-        not isinstance(content, list)
-        or len(content) != 3
-        or not all(type(number) in (int, float) for number in content)
-    ):
-        raise ConfigurationError(
-            f"{where}: {content!r} is not a place, want three numbers [longitude, latitude, height]"
+def _refusal(file: YamlFile, found: Sequence[Any]) -> ConfigurationError:
+    """The error for the first thing that pydantic found wrong."""
+    unknown = [error["loc"][0] for error in found if error["type"] == "extra_forbidden"]
+    if unknown:
+        where = file.where(unknown[0])
+        return ConfigurationError(f"{where}: unknown key {unknown[0]}; want only 'cases'")
+    loc = found[0]["loc"]
+    is_key = loc[-1] == "[key]"  # the key itself is wrong, and stands before that as text
+    keys = (*loc[:-2], found[0]["input"]) if is_key else loc
+    where = file.where(*keys)
+    if len(keys) == 1:
+        return ConfigurationError(f"{where}: want 'cases:' with one layout for each case number")
+    case = keys[1]
+    if len(keys) == 2 and is_key:
+        return ConfigurationError(f"{where}: case {case!r} is not a whole number 0..{MAX_CASE}")
+    if len(keys) == 2:
+        return ConfigurationError(
+            f"{where}: case {case}: want 'node id: [longitude, latitude, height]' lines"
         )
-    longitude, latitude, height = map(float, content)
-    try:
-        check_goal(latitude, longitude, height)
-    except GoalRefused as error:
-        raise ConfigurationError(f"{where}: {error}") from error
-    return Location(latitude=latitude, longitude=longitude, height=height)
+    node_id = keys[2]
+    if is_key:
+        return ConfigurationError(
+            f"{where}: case {case}: {node_id!r} is not a node id, want 0..{MAX_NODE_ID}"
+        )
+    place = reprlib.repr(file.content["cases"][case][node_id])
+    return ConfigurationError(
+        f"{where}: case {case}, drone {node_id}: {place} is not a place, "
+        "want three numbers [longitude, latitude, height]"
+    )
+
+
+def _layout(file: YamlFile, case: int, places: Mapping[int, Sequence[float]]) -> Layout:
+    layout: Layout = {}
+    for node_id, (longitude, latitude, height) in places.items():
+        try:
+            check_goal(latitude, longitude, height)
+        except GoalRefused as error:
+            where = file.where("cases", case, node_id)
+            raise ConfigurationError(f"{where}: case {case}, drone {node_id}: {error}") from error
+        layout[node_id] = Location(latitude=latitude, longitude=longitude, height=height)
+    return layout
 
 
 def _ranges(numbers: list[int]) -> str:

@@ -2,52 +2,122 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Hashable
 from pathlib import Path
-from typing import Any
+from typing import Any, Tuple
 
 import yaml
+from yaml.composer import ComposerError
+from yaml.constructor import ConstructorError
 
 from drone_mesh.errors import ConfigurationError
 
+# Our choices: far above what a configuration or a layout of 254 drones needs, and low enough that
+# a wrong or hostile file is refused at once.
+MAX_FILE_BYTES = 500_000
+MAX_DEPTH = 10
+MAX_VALUE_CHARACTERS = 250
 
-class _UniqueKeysLoader(yaml.SafeLoader):
-    """SafeLoader, but a key that stands twice is an error; otherwise the last one would win."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        seen: set[Hashable] = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if isinstance(key, Hashable):
-                if key in seen:
-                    raise yaml.constructor.ConstructorError(
-                        None, None, f"{key} stands there twice", key_node.start_mark
-                    )
-                seen.add(key)
-        return super().construct_mapping(node, deep)
+KeyPath = Tuple[Hashable, ...]
 
 
-def read_mapping(path: str | Path) -> dict[Any, Any]:
-    """The mapping that is the whole of this file; an empty file is an empty mapping.
+class YamlFile:
+    """The mapping that a file consists of, and the line of each of its keys."""
+
+    def __init__(
+        self, path: str | Path, content: dict[Any, Any], lines: dict[KeyPath, int]
+    ) -> None:
+        self.path = path
+        self.content = content
+        self._lines = lines
+
+    def where(self, *keys: Hashable) -> str:
+        """Path and line of a key, given by the keys that lead to it, for an error message.
+
+        For keys that are not in the file: the line of the nearest one around them.
+        """
+        for length in range(len(keys), 0, -1):
+            line = self._lines.get(keys[:length])
+            if line is not None:
+                return f"{self.path}, line {line}"
+        return str(self.path)
+
+
+def read_mapping(path: str | Path) -> YamlFile:
+    """Read this file; an empty file is an empty mapping.
 
     Raises ConfigurationError (one line: file, line, what is wrong) for a file that cannot be read,
-    is not YAML, names a key twice or holds something else than a mapping.
+    is not YAML, has a duplicate key, exceeds the limits above or contains anything but a mapping.
+    Aliases (*name) are refused: a few lines of them can stand for gigabytes.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        loader = _Loader(_read_text(path))
+        root = loader.get_single_node()
+        lines: dict[KeyPath, int] = {}
+        if root is not None:
+            loader.note_lines(root, (), lines)
+        content = {} if root is None else loader.construct_document(root)
+    except yaml.MarkedYAMLError as error:
+        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
+        raise ConfigurationError(f"{path}{line}: {error.problem}") from error
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigurationError(f"{path}: {' '.join(str(error).split())}") from error
+    if content is None:
+        content = {}
+    if not isinstance(content, dict):
+        raise ConfigurationError(f"{path}: want 'key: value' lines, not a {type(content).__name__}")
+    return YamlFile(path, content, lines)
+
+
+def _read_text(path: str | Path) -> str:
+    try:
+        # Opening a pipe waits for its writer, and a device may never end.
+        status = Path(path).stat()
+        if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
+            raise ConfigurationError(f"{path}: not a regular file")
+        if status.st_size > MAX_FILE_BYTES:
+            raise ConfigurationError(f"{path}: larger than {MAX_FILE_BYTES} bytes")
+        return Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise ConfigurationError(f"{path}: not a text file in UTF-8") from error
-    try:
-        content = yaml.load(text, Loader=_UniqueKeysLoader)
-    except yaml.MarkedYAMLError as error:
-        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise ConfigurationError(f"{path}{line}: {error.problem}") from error
-    except yaml.YAMLError as error:
-        raise ConfigurationError(f"{path}: {' '.join(str(error).split())}") from error
-    if content is None:
-        return {}
-    if not isinstance(content, dict):
-        raise ConfigurationError(f"{path}: want 'key: value' lines, not a {type(content).__name__}")
-    return content
+
+
+class _Loader(yaml.SafeLoader):
+    """SafeLoader with limits, and without duplicate keys: there, the last one would win."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        mark: Any = event.start_mark
+        if isinstance(event, yaml.AliasEvent):
+            raise ComposerError(None, None, "aliases (*name) are not allowed", mark)
+        if self._depth >= MAX_DEPTH:
+            problem = f"nested deeper than {MAX_DEPTH} levels"
+            raise ComposerError(None, None, problem, mark)
+        if isinstance(event, yaml.ScalarEvent) and len(event.value) > MAX_VALUE_CHARACTERS:
+            problem = f"a value is longer than {MAX_VALUE_CHARACTERS} characters"
+            raise ComposerError(None, None, problem, mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def note_lines(self, node: yaml.Node, keys: KeyPath, lines: dict[KeyPath, int]) -> None:
+        """Enter the line of each key below `node`; ConstructorError for a duplicate key."""
+        if not isinstance(node, yaml.MappingNode):
+            return
+        for key_node, value_node in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, Hashable):
+                continue  # construct_document refuses it
+            path = (*keys, key)
+            if path in lines:
+                raise ConstructorError(None, None, f"duplicate key {key}", key_node.start_mark)
+            lines[path] = key_node.start_mark.line + 1
+            self.note_lines(value_node, path, lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from pathlib import Path
 
 import pytest
@@ -117,11 +118,11 @@ def test_as_fast_as_possible_is_a_factor_of_zero(write):
         ("7: 3", "unknown key 7; known are"),
     ],
 )
-def test_a_bad_line_is_refused_with_file_key_value_and_what_is_allowed(write, line, why):
-    path = write(line)
+def test_a_bad_line_is_refused_with_file_line_key_value_and_what_is_allowed(write, line, why):
+    path = write(f"# mine\n{line}\n")
     with pytest.raises(ConfigurationError, match=why) as refused:
         load_configuration(path)
-    assert str(refused.value).startswith(f"{path}: ")
+    assert str(refused.value).startswith(f"{path}, line 2: ")
     assert "\n" not in str(refused.value)
 
 
@@ -137,13 +138,18 @@ def test_a_bad_override_is_refused_as_an_argument(write):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("routers: 1\nrouters: 2\n", "line 2: routers stands there twice"),
+        ("routers: 1\nrouters: 2\n", "line 2: duplicate key routers"),
         ("routers: [1\n", "line 2: "),
         ("- routers\n", "want 'key: value' lines, not a list"),
         ("routers 3\n", "want 'key: value' lines, not a str"),
         ("? [1, 2]\n: 3\n", "line 1: "),
         ("routers: !!python/object:os.system {}\n", "line 1: "),
         ("routers: \x00\n", "mine.yaml: "),
+        ("seed: 2001-99-99\n", "mine.yaml: "),
+        (f"seed: {'9' * 5000}\n", "line 1: a value is longer than 250 characters"),
+        (f"routing: {'[' * 5000}\n", "line 1: nested deeper than 10 levels"),
+        ("a: &a [1]\nb: [*a, *a]\n", r"line 2: aliases \(\*name\) are not allowed"),
+        ("routers: 1\n" * 60_000, "mine.yaml: larger than 500000 bytes"),
     ],
 )
 def test_a_file_that_is_no_configuration_is_refused_in_one_line(write, text, why):
@@ -161,6 +167,20 @@ def test_a_file_that_is_not_there_or_no_text_is_refused_by_name(tmp_path):
     picture.write_bytes(b"\x89PNG\xff\xfe")
     with pytest.raises(ConfigurationError, match="picture.png: not a text file"):
         load_configuration(picture)
+
+
+def test_a_pipe_or_a_device_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for path in (tmp_path / "pipe.yaml", Path("/dev/zero")):
+        with pytest.raises(ConfigurationError, match="not a regular file"):
+            load_configuration(path)
+
+
+def test_a_long_value_is_not_repeated_whole(write):
+    path = write(f"routers: [{', '.join(['1'] * 1000)}]")
+    with pytest.raises(ConfigurationError, match="want a whole number of drones") as refused:
+        load_configuration(path)
+    assert len(str(refused.value)) < 200 + len(str(path))
 
 
 def test_the_seed_of_the_file_is_used_and_shown(write, caplog):

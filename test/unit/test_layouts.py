@@ -131,8 +131,8 @@ def test_an_unknown_case_is_refused_with_the_known_ones(shipped):
         ("cases: {5: {1: [0, 5001, 0]}}", "case 5, drone 1: latitude 5001 m is outside"),
         ("cases: {5: {1: [0, 0, 501]}}", "case 5, drone 1: height 501 m is outside 0..500"),
         ("cases: {5: {1: [0, 0, -1]}}", "case 5, drone 1: height -1 m is outside"),
-        ("cases:\n  5: {1: [0, 0, 0]}\n  5: {2: [0, 0, 0]}", "line 3: 5 stands there twice"),
-        ("cases:\n  5:\n    1: [0, 0, 0]\n    1: [1, 1, 1]", "line 4: 1 stands there twice"),
+        ("cases:\n  5: {1: [0, 0, 0]}\n  5: {2: [0, 0, 0]}", "line 3: duplicate key 5"),
+        ("cases:\n  5:\n    1: [0, 0, 0]\n    1: [1, 1, 1]", "line 4: duplicate key 1"),
     ],
 )
 def test_a_bad_file_is_refused_with_the_place_and_the_reason(load, tmp_path, text, why):
@@ -140,6 +140,19 @@ def test_a_bad_file_is_refused_with_the_place_and_the_reason(load, tmp_path, tex
         load(text)
     assert str(refused.value).startswith(str(tmp_path / "mine.yaml"))
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ("2: [0, 0]", r"line 5: case 5, drone 2: \[0, 0\] is"),
+        ("2: [0, 0, 501]", "line 5: case 5, drone 2: height 501"),
+        ("two: [0, 0, 0]", "line 5: case 5: 'two' is not a node id"),
+    ],
+)
+def test_a_refusal_names_the_line(load, place, why):
+    with pytest.raises(ConfigurationError, match=why):
+        load(f"# mine\ncases:\n  5:\n    1: [0, 0, 0]\n    {place}\n")
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import json
-import math
-from dataclasses import dataclass
-from typing import Any, Callable, Mapping, Protocol
+import abc
+from typing import Literal, Optional, Protocol, Union
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
+from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.errors import MeshError
+from drone_mesh.layouts import MAX_CASE
 
-FURTHEST_M = 5000.0  # docs/protocol.md, "Goals"
-HIGHEST_M = 500.0
-FASTEST = 100.0  # simulated seconds per wall second; our choice
+MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
+
+NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
+NodeOrNone = Optional[NodeId]
+Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
 
 
 class OrderRefused(MeshError):
@@ -31,76 +37,86 @@ class MeshControls(Protocol):
     def speed(self, paused: bool, factor: float) -> str: ...
 
 
-@dataclass(frozen=True)
-class Order:
+class _Request(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True)  # "3" is not a node, 1 not a switch
+
+
+class Order(_Request, abc.ABC):
     """One order of one page; `number` comes back with the answer."""
 
-    number: int
-    carry_out: Callable[[MeshControls], str]  # returns a few words for the page
+    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
+
+    @abc.abstractmethod
+    def carry_out(self, controls: MeshControls) -> str:
+        """A few words for the page. Raises OrderRefused."""
 
 
-@dataclass(frozen=True)
-class Watch:
+class _Power(Order):
+    do: Literal["power"]
+    node: NodeId
+    on: bool
+
+    def carry_out(self, controls: MeshControls) -> str:
+        return controls.power(self.node, self.on)
+
+
+class _Fly(Order):
+    do: Literal["fly"]
+    node: NodeId
+    x: Coordinate
+    y: Coordinate
+    z: float = Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)
+
+    def carry_out(self, controls: MeshControls) -> str:
+        return controls.fly(self.node, self.x, self.y, self.z)
+
+
+class _Layout(Order):
+    do: Literal["layout"]
+    case: int = Field(ge=0, le=MAX_CASE)
+
+    def carry_out(self, controls: MeshControls) -> str:
+        return controls.layout(self.case)
+
+
+class _Speed(Order):
+    do: Literal["speed"]
+    paused: bool
+    factor: float = Field(ge=0, le=MAX_REAL_TIME_FACTOR, allow_inf_nan=False)
+
+    def carry_out(self, controls: MeshControls) -> str:
+        return controls.speed(self.paused, self.factor)
+
+
+class Watch(_Request):
     """The page wants to see one node's neighbours in detail; None: no longer."""
 
-    node: int | None
+    do: Literal["watch"]
+    node: NodeOrNone
+
+
+class _Numbered(_Request):
+    number: int
+
+
+_REQUESTS: TypeAdapter[Order | Watch] = TypeAdapter(
+    Annotated[Union[_Power, _Fly, _Layout, _Speed, Watch], Field(discriminator="do")]
+)
 
 
 def parse_request(text: str) -> Order | Watch:
     """A page's message. Raises OrderRefused for anything that is not exactly a known request."""
     try:
-        request = json.loads(text)
-    except ValueError:
-        raise OrderRefused("this is not JSON") from None
-    if not isinstance(request, dict):
-        raise OrderRefused("a request is an object")
-    if request.get("do") == "watch":
-        return Watch(None if request.get("node") is None else _node(request))
-    number = _whole(request, "number", 0, 2**53)
-    action = request.get("do")
-    if action == "power":
-        node, on = _node(request), _truth(request, "on")
-        return Order(number, lambda controls: controls.power(node, on))
-    if action == "fly":
-        node = _node(request)
-        x = _real(request, "x", -FURTHEST_M, FURTHEST_M)
-        y = _real(request, "y", -FURTHEST_M, FURTHEST_M)
-        z = _real(request, "z", 0, HIGHEST_M)
-        return Order(number, lambda controls: controls.fly(node, x, y, z))
-    if action == "layout":
-        case = _whole(request, "case", 0, 2**32 - 1)
-        return Order(number, lambda controls: controls.layout(case))
-    if action == "speed":
-        paused, factor = _truth(request, "paused"), _real(request, "factor", 0, FASTEST)
-        return Order(number, lambda controls: controls.speed(paused, factor))
-    raise OrderRefused(f"{action!r} is not something this console does")
+        return _REQUESTS.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = f"{first['loc'][-1]}: " if first["loc"] else ""
+        raise OrderRefused(f"invalid request: {key}{first['msg']}") from None
 
 
-def _node(request: Mapping[str, Any]) -> int:
-    return _whole(request, "node", 0, MAX_NODE_ID)
-
-
-def _whole(request: Mapping[str, Any], key: str, low: int, high: int) -> int:
-    value = request.get(key)
-    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise OrderRefused(f"{key}: a whole number from {low} to {high} is wanted, not {value!r}")
-    return value
-
-
-def _real(request: Mapping[str, Any], key: str, low: float, high: float) -> float:
-    value = request.get(key)
-    if (
-        not isinstance(value, (int, float))
-        or isinstance(value, bool)
-        or not math.isfinite(value)
-        or not low <= value <= high
-    ):
-        raise OrderRefused(f"{key}: a number from {low:g} to {high:g} is wanted, not {value!r}")
-    return float(value)
-
-
-def _truth(request: Mapping[str, Any], key: str) -> bool:
-    value = request.get(key)
-    if not isinstance(value, bool):
-        raise OrderRefused(f"{key}: true or false is wanted, not {value!r}")
-    return value
+def number_of(text: str) -> int | None:
+    """The number of a refused request, so that the page knows which one it was."""
+    try:
+        return _Numbered.model_validate_json(text).number
+    except ValidationError:
+        return None

@@ -15,7 +15,7 @@ import logging
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Sequence
+from typing import Sequence
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -27,7 +27,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from drone_mesh.console.frames import FrameStore
-from drone_mesh.console.orders import MeshControls, Order, OrderRefused, Watch, parse_request
+from drone_mesh.console.orders import (
+    MeshControls,
+    Order,
+    OrderRefused,
+    Watch,
+    number_of,
+    parse_request,
+)
 from drone_mesh.web.access import Access, AccessDenied
 
 log = logging.getLogger(__name__)
@@ -197,7 +204,7 @@ class ConsoleServer:
         try:
             request = parse_request(text)
         except OrderRefused as error:
-            await self._answer(page, _number_in(text), False, str(error))
+            await self._answer(page, number_of(text), False, str(error))
             return
         if isinstance(request, Watch):
             page.watching = request.node
@@ -222,12 +229,3 @@ class ConsoleServer:
         # A page that went meanwhile wants no answer.
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
             await self._send(page, json.dumps(answer))
-
-
-def _number_in(text: str) -> int | None:
-    """The number of a refused request, so that the page knows which one it was."""
-    try:
-        number: Any = json.loads(text).get("number")
-    except (ValueError, AttributeError):
-        return None
-    return number if isinstance(number, int) else None

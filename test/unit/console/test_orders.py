@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from drone_mesh.console.orders import Order, OrderRefused, Watch, parse_request
+from drone_mesh.console.orders import Order, OrderRefused, Watch, number_of, parse_request
 
 
 class Notebook:
@@ -51,36 +51,51 @@ def test_an_order_is_carried_out_as_it_was_given(request_, done):
 
 
 def test_a_page_may_watch_a_node_or_none():
-    assert parse_request('{"do":"watch","node":3}') == Watch(3)
-    assert parse_request('{"do":"watch","node":null}') == Watch(None)
+    for text, node in (("3", 3), ("null", None)):
+        request = parse_request(f'{{"do":"watch","node":{text}}}')
+        assert isinstance(request, Watch)
+        assert request.node == node
 
 
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("", "not JSON"),
-        ("{", "not JSON"),
+        ("", "Invalid JSON"),
+        ("{", "Invalid JSON"),
+        ("[" * 4096, "Invalid JSON"),
         ("[]", "an object"),
         ("7", "an object"),
-        ('{"number":1}', "None is not something"),
-        ('{"number":1,"do":"reboot"}', "'reboot' is not something"),
-        ('{"do":"layout","case":0}', "number"),
-        ('{"number":-1,"do":"layout","case":0}', "number"),
-        ('{"number":1,"do":"power","node":254,"on":true}', "node: a whole number from 0 to 253"),
-        ('{"number":1,"do":"power","node":true,"on":true}', "node"),
-        ('{"number":1,"do":"power","node":"3","on":true}', "node"),
-        ('{"number":1,"do":"power","node":3,"on":1}', "on: true or false"),
-        ('{"number":1,"do":"fly","node":3,"x":NaN,"y":0,"z":0}', "x: a number"),
-        ('{"number":1,"do":"fly","node":3,"x":1e999,"y":0,"z":0}', "x: a number"),
-        ('{"number":1,"do":"fly","node":3,"x":5001,"y":0,"z":0}', "x: a number from -5000"),
-        ('{"number":1,"do":"fly","node":3,"x":0,"y":0,"z":-1}', "z: a number from 0 to 500"),
-        ('{"number":1,"do":"fly","node":3,"x":0,"y":0}', "z"),
-        ('{"number":1,"do":"layout","case":4294967296}', "case"),
-        ('{"number":1,"do":"layout","case":1.5}', "case"),
-        ('{"number":1,"do":"speed","paused":false,"factor":101}', "factor"),
-        ('{"do":"watch","node":300}', "node"),
+        ('{"number":1}', "'do'"),
+        ('{"number":1,"do":"reboot"}', "'reboot' .* does not match .* 'power'"),
+        ('{"do":"layout","case":0}', "number: "),
+        ('{"number":-1,"do":"layout","case":0}', "number: "),
+        ('{"number":1,"do":"power","node":254,"on":true}', "node: .* less than or equal to 253"),
+        ('{"number":1,"do":"power","node":true,"on":true}', "node: .* integer"),
+        ('{"number":1,"do":"power","node":"3","on":true}', "node: .* integer"),
+        ('{"number":1,"do":"power","node":3,"on":1}', "on: .* boolean"),
+        ('{"number":1,"do":"fly","node":3,"x":NaN,"y":0,"z":0}', "x: .* finite number"),
+        ('{"number":1,"do":"fly","node":3,"x":1e999,"y":0,"z":0}', "x: .* finite number"),
+        ('{"number":1,"do":"fly","node":3,"x":5001,"y":0,"z":0}', "x: .* or equal to 5000"),
+        ('{"number":1,"do":"fly","node":3,"x":0,"y":-5001,"z":0}', "y: .* or equal to -5000"),
+        ('{"number":1,"do":"fly","node":3,"x":0,"y":0,"z":-1}', "z: .* or equal to 0"),
+        ('{"number":1,"do":"fly","node":3,"x":0,"y":0,"z":501}', "z: .* or equal to 500"),
+        ('{"number":1,"do":"fly","node":3,"x":0,"y":0}', "z: "),
+        ('{"number":1,"do":"layout","case":4294967296}', "case: "),
+        (f'{{"number":1,"do":"layout","case":{"9" * 400}}}', "case: "),
+        ('{"number":1,"do":"layout","case":1.5}', "case: "),
+        ('{"number":1,"do":"speed","paused":false,"factor":1001}', "factor: "),
+        ('{"do":"watch","node":300}', "node: "),
     ],
 )
 def test_anything_else_is_refused_with_a_reason(text, why):
-    with pytest.raises(OrderRefused, match=why):
+    with pytest.raises(OrderRefused, match=why) as refused:
         parse_request(text)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [('{"number":7,"do":"reboot"}', 7), ('{"number":"7"}', None), ("7", None), ("[" * 4096, None)],
+)
+def test_a_refusal_goes_back_under_the_number_of_the_request(text, number):
+    assert number_of(text) == number
