@@ -120,7 +120,7 @@ def test_the_address_with_the_token_opens_the_page_and_the_token_leaves_the_addr
     assert "token" not in page.page.evaluate("document.cookie"), "scripts can read the token"
 
 
-def test_nonsense_from_a_page_is_answered_and_harms_nobody(start_console):
+def test_nonsense_from_a_page_is_answered_and_does_no_harm(start_console):
     answers = []
     with connect(start_console()) as page:
         for text in ("{", "[]", '{"do":"power","number":5,"node":999,"on":true}', '"x"'):
@@ -162,7 +162,7 @@ def open_and_take_nothing(console) -> socket.socket:
     return page
 
 
-def test_a_page_that_takes_nothing_holds_up_nobody(start_console, visit):
+def test_a_page_that_takes_nothing_delays_no_other_page(start_console, visit):
     console = start_console("--routers", "253", "--gridsize", "16", "--skip", "12")
     stuck = [open_and_take_nothing(console) for _ in range(4)]
     page = visit(console.url)

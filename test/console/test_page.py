@@ -39,7 +39,7 @@ def on_screen(page: Visit, x: float, y: float) -> tuple[float, float]:
     )
 
 
-def test_the_page_loads_without_complaint_and_asks_nobody_else(start_console, visit):
+def test_the_page_loads_without_errors_and_from_one_server_only(start_console, visit):
     console = start_console(*FAST)
     page = visit(console.url)
     page.wait_for_drones(len(PLACES))
@@ -98,7 +98,7 @@ def test_a_drag_sends_the_drone_there(page):
     page.wait_for("its y", lambda: abs(float(page.row(17, 11)) - 9.0) < 0.2)
 
 
-def test_a_drag_that_is_let_go_with_escape_sends_nobody(page):
+def test_a_drag_that_ends_with_escape_sends_no_drone(page):
     start = on_screen(page, *PLACES[17])
     page.page.mouse.move(*start)
     page.page.mouse.down()
@@ -195,7 +195,7 @@ def test_the_table_sorts_by_the_column_that_is_clicked(page):
     assert page.page.locator(ids).all_inner_texts() == [str(n) for n in range(18)]
 
 
-def test_the_log_tells_events_with_simulated_time_and_neighbours_on_request(page):
+def test_the_log_shows_events_with_simulated_time_and_neighbours_on_request(page):
     page.page.click("#nodes tr[data-id='2']")
     page.page.click("#power")
     page.page.wait_for_selector("#events li:has-text('2 power off')")
@@ -237,7 +237,7 @@ def test_at_phone_width_nothing_sticks_out_and_each_view_is_one_tap_away(start_c
         assert page.page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
-def test_a_finger_that_moves_the_map_sends_nobody_away(start_console, visit):
+def test_a_finger_that_moves_the_map_sends_no_drone_away(start_console, visit):
     page = visit(start_console(*FAST).url, viewport={"width": 390, "height": 780}, has_touch=True)
     page.wait_for_drones(len(PLACES))
     start = on_screen(page, *PLACES[9])

@@ -1,4 +1,4 @@
-"""The world's window on a virtual screen: what is on it, and that it harms nobody when it goes."""
+"""The world's window on a virtual screen: its content, and that closing it does no harm."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_q_closes_the_window_and_the_simulation_hears_of_it(screen, window, capl
 
 
 @needs_screen
-def test_a_window_that_dies_harms_nobody_and_is_told_of(screen, caplog):
+def test_a_window_that_dies_does_no_harm_and_is_reported(screen, caplog):
     looks = []
     window = WindowProcess(lambda: looks.append(1) or SCENE)
     window.start()

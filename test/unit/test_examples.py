@@ -29,8 +29,8 @@ def run_example(tmp_path):
 
 
 def test_a_mesh_in_process_heals(run_example):
-    told = run_example("inprocess_network.py")
-    assert "all that still have a way connected: True" in told
+    printed = run_example("inprocess_network.py")
+    assert "all that still have a way connected: True" in printed
 
 
 def test_ten_lines_are_enough_for_a_network_of_ones_own():
@@ -40,8 +40,8 @@ def test_ten_lines_are_enough_for_a_network_of_ones_own():
 
 
 def test_two_routing_techniques_are_compared_and_one_run_is_drawn(run_example, tmp_path):
-    told = run_example("own_routing.py", "--runs", "1", "--gridsize", "4", "--page", "run.html")
-    rows = [line.split() for line in told.splitlines()[1:3]]
+    printed = run_example("own_routing.py", "--runs", "1", "--gridsize", "4", "--page", "run.html")
+    rows = [line.split() for line in printed.splitlines()[1:3]]
     assert [row[0] for row in rows] == ["child_table_tree", "__main__:SteadyTree"]
     assert all(row[1] == "100.0%" for row in rows)
     assert "</html>" in (tmp_path / "run.html").read_text(encoding="utf-8")

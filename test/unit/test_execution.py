@@ -151,7 +151,7 @@ def test_a_component_that_fails_and_stays_due_is_not_called_in_a_tight_loop(exec
     assert [now_s for now_s, _ in stubborn.ticks] == [1.0]
 
 
-def test_call_every_skips_the_periods_it_slept_through_and_ends_when_told_to(executor, clock):
+def test_call_every_skips_the_periods_it_slept_through_and_ends_when_cancelled(executor, clock):
     calls = []
     stop = executor.call_every(1.0, calls.append)
     settle(executor)

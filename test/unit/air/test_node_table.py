@@ -109,7 +109,7 @@ def test_a_node_that_is_off_neither_sends_nor_receives(off):
     assert table.in_range(0) == ()
 
 
-def test_unknown_nodes_are_not_linked_and_may_not_ask_who_is_near():
+def test_unknown_nodes_are_not_linked_and_cannot_request_the_nodes_in_range():
     table = register_of((0.0, 0.0, 0.05))
     assert table.link(0, 9) is None
     assert table.link(9, 0) is None

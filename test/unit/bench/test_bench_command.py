@@ -14,7 +14,7 @@ def run(capsys, *arguments):
     return exit_.value.code, captured.out, captured.err
 
 
-def test_in_process_needs_no_ros_and_tells_the_same_as_table_and_json(
+def test_in_process_needs_no_ros_and_prints_the_same_as_table_and_json(
     capsys, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("PATH", str(tmp_path))

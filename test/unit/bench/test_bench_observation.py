@@ -54,7 +54,7 @@ def test_the_time_to_connect_is_counted_from_the_last_start_by_the_stamps_of_the
     assert watch.connected_after_s() == pytest.approx(0.5)
 
 
-def test_without_the_first_events_the_states_tell_the_time_to_connect():
+def test_without_the_first_events_the_states_give_the_time_to_connect():
     watch = watch_of(
         3,
         Happening(1.4, 2, STARTED),
@@ -66,7 +66,7 @@ def test_without_the_first_events_the_states_tell_the_time_to_connect():
     assert watch.connected_after_s() == pytest.approx(1.0)
 
 
-def test_who_was_connected_before_the_last_one_started_took_no_time():
+def test_a_fleet_connected_before_its_last_node_started_took_no_time():
     watch = watch_of(
         2,
         Happening(1.0, 1, STARTED),

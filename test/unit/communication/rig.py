@@ -180,7 +180,7 @@ class Rig:
     # Shorthand for what many tests begin with; the packets are those of gateway 0.
 
     def know_neighbour(self, *nodes):
-        """Be told by each node that it is there and unconnected, and forget what was answered."""
+        """Hear an unconnected PRESENT of each node, and forget the answers."""
         for node in nodes:
             self.mesh.on_msg(
                 bytes((node, node, 0, self.mesh.get_node_id(), 254)).ljust(32, b"\0"), self.now_s

@@ -1,4 +1,4 @@
-"""A routing technique of somebody else, and what is none: for test_routing.py."""
+"""A foreign routing technique, and things that are not one, for test_routing.py."""
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
 

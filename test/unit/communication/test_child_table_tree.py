@@ -51,7 +51,7 @@ def test_the_original_case_of_a_child_that_is_lost():
     assert tree.get_direction_to_node(5) == NO_ROUTE
 
 
-def test_a_new_tree_knows_nobody():
+def test_a_new_tree_is_empty():
     tree = ChildTableTree()
     assert tree.empty()
     assert (tree.get_table_size(), tree.get_amount_of_children()) == (0, 0)

@@ -24,7 +24,7 @@ BAD = {
     "from 255": packet("02 ff 03 01 fe"),
     "from myself": packet("02 01 03 01 fe"),
     "forward 255": packet("02 02 03 01 ff"),
-    "to somebody else": packet("02 02 03 03 fe"),
+    "to another node": packet("02 02 03 03 fe"),
     "to 254": packet("02 02 03 fe fe"),
     "location nowhere": packet(f"02 02 01 01 01 {NAN} {ONE}"),
     "location at infinity": packet(f"02 02 01 01 01 {ONE} {INFINITY}"),
@@ -78,7 +78,7 @@ def test_a_type_that_is_not_known_is_forwarded_like_any_other(kind):
 # Learning ------------------------------------------------------------------------------------
 
 
-def test_who_sends_is_a_direct_neighbour():
+def test_the_sender_is_a_direct_neighbour():
     rig = Rig()
     rig.now_s = 2.5
     rig.hear("02 02 00 01 01")
@@ -166,7 +166,7 @@ def test_a_heartbeat_with_254_hops_is_dropped():
     assert rig.sent() == []
 
 
-def test_without_a_route_the_neighbours_are_told_the_sender_first():
+def test_without_a_route_the_neighbours_are_informed_the_sender_first():
     rig = Rig()
     rig.know_neighbour(2, 3, 7)
     rig.hear("07 07 00 01 09")
@@ -205,7 +205,7 @@ def test_after_two_routes_that_do_not_take_it_it_is_dropped():
     assert rig.routing.get_direction_to_node(9) == 6
 
 
-def test_when_the_only_next_hop_does_not_take_it_the_neighbours_are_told_once_the_sender_first():
+def test_when_the_only_next_hop_fails_the_neighbours_are_informed_once_the_sender_first():
     rig = Rig()
     rig.know_neighbour(2, 3, 9)
     rig.antenna.dead = {9}
@@ -214,7 +214,7 @@ def test_when_the_only_next_hop_does_not_take_it_the_neighbours_are_told_once_th
     assert rig.routing.get_direction_to_node(9) == NO_ROUTE
 
 
-def test_when_the_next_hop_and_with_it_the_addressee_are_lost_the_neighbours_are_told_of_both():
+def test_when_the_next_hop_and_with_it_the_addressee_are_lost_the_neighbours_are_informed_of_both():
     rig = Rig()
     rig.know_neighbour(2, 3, 4)
     rig.routing.other_can_communicate_with_node(4, 9)
@@ -228,7 +228,7 @@ def test_when_the_next_hop_and_with_it_the_addressee_are_lost_the_neighbours_are
     ]
 
 
-def test_when_a_lost_addressee_could_be_reached_over_the_sender_alone_the_neighbours_are_told():
+def test_when_a_lost_addressee_could_be_reached_over_the_sender_alone_the_neighbours_are_informed():
     rig = Rig()
     rig.know_neighbour(2, 3, 9)
     rig.routing.other_can_communicate_with_node(3, 9)
@@ -241,20 +241,20 @@ def test_when_a_lost_addressee_could_be_reached_over_the_sender_alone_the_neighb
 
 
 def stranded(rig):
-    """Whether the rig told, once, of an order for drone 9 that ends here."""
-    told = [event.peer for event in rig.events if event.kind.name == "NO_ROUTE"]
-    assert rig.mesh.complaints.counts["no route to drone 9"] == len(told)
-    return told == [9]
+    """Whether the rig reported, once, an order for drone 9 that ends here."""
+    peers = [event.peer for event in rig.events if event.kind.name == "NO_ROUTE"]
+    assert rig.mesh.complaints.counts["no route to drone 9"] == len(peers)
+    return peers == [9]
 
 
-def test_an_order_without_a_route_ends_here_and_that_is_told():
+def test_an_order_without_a_route_ends_here_and_is_reported():
     rig = Rig()
     rig.know_neighbour(3)
     rig.hear("00 03 06 01 09")
     assert stranded(rig)
 
 
-def test_an_order_that_comes_round_ends_here_and_that_is_told():
+def test_an_order_that_circulates_ends_here_and_is_reported():
     rig = Rig()
     rig.know_neighbour(9)
     rig.hear("00 02 06 01 09")
@@ -263,7 +263,7 @@ def test_an_order_that_comes_round_ends_here_and_that_is_told():
     assert stranded(rig)
 
 
-def test_an_order_that_two_next_hops_do_not_take_ends_here_and_that_is_told():
+def test_an_order_that_two_next_hops_do_not_take_ends_here_and_is_reported():
     rig = Rig()
     for child in (4, 6, 7):
         rig.routing.other_can_communicate_with_node(child, 9)
@@ -366,7 +366,7 @@ def test_ten_thousand_random_packets_raise_nothing_and_the_node_still_answers(ga
     rng = random.Random(14)
     for number in range(10_000):
         payload = bytearray(rng.getrandbits(256).to_bytes(32, "little"))
-        if number % 2:  # a good header: from somebody, to this node
+        if number % 2:  # a good header, to this node
             payload[0], payload[1], payload[3] = rng.randrange(254), rng.randrange(2, 254), 1
             payload[2] = rng.choice([0, 1, 2, 3, 4, 5, 7, rng.randrange(8, 256)])
             payload[4] = rng.choice([1, 254, rng.randrange(255)])

@@ -163,26 +163,26 @@ def test_a_packet_that_is_taken_counts_as_sent_and_teaches():
 
 
 def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
-    """Whatever technique it is: this one is told, and has no table to guess from."""
-    told = []
+    """Any technique is informed of successes and failures; this one has no table."""
+    calls = []
 
     class Told(ChildTableTree):
         def can_communicate_with_node(self, node):
-            told.append(("can", node))
+            calls.append(("can", node))
             super().can_communicate_with_node(node)
 
         def cant_communicate_with_node(self, node):
-            told.append(("cannot", node))
+            calls.append(("cannot", node))
             return super().cant_communicate_with_node(node)
 
     antenna = RecordingAntenna()
     mesh = MeshnetworkRouter(1, antenna, RigEngine(), Told(), AlwaysHalf())
     mesh.start(0.0)
     mesh.on_msg(packet(ASK), 0.0)
-    assert told == [("can", 5), ("can", 5)]  # heard, and has taken the answer
+    assert calls == [("can", 5), ("can", 5)]  # heard, and has taken the answer
     antenna.dead = {5}
     mesh.on_msg(packet(ASK), 0.0)
-    assert told[2:] == [("can", 5), ("cannot", 5)]
+    assert calls[2:] == [("can", 5), ("cannot", 5)]
 
 
 def test_broadcasts_do_not_count_as_sent():
@@ -201,7 +201,7 @@ def test_a_packet_that_is_lost_is_sent_again_and_costs_no_neighbour(lost):
     assert rig.mesh.get_total_message_sent() == 1
 
 
-def test_after_three_failures_the_neighbour_is_lost_and_the_others_are_told():
+def test_after_three_failures_the_neighbour_is_lost_and_the_others_are_informed():
     rig = Rig()
     rig.know_neighbour(2, 5, 7)
     rig.antenna.losing = 3
@@ -246,7 +246,7 @@ def test_a_heartbeat_without_a_route_is_false_and_sends_nothing():
     assert rig.tried() == []
 
 
-def test_a_heartbeat_that_nobody_takes_is_false():
+def test_a_heartbeat_without_an_acknowledgement_is_false():
     rig = Rig()
     rig.routing.other_can_communicate_with_node(2, 9)
     rig.antenna.dead = {2}
@@ -254,7 +254,7 @@ def test_a_heartbeat_that_nobody_takes_is_false():
     assert rig.routing.empty()
 
 
-def test_a_neighbour_that_cannot_be_told_is_lost_and_the_rest_learn_of_both():
+def test_a_neighbour_that_cannot_be_informed_is_lost_and_the_rest_learn_of_both():
     rig = Rig()
     rig.know_neighbour(2, 3, 5)
     rig.antenna.dead = {2, 5}
@@ -275,7 +275,7 @@ def test_losing_two_hundred_neighbours_at_once_is_survived():
 # Missing nodes -------------------------------------------------------------------------------
 
 
-def test_a_missing_node_is_dropped_and_told_to_all_but_the_one_that_told():
+def test_a_missing_node_is_dropped_and_reported_to_all_but_the_sender():
     rig = Rig()
     rig.know_neighbour(3, 4)
     rig.hear("09 02 00 01 01", "02 02 05 01 01 09")
@@ -291,7 +291,7 @@ def test_a_missing_node_that_was_never_behind_the_teller_is_no_news():
     assert rig.sent() == []
 
 
-def test_a_missing_node_that_has_another_way_is_not_told_on():
+def test_a_missing_node_with_another_route_is_not_reported_on():
     rig = Rig()
     rig.know_neighbour(4)
     for child in (2, 3):
@@ -321,7 +321,7 @@ def test_that_this_node_or_no_node_is_missing_is_no_news(missing):
 # Location ------------------------------------------------------------------------------------
 
 
-def test_the_own_location_is_told_with_whole_metres_of_height_and_whole_seconds():
+def test_the_own_location_has_whole_metres_of_height_and_whole_seconds():
     rig = Rig()
     rig.engine.place = rig.engine.place._replace(latitude=1.5, longitude=-2.0, height=2.6)
     rig.wait(1.99)
@@ -329,7 +329,7 @@ def test_the_own_location_is_told_with_whole_metres_of_height_and_whole_seconds(
     assert rig.sent() == [packet("01 01 01 05 05 00 00 c0 3f 00 00 00 c0 03 00 01 00 00 00")]
 
 
-def test_a_drone_that_does_not_know_its_place_tells_none():
+def test_a_drone_that_does_not_know_its_place_sends_none():
     """It does not invent a place."""
     rig = Rig()
     rig.engine.place = None
@@ -341,7 +341,7 @@ def test_a_drone_that_does_not_know_its_place_tells_none():
 
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf")])
-def test_a_place_that_is_none_is_not_told(number):
+def test_an_invalid_place_is_not_sent(number):
     rig = Rig()
     rig.engine.place = rig.engine.place._replace(latitude=number)
     rig.hear(ASK)
@@ -365,7 +365,7 @@ def test_an_answer_goes_the_way_the_question_came_with_the_asker_as_addressee():
 # The medium comes back -----------------------------------------------------------------------
 
 
-def test_a_node_that_the_medium_knows_anew_introduces_itself_soon():
+def test_a_node_that_the_medium_registers_again_introduces_itself_soon():
     rig = Rig()
     rig.mesh.on_antenna_registered(rig.now_s)
     rig.wait(2.0)

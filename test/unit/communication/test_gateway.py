@@ -77,7 +77,7 @@ def test_the_introduction_of_a_connected_node_is_not_answered():
     assert rig.tried() == []
 
 
-def test_a_gateway_tells_its_location_when_it_is_asked():
+def test_a_gateway_sends_its_location_when_it_is_asked():
     rig = gateway_rig()
     rig.hear("05 02 02 01 01")
     assert rig.sent() == [packet("01 01 01 02 05")]
@@ -130,14 +130,14 @@ def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(caplog):
     assert (rig.events[-1].kind.name, rig.events[-1].peer) == ("NO_ROUTE", 77)
 
 
-def test_an_order_that_nobody_takes_is_false():
+def test_an_order_without_an_acknowledgement_is_false():
     rig = gateway_rig()
     rig.know_neighbour(5)
     rig.antenna.dead = {5}
     assert not rig.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, rig.now_s)
 
 
-def test_an_order_for_its_own_drone_is_flown_and_the_landing_told():
+def test_an_order_for_its_own_drone_is_flown_and_the_landing_reported():
     rig = gateway_rig()
     rig.know_neighbour(2)
     assert rig.mesh.send_goal_request_to_drone(1, 3.0, 4.0, 5, rig.now_s)

@@ -31,13 +31,13 @@ def test_a_router_starts_unconnected_with_255_for_what_it_does_not_know():
     assert mesh.get_total_message_sent() == 0
 
 
-@pytest.mark.parametrize(("hops", "told"), [(0, 1), (3, 4), (253, 254), (254, 255), (255, 255)])
-def test_a_heartbeat_of_a_gateway_connects_with_one_hop_more_than_it_made(hops, told):
+@pytest.mark.parametrize(("hops", "shown"), [(0, 1), (3, 4), (253, 254), (254, 255), (255, 255)])
+def test_a_heartbeat_of_a_gateway_connects_with_one_hop_more_than_it_made(hops, shown):
     rig = Rig()
     rig.hear(f"09 02 04 01 01 01 09 {hops:02x}")
     assert rig.mesh.get_connected_to_gateway()
     assert rig.mesh.get_preferred_gateway() == 9
-    assert rig.mesh.get_hops_from_gateway_away() == told
+    assert rig.mesh.get_hops_from_gateway_away() == shown
     assert rig.mesh.get_route_to_gateway() == 2
 
 
@@ -162,7 +162,7 @@ def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
     assert rig.sent(REQUEST) == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
 
 
-def test_a_heartbeat_that_nobody_takes_ends_the_connection_at_once():
+def test_a_heartbeat_without_an_acknowledgement_ends_the_connection_at_once():
     rig = connected_rig()
     rig.antenna.dead = {0}
     assert not rig.mesh.send_heartbeat(0)
@@ -264,14 +264,14 @@ def test_taking_a_gateway_drops_every_other_entry_for_it():
         "02 02 04 01 01 01 00 00",  # and to mine
     ],
 )
-def test_the_heartbeat_of_a_connected_router_tells_a_connected_one_nothing(heartbeat):
+def test_the_heartbeat_of_a_connected_router_changes_nothing_in_a_connected_one(heartbeat):
     rig = connected_rig()
     rig.hear(heartbeat)
     assert rig.tried() == []
     assert rig.mesh.get_preferred_gateway() == 0
 
 
-def test_two_unconnected_routers_tell_each_other_nothing():
+def test_two_unconnected_routers_change_nothing_in_each_other():
     rig = Rig()
     rig.hear("02 02 04 01 01 00 ff 00", "03 03 04 01 01 00 09 00")
     assert rig.tried() == []
@@ -380,7 +380,7 @@ def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():
 
 
 def test_only_a_neighbour_can_be_a_shortcut():
-    """What passed on the introduction of somebody else, or of this node, is no way."""
+    """A neighbour that relays an introduction, or returns our own, is not a shortcut."""
     for creator in ("05", "01"):
         rig = Rig()
         rig.connect_through(2, hops=4)
@@ -497,7 +497,7 @@ def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
     rig.wait_until(30.0)
     rig.antenna.powered = True
     rig.mesh.on_antenna_power(True, rig.now_s)
-    rig.wait_until(64.0)  # at 35 s it starts anew
+    rig.wait_until(64.0)  # at 35 s it starts again
     assert rig.engine.goals == []
     rig.wait_until(66.0)
     assert len(rig.engine.goals) == 1

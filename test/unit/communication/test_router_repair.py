@@ -73,7 +73,7 @@ def test_it_is_the_gateways_when_that_is_the_next_hop():
     assert rig.mesh.get_last_good_known_location_id() == 0
 
 
-def test_it_is_unknown_until_somebody_told():
+def test_it_is_unknown_until_a_location_arrives():
     rig = Rig()
     rig.connect_through(2)
     assert rig.mesh.get_last_good_known_location_id() == 255
@@ -145,7 +145,7 @@ def test_it_asks_for_its_position_once_a_second_and_not_before():
 
 def test_a_flight_is_not_turned_round_however_long_it_takes():
     rig = lone_rig()
-    rig.hear("00 02 06 01 01 00 00 fa 43")  # 500 m away: nobody there
+    rig.hear("00 02 06 01 01 00 00 fa 43")  # 500 m away: no node there
     assert len(rig.engine.goals) == 1
     for second in range(250):
         fly(rig, Location(2.0 * second, 0.0, 0.0))
@@ -187,7 +187,7 @@ def test_the_same_order_during_the_flight_is_no_new_flight():
     assert rig.engine.goals == [Location(20.0, 0.0, 0)]
 
 
-def test_the_same_order_of_a_second_gateway_is_told_of_once():
+def test_the_same_order_of_a_second_gateway_is_reported_once():
     rig = Rig()
     rig.hear("00 02 06 01 01 00 00 a0 41", "07 02 06 01 01 00 00 a0 41")
     assert rig.kinds().count("FLIGHT_ORDERED") == 1
@@ -246,7 +246,7 @@ def test_a_heartbeat_that_is_answered_in_flight_counts_no_more_after_the_landing
 # Lost connection -----------------------------------------------------------------------------
 
 
-def test_a_lost_gateway_is_dropped_and_the_neighbours_are_told():
+def test_a_lost_gateway_is_dropped_and_the_neighbours_are_informed():
     rig = Rig()
     rig.connect_through(2)
     rig.routing.other_can_communicate_with_node(3, 0)
@@ -261,7 +261,7 @@ def test_a_lost_gateway_is_dropped_and_the_neighbours_are_told():
     assert rig.routing.get_set_of_children() == {2, 3}
 
 
-def test_who_never_knew_a_gateway_has_none_to_drop():
+def test_a_router_that_never_knew_a_gateway_has_none_to_drop():
     rig = Rig()
     rig.know_neighbour(2)
     rig.wait_until(6.0)
@@ -307,7 +307,7 @@ def test_the_timer_is_off_when_a_gateway_answers():
 # Emergency without neighbours ----------------------------------------------------------------
 
 
-def test_who_has_no_neighbours_flies_to_the_place_to_step_back_to():
+def test_a_router_without_neighbours_flies_to_the_place_to_step_back_to():
     rig = lone_rig()
     rig.wait_until(60.0)
     assert rig.engine.goals[:1] == [NEIGHBOUR_PLACE]
@@ -315,7 +315,7 @@ def test_who_has_no_neighbours_flies_to_the_place_to_step_back_to():
     assert rig.mesh.get_last_good_known_location_id() == 0
 
 
-def test_who_knows_no_other_place_flies_to_the_gateway():
+def test_a_router_that_knows_no_other_place_flies_to_the_gateway():
     rig = Rig()
     rig.engine.place = Location(12.0, 0.0, 0.0)
     rig.connect_through(2)
@@ -334,7 +334,7 @@ def test_after_one_step_back_the_next_one_is_to_the_gateway():
     assert rig.engine.goals[:2] == [NEIGHBOUR_PLACE, GATEWAY_PLACE]
 
 
-def test_who_knows_no_place_at_all_stays():
+def test_a_router_that_knows_no_place_at_all_stays():
     rig = Rig()
     rig.wait_until(200.0)
     assert rig.engine.goals == []
@@ -415,7 +415,7 @@ def test_scores_are_compared_as_they_are_on_the_air():
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
-def test_nobody_flies_when_nobody_bids():
+def test_no_router_flies_without_a_bid():
     rig = Rig()
     rig.know_neighbour(3)
     rig.wait_until(35.1)
@@ -425,14 +425,14 @@ def test_nobody_flies_when_nobody_bids():
     assert rig.events[-1].peer == NO_ROUTE
 
 
-def test_who_would_take_the_place_of_a_neighbour_does_not_bid():
+def test_a_router_that_would_take_the_place_of_a_neighbour_does_not_bid():
     rig = group_rig(2, 3)
     rig.antenna.dead = set()  # it takes the heartbeats for the gateway, and no answer comes
     rig.wait_until(EMERGENCY_S + 0.1)
     assert own_bid(3, -1.0) in rig.sent(BID)
 
 
-def test_who_knows_no_gateway_location_does_not_bid():
+def test_a_router_that_knows_no_gateway_location_does_not_bid():
     rig = Rig()
     rig.hear(NEIGHBOUR_2_AT_0_8)
     rig.antenna.dead = {2}
@@ -441,7 +441,7 @@ def test_who_knows_no_gateway_location_does_not_bid():
     assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
-def test_who_knows_the_place_of_the_gateway_alone_bids_for_flying_there():
+def test_a_router_that_knows_only_the_place_of_the_gateway_bids_for_flying_there():
     """Else a group of such drones would stay for ever (the place to fly to without neighbours)."""
     rig = Rig()
     rig.engine.place = Location(12.0, 0.0, 0.0)
@@ -455,7 +455,7 @@ def test_who_knows_the_place_of_the_gateway_alone_bids_for_flying_there():
     assert rig.engine.goals == [GATEWAY_PLACE]
 
 
-def test_who_does_not_know_where_it_is_does_not_bid():
+def test_a_router_that_does_not_know_its_location_does_not_bid():
     rig = group_rig(3)
     rig.engine.place = None
     rig.wait_until(EMERGENCY_S + 0.1)
@@ -490,7 +490,7 @@ def test_a_neighbour_that_dies_in_the_middle_is_not_waited_for():
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
-def test_a_neighbour_that_dies_as_it_is_told_the_bid_is_not_waited_for():
+def test_a_neighbour_that_dies_while_the_bid_is_sent_is_not_waited_for():
     rig = group_rig(3)
     rig.antenna.gets_lost = lambda payload: payload[2] == BID
     rig.wait_until(EMERGENCY_S + 0.1)

@@ -1,4 +1,4 @@
-"""Frames: what a page is told, and what it is spared."""
+"""Frames: what is sent to a page, and what is left out."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def frame(store: FrameStore, version: int) -> dict:
     return json.loads(store.frame_since(version))
 
 
-def test_a_new_page_is_told_everything():
+def test_a_new_page_gets_everything():
     store = FrameStore()
     store.update_mesh(mesh(neighbours=b"\x00\x09"), wall_s=0.0)
     first = frame(store, 0)
@@ -37,7 +37,7 @@ def test_a_new_page_is_told_everything():
     assert first["nodes"]["1"]["at"] == [2.0, 3.0, 0.0]
 
 
-def test_a_page_that_is_up_to_date_is_told_only_what_changed():
+def test_a_page_that_is_up_to_date_gets_only_what_changed():
     store = FrameStore()
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
@@ -57,7 +57,7 @@ def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():
     assert frame(store, known)["nodes"] == {"1": {"hops": 3, "sent": 7}}
 
 
-def test_movements_below_a_centimetre_are_not_told():
+def test_movements_below_a_centimetre_are_not_sent():
     store = FrameStore()
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
@@ -80,24 +80,24 @@ def test_a_node_that_is_gone_is_taken_away_and_may_come_back():
     assert back["nodes"]["1"]["hops"] == 1
 
 
-def test_a_place_that_nobody_knows_is_null():
+def test_an_unknown_place_is_null():
     store = FrameStore()
     store.update_mesh(MeshStatus(1.0, [NodeStatus(3)]), wall_s=0.0)
     assert frame(store, 0)["nodes"]["3"]["at"] is None
 
 
-def test_each_event_is_told_once():
+def test_each_event_is_sent_once():
     store = FrameStore()
     store.update_mesh(mesh(), wall_s=0.0)
     store.add_events([EventRecord(1.0, 1, "connected", (0,), "1 hops")])
-    told = frame(store, 0)["events"]
-    assert told == [{"t": 1.0, "node": 1, "kind": "connected", "peers": [0], "detail": "1 hops"}]
+    events = frame(store, 0)["events"]
+    assert events == [{"t": 1.0, "node": 1, "kind": "connected", "peers": [0], "detail": "1 hops"}]
     known = store.version
     store.add_events([EventRecord(2.0, 1, "disconnected", (0,))])
     assert [event["kind"] for event in frame(store, known)["events"]] == ["disconnected"]
 
 
-def test_of_a_burst_of_events_the_newest_are_told():
+def test_of_a_burst_of_events_the_newest_are_sent():
     store = FrameStore()
     store.add_events([EventRecord(float(n), 1, "landed") for n in range(EVENTS_PER_FRAME + 50)])
     events = frame(store, 0)["events"]
@@ -115,7 +115,7 @@ def test_samples_are_taken_once_a_second_and_not_while_time_stands_still():
     assert len(frame(store, 0)["samples"]) == 4
 
 
-def test_a_world_that_began_anew_is_told_in_full_and_without_the_past():
+def test_a_restarted_world_is_sent_in_full_and_without_the_past():
     store = FrameStore()
     store.update_mesh(mesh(100.0), wall_s=0.0)
     store.add_events([EventRecord(99.0, 1, "connected")])
@@ -128,7 +128,7 @@ def test_a_world_that_began_anew_is_told_in_full_and_without_the_past():
     assert [sample["stamp_s"] for sample in delta["samples"]] == [0.5]
 
 
-def test_silence_is_told_and_ends_with_the_next_news():
+def test_silence_is_reported_and_ends_with_the_next_state():
     store = FrameStore()
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version

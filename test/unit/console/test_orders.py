@@ -10,7 +10,7 @@ from drone_mesh.console.orders import Order, OrderRefused, Watch, number_of, par
 
 
 class Notebook:
-    """Controls that write down what they are told."""
+    """Controls that record their orders."""
 
     def __init__(self) -> None:
         self.done: list[tuple[object, ...]] = []

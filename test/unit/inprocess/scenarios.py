@@ -50,7 +50,7 @@ def flown(network, since_s=0.0):
 
 
 def hops_across(network):
-    """The longest of all shortest paths between two nodes, whoever has power."""
+    """The longest of all shortest paths between two nodes, with or without power."""
     longest = 0
     for start in network.nodes:
         hops, edge = {start: 0}, [start]
@@ -89,7 +89,7 @@ def run_until(network, condition, within_s, step_s=5.0):
 
 
 def outage(network, seconds):
-    """The medium is gone for a while: every packet is lost. Then it knows each antenna anew."""
+    """The medium loses every packet for a while; then it registers each antenna again."""
     network.air.loss = 1.0
     network.run_for(seconds)
     network.air.loss = 0.0

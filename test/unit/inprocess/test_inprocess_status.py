@@ -1,4 +1,4 @@
-"""What an in-process network tells to those who draw and judge meshes."""
+"""The status of an in-process network, for tables, pictures and reports."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def line():
     return network
 
 
-def test_the_status_tells_who_hears_whom_and_which_way_packets_go(line):
+def test_the_status_has_the_links_and_the_routes_of_packets(line):
     status = line.status()
     assert [node.role for node in status.nodes] == [Role.GATEWAY] + [Role.ROUTER] * 3
     assert [bytes(node.neighbours) for node in status.nodes] == [b"\1", b"\0\2", b"\1\3", b"\2"]
@@ -53,7 +53,7 @@ def test_a_drone_in_flight_has_the_rest_of_its_way(line):
     assert [len(node.path) for node in line.status().nodes] == [0] * 4
 
 
-def test_the_story_of_the_run_names_who_was_lost_and_when_it_was_back(line):
+def test_the_story_of_the_run_names_each_lost_node_and_its_return(line):
     cut_s = line.clock.now_s
     line.power(2, on=False)
     line.run_for(15.0)

@@ -76,7 +76,7 @@ def test_a_lossy_and_jittery_air_connects_them_all_the_same(loss, within_s, seed
     assert network.run_until(network.all_connected, within_s), f"lost at {lost_s}"
 
 
-def test_everybody_stays_connected_for_an_hour_and_nothing_grows():
+def test_all_stay_connected_for_an_hour_and_nothing_grows():
     network = fleet(5, gridsize=3)
     network.run_for(60.0)
     connected_s = network.clock.now_s
@@ -124,7 +124,7 @@ def test_an_order_reaches_a_drone_four_hops_away_and_only_it():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_field_case_reaches_everybody_and_all_are_connected_after_the_landing(seed):
+def test_the_field_case_reaches_each_drone_and_all_are_connected_after_the_landing(seed):
     """Layout 0 from the default start, 1 m apart: the far end is ordered first."""
     network = Network(seed=seed)
     network.add_fleet(gateways=1, routers=17, gridsize=6, spacing=1.0)
@@ -142,7 +142,7 @@ def test_the_field_case_reaches_everybody_and_all_are_connected_after_the_landin
 
 
 class StrangersNode:
-    """A radio of somebody else, with nothing of ours behind it. Keeps what it hears."""
+    """A foreign radio without our mesh software. It records what it hears."""
 
     def __init__(self, network, node, x, y):
         self.heard = []

@@ -1,4 +1,4 @@
-"""Seeded misfortune: kill sequences, packets that would circulate, packets of anybody."""
+"""Seeded misfortune: kill sequences, packets that would circulate, arbitrary packets."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def test_a_heartbeat_that_would_circulate_ends():
     assert network.air.delivered - before < 20
 
 
-# Packets of anybody --------------------------------------------------------------------------
+# Arbitrary packets ---------------------------------------------------------------------------
 
 
 def test_ten_thousand_random_packets_leave_a_network_that_heals():

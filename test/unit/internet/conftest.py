@@ -66,7 +66,7 @@ class MeshWithHttp:
 
 @pytest.fixture(scope="session")
 def mesh() -> Iterator[MeshWithHttp]:
-    """For tests that only ask; who changes the mesh makes one."""
+    """For tests that only read; a test that changes the mesh makes its own."""
     mesh = MeshWithHttp()
     yield mesh
     mesh.close()

@@ -15,13 +15,13 @@ ORDER = "/DroneMovement/1/2/3/4"
 
 @pytest.fixture(scope="module")
 def stranger(guarded_mesh):
-    """Somebody who does not have the token."""
+    """A client without the token."""
     with httpx.Client(base_url=guarded_mesh.internet.url, timeout=20.0, verify=False) as client:
         yield client
 
 
 def never(_function):
-    raise AssertionError("nobody asked the gateway anything")
+    raise AssertionError("the gateway got no request")
 
 
 @pytest.mark.parametrize("operation", [("GET", "/ready"), ("GET", "/nodes"), ("POST", ORDER)])
@@ -127,7 +127,7 @@ def test_headers_that_are_too_long_are_refused(mesh):
     assert mesh.client.get("/ready", headers={"X": "y" * 8192}).status_code == 431
 
 
-def test_a_small_body_that_nobody_needs_does_no_harm(mesh):
+def test_a_small_unused_body_does_no_harm(mesh):
     assert mesh.client.post("/DroneMovement/99/2/3/4", content=b"{}").status_code == 503
 
 

@@ -94,7 +94,7 @@ def test_a_bug_behind_one_request_is_logged_and_stops_nothing(slow, caplog):
         assert next_client.get("/ready").status_code == 200
 
 
-def test_disconnecting_on_the_gateways_own_thread_refuses_who_waits_and_ends(make_mesh):
+def test_disconnecting_on_the_gateways_own_thread_refuses_waiting_requests_and_ends(make_mesh):
     mesh = make_mesh(answer_within_s=PATIENCE_S)
     held, go_on = threading.Event(), threading.Event()
 

@@ -36,7 +36,7 @@ def test_an_order_for_the_gateway_itself_flies_its_own_drone(make_mesh):
     assert mesh.network.location(0) == pytest.approx((1.0, 0.0, 2.0))
 
 
-def test_nodes_tells_routes_hops_and_when_each_was_heard(mesh):
+def test_nodes_lists_routes_hops_and_when_each_was_heard(mesh):
     answer = mesh.client.get("/nodes").json()
     assert answer["gateway"] == 0
     seen = {node["id"]: (node["next_hop"], node["hops"]) for node in answer["nodes"]}
@@ -44,7 +44,7 @@ def test_nodes_tells_routes_hops_and_when_each_was_heard(mesh):
     assert all(0 <= node["heard_s_ago"] <= 12.0 for node in answer["nodes"])
 
 
-def test_nodes_shows_that_a_route_is_gone_and_who_was_heard_there(make_mesh):
+def test_nodes_shows_that_a_route_is_gone_and_which_nodes_were_heard(make_mesh):
     def switch_off_the_first_relay(network):
         network.power(1, False)
         network.run_for(25.0)

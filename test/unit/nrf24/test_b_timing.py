@@ -159,7 +159,7 @@ def test_row_18_power_down_in_mid_transaction_keeps_the_payload_and_sets_no_flag
     assert len(prx.unload_all()) == 1
 
 
-def test_a_frame_that_is_broken_off_reaches_nobody(lab):
+def test_an_aborted_frame_reaches_no_chip(lab):
     ptx, prx = lab.pair()
     ptx.load()
     ptx.pulse()

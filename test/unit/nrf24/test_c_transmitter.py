@@ -85,7 +85,7 @@ def test_row_21_nothing_is_sent_until_max_rt_is_cleared_then_the_same_packet(lab
     assert set(pids(lab, "ptx")) == {1}
 
 
-def test_row_22_a_send_to_nobody_does_not_spoil_the_next(lab):
+def test_row_22_a_failed_send_does_not_spoil_the_next(lab):
     sender, receiver = lab.driver(5), lab.driver(10, 100.0)
     assert not sender.send(11, b"\x01" * 32)
     tries = sender.statistics().tries

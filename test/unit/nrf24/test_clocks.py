@@ -32,7 +32,7 @@ def test_threads_take_turns_in_the_order_of_virtual_time():
     assert seen == [("a", 0.2), ("b", 0.3), ("a", 0.4), ("b", 0.6), ("a", 0.6), ("b", 0.9)]
 
 
-def test_a_virtual_lock_goes_to_those_who_wait_in_their_order():
+def test_a_virtual_lock_goes_to_waiting_threads_in_their_order():
     clock = VirtualClock()
     lock = clock.lock()
     order = []
@@ -74,7 +74,7 @@ def test_what_a_thread_raises_is_raised_where_it_is_joined():
         task.join()
 
 
-def test_threads_that_all_wait_for_ever_are_told_so():
+def test_a_deadlock_of_all_threads_raises_an_error():
     clock = VirtualClock()
     signal = clock.signal()
     with pytest.raises(RuntimeError, match="waits for ever"):

@@ -18,7 +18,7 @@ def dynamic(wires, feature=0x04):
     wires.lab.wait_us(200)
 
 
-def test_row_41_a_broadcast_reaches_all_listeners_and_nobody_acknowledges(lab):
+def test_row_41_a_broadcast_reaches_all_listeners_without_acknowledgement(lab):
     ptx = lab.wires("ptx").become_ptx(address=BROADCAST_ADDRESS)
     ptx.write(Register.FEATURE, 0x01)
     listeners = [lab.wires(f"prx {n}", 10.0 * n).become_prx() for n in range(1, 4)]
@@ -98,7 +98,7 @@ def test_row_46_the_driver_flushes_a_frame_that_is_wider_than_a_payload_can_be(l
     assert receiver.receive(0.05) == [(2, b"\x02" * 32)]
 
 
-def test_the_polarity_of_the_no_ack_bit_tells_clones_from_genuine_chips(lab):
+def test_the_polarity_of_the_no_ack_bit_separates_clones_from_genuine_chips(lab):
     """A clone follows the datasheet, a genuine chip may not: then acknowledgements go wrong."""
     ptx = lab.wires("clone", no_ack_bit=0).become_ptx()
     prx = lab.wires("genuine", 100.0).become_prx()

@@ -99,7 +99,7 @@ def test_row_54_mail_for_node_0_reaches_node_0_only(lab):
     assert [other.receive(0.05) for other in others] == [[(2, PAYLOAD)], [], []]
 
 
-def test_row_55_a_broadcast_to_nobody_returns_in_less_than_3_ms(lab):
+def test_row_55_a_broadcast_without_a_receiver_returns_in_less_than_3_ms(lab):
     driver = lab.driver(5)
     begin_s = lab.clock.now_s()
     assert driver.broadcast(PAYLOAD)
@@ -132,7 +132,7 @@ def test_row_56_a_missing_spi_device_is_named_with_the_way_to_switch_it_on():
     assert "raspi-config" in text or "python3-spidev" in text
 
 
-def test_row_57_after_a_brown_out_the_driver_sets_the_chip_up_anew(lab, caplog):
+def test_row_57_after_a_brown_out_the_driver_sets_the_chip_up_again(lab, caplog):
     sender, receiver = lab.driver(5), lab.driver(10, 100.0)
     assert sender.send(10, b"\x01" * 32)
     sender.chip.brown_out()
@@ -201,7 +201,7 @@ def test_a_radio_that_is_half_dead_cannot_be_reached_with_acknowledgement(lab, f
     assert len(receiver.receive(0.1)) == (1 if fault == "dead_transmitter" else 0)
 
 
-def test_a_chip_that_says_nothing_for_95_ms_is_set_up_anew(lab):
+def test_a_chip_that_is_silent_for_95_ms_is_set_up_again(lab):
     sender = lab.driver(5)
     lab.driver(10, 100.0)
     start = sender.chip.transmitter.start

@@ -64,7 +64,7 @@ def test_a_missing_gpiod_package_is_named(monkeypatch):
         gpio.GpiodCe()
 
 
-def test_the_older_gpiod_under_the_same_name_is_told_apart(monkeypatch):
+def test_the_older_gpiod_under_the_same_name_is_recognised(monkeypatch):
     monkeypatch.setitem(sys.modules, "gpiod", types.SimpleNamespace(Chip=object))
     with pytest.raises(HardwareUnavailable, match="older than version 2"):
         gpio.GpiodCe()
@@ -140,7 +140,7 @@ def test_the_gpio_chip_is_found_by_its_label(header):
     assert header.find(header.folder) == str(header.folder / "gpiochip4")
 
 
-def test_a_machine_without_the_header_is_told_what_was_looked_for(header):
+def test_on_a_machine_without_the_header_the_error_lists_the_names_searched(header):
     header.labels["gpiochip4"] = "INT33FC:00"
     with pytest.raises(HardwareUnavailable, match="pinctrl-bcm2711.*INT33FC:00.*Raspberry Pi?"):
         header.find(header.folder)

@@ -12,7 +12,7 @@ from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 
 
 class Mesh(IMeshNetwork):
-    """Keeps what the antenna tells it."""
+    """Records what the antenna reports."""
 
     def __init__(self, node_id):
         self.node_id = node_id
@@ -60,14 +60,14 @@ def packet(to, *, sender=0, filling=0x55):
     return bytes((sender, sender, 3, to, to)) + bytes((filling,)) * 27
 
 
-def test_a_packet_reaches_the_node_in_byte_3_and_nobody_else(lab, nodes):
+def test_a_packet_reaches_the_node_in_byte_3_and_no_other(lab, nodes):
     assert nodes[0].antenna.send_message_to(packet(2))
     lab.clock.sleep(0.01)
     assert [node.mesh.heard for node in nodes] == [[], [], [packet(2)]]
     assert nodes[2].shown == [packet(2)]
 
 
-def test_a_broadcast_is_one_frame_and_everybody_finds_its_own_id_in_byte_3(lab, nodes):
+def test_a_broadcast_is_one_frame_and_each_receiver_finds_its_own_id_in_byte_3(lab, nodes):
     frames = len(lab.trace.frames)
     nodes[0].antenna.broadcast_message(packet(254))
     lab.clock.sleep(0.01)

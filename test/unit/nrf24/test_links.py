@@ -52,7 +52,7 @@ def losses(model, distance_m, frames=2000):
     return sum(model.bit_errors(hop) != 0 for _ in range(frames)) / frames
 
 
-def test_log_distance_has_its_edge_where_it_is_told():
+def test_log_distance_has_its_edge_at_the_given_range():
     model = LogDistance.with_edge_at(9.0, random.Random(1))
     assert losses(model, 6.0) == 0.0
     assert losses(model, 9.0) == pytest.approx(0.28, abs=0.04)

@@ -55,7 +55,7 @@ def test_row_60_their_acknowledged_packet_reaches_us(lab, theirs):
     assert ours.receive(0.1) == [(2, PAYLOAD)]
 
 
-def test_row_60_their_packet_to_nobody_fails(lab, theirs):
+def test_row_60_their_packet_without_a_receiver_fails(lab, theirs):
     ours = lab.driver(5)
     theirs.listen = False
     theirs.open_tx_pipe(bytes.fromhex("06 68 52 4D 54"))

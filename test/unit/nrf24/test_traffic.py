@@ -15,7 +15,7 @@ MEAN_PAUSE_S = 0.1
 
 
 class RecordingSpi:
-    """In front of a chip's SPI: who spoke to it, and whether inside a send of somebody else."""
+    """In front of a chip's SPI: the callers, and whether one broke into the send of another."""
 
     def __init__(self, spi):
         self._spi = spi
@@ -85,7 +85,7 @@ def test_row_58_and_59_ten_thousand_packets_each_way_arrive_once_if_they_were_co
 
 @pytest.mark.parametrize("irq", [True, False], ids=["IRQ", "polling"])
 def test_row_59_a_day_of_a_driver_leaves_no_warning(lab, irq):
-    """Sends, broadcasts, nobody there, a power cut, power down and up again."""
+    """Sends, broadcasts, an absent receiver, a power cut, power down and up again."""
     one, other = lab.driver(1, irq=irq), lab.driver(2, 100.0, irq=irq)
     for number in range(20):
         one.send(2, bytes((number,)) * 32)

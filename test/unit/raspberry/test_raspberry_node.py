@@ -122,7 +122,7 @@ def test_a_gateway_that_cannot_serve_gives_the_radio_back(wired, capfd):
     assert wired.pins[5].closed
 
 
-def test_a_node_that_hears_nobody_says_so(wired, monkeypatch, caplog):
+def test_a_node_that_hears_no_other_node_reports_it(wired, monkeypatch, caplog):
     monkeypatch.setattr(program, "LONELY_AFTER_S", 0.1)
     said = lambda: "node 7 hears nobody" in caplog.text  # noqa: E731
     assert run_until(said, parse_router, "--id 7 --spi 0.1 --ce 5") == 0

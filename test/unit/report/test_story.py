@@ -53,7 +53,7 @@ EVENTS = [
 ]
 
 
-def test_a_repair_is_told_with_how_long_each_phase_took():
+def test_a_repair_is_described_with_the_duration_of_each_phase():
     story = tell_story(STATES, EVENTS)
     assert repair_rows(story) == [
         {
@@ -86,7 +86,7 @@ def test_the_phases_of_a_bar_follow_one_another():
     ]
 
 
-def test_who_is_connected_before_it_lands_flew_until_it_was_connected():
+def test_a_drone_that_is_connected_before_it_lands_flew_until_it_was_connected():
     late = [*EVENTS[:-2], EventRecord(142.5, 2, "connected", (0,)), EventRecord(143.0, 2, "landed")]
     story = tell_story(STATES, late)
     (row,) = repair_rows(story)
@@ -100,12 +100,12 @@ def test_a_loss_that_lasts_is_drawn_to_the_end():
     assert [(start, stop) for start, stop, *_ in phases_of(outage, 150.0)] == [(101.0, 150.0)]
 
 
-def test_only_the_last_run_in_a_recording_is_told():
+def test_only_the_last_run_in_a_recording_is_described():
     story = tell_story([state(900.0), *STATES], EVENTS)
     assert [sample.stamp_s for sample in story.samples] == [1.0, 50.0, 101.0, 140.0, 150.0]
 
 
-def test_without_a_state_there_is_nothing_to_tell():
+def test_without_a_state_there_is_no_story():
     with pytest.raises(NothingRecorded, match="was /mesh/state recorded"):
         tell_story([], EVENTS)
 

@@ -51,7 +51,7 @@ def test_of_too_many_links_the_shortest_stay():
     assert shortest(known_links(nodes), nodes, most=2) == [(1, 2), (0, 1)]
 
 
-def test_a_link_to_a_place_nobody_knows_is_not_drawn():
+def test_a_link_to_an_unknown_place_is_not_drawn():
     nodes = line(0.0, 5.0)
     nodes[1].position = (float("nan"),) * 3
     assert shortest(known_links(nodes), nodes, most=9) == []

@@ -36,7 +36,7 @@ def test_other_events_stay_apart():
     assert batch(connected, connected) == [(1, "connected", (0,)), (1, "connected", (0,))]
 
 
-def test_an_event_about_nobody_else_has_no_peers():
+def test_an_event_without_another_node_has_no_peers():
     assert batch(MeshEvent(MeshEventKind.LANDED, 4, 0.0)) == [(4, "landed", ())]
 
 

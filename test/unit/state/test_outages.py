@@ -1,4 +1,4 @@
-"""The story of losses and repairs, told from events."""
+"""The story of losses and repairs, derived from events."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_loss_that_lasts_stays_open():
     assert repair.seconds is None
 
 
-def test_a_recording_may_begin_when_everybody_is_connected_already():
+def test_a_recording_may_begin_when_all_are_connected_already():
     *_, repair = find_outages(REPAIR[2:])
     assert (repair.node, repair.lost_s, repair.connected_s) == (3, 103.0, 153.5)
 

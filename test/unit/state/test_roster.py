@@ -62,6 +62,6 @@ def test_a_node_without_a_drone_has_no_place():
     assert all(map(math.isnan, stranger.position))
 
 
-def test_a_drone_that_nobody_reported_yet_is_listed_as_switched_off():
+def test_a_drone_without_a_report_is_listed_as_switched_off():
     (drone,) = MeshRoster().snapshot([DroneView(3, Role.ROUTER, (1.0, 2.0, 0.0))], wall_s=0.0)
     assert (drone.id, drone.on, drone.position) == (3, False, (1.0, 2.0, 0.0))

@@ -28,7 +28,7 @@ def test_a_gateway_is_its_own_route():
     assert route_to_gateway(0, mesh()) == bytes([0])
 
 
-def test_who_knows_no_next_hop_has_no_route():
+def test_a_node_without_a_next_hop_has_no_route():
     assert route_to_gateway(1, mesh((1, NO_ROUTE))) == b""
 
 
@@ -44,7 +44,7 @@ def test_a_route_ends_at_a_node_that_is_off():
     assert not reaches_gateway(bytes([3, 2, 1]), nodes)
 
 
-def test_who_is_off_has_no_route():
+def test_a_node_that_is_off_has_no_route():
     assert route_to_gateway(2, mesh((1, 0), (2, 1), off=(2,))) == b""
 
 
@@ -53,6 +53,6 @@ def test_a_route_to_a_gateway_that_is_off_does_not_reach_it():
     assert not reaches_gateway(route_to_gateway(1, nodes), nodes)
 
 
-def test_a_route_ends_where_nobody_reports_the_next_node():
+def test_a_route_ends_where_the_next_node_is_not_reported():
     assert route_to_gateway(2, mesh((2, 9))) == b""
     assert route_to_gateway(3, mesh((2, 9), (3, 2))) == bytes([3, 2])

@@ -1,4 +1,4 @@
-"""Pictures of a world: everybody is in them, in the right colour, and no screen is needed."""
+"""Pictures of a world: all drones are in them, in the right colour, and no screen is needed."""
 
 from __future__ import annotations
 
@@ -88,8 +88,7 @@ def test_each_drone_is_where_it_stands_in_the_colour_of_its_condition(shoot):
 
 def test_a_fleet_of_254_is_all_in_the_picture(shoot):
     drones = [
-        DronePicture(k, Role.ROUTER, (6.0 * (k % 16), 6.0 * (k // 16), 0.0))
-        for k in range(254)
+        DronePicture(k, Role.ROUTER, (6.0 * (k % 16), 6.0 * (k // 16), 0.0)) for k in range(254)
     ]
     pixels = shoot(drones, size=(700, 450))
     camera = camera_of(drones, (700, 450))

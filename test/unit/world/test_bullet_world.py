@@ -45,7 +45,7 @@ def test_a_step_is_ten_milliseconds_and_time_does_not_drift(world):
     assert now_s == 1000.0 == world.now_s
 
 
-def test_who_was_woken_gets_turns_until_it_rests(world):
+def test_a_woken_engine_gets_turns_until_it_rests(world):
     mover = Countdown(3)
     world.wake(mover)
     for _ in range(10):
@@ -53,7 +53,7 @@ def test_who_was_woken_gets_turns_until_it_rests(world):
     assert mover.times == [0.01, 0.02, 0.03]
 
 
-def test_who_is_woken_twice_gets_one_turn_in_a_step(world):
+def test_an_engine_woken_twice_gets_one_turn_in_a_step(world):
     mover = Countdown(2)
     world.wake(mover)
     world.wake(mover)

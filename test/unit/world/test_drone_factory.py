@@ -45,7 +45,7 @@ def test_gateways_stand_in_a_column_and_routers_in_rows():
     ]
 
 
-def test_everybody_starts_with_the_underside_on_the_ground():
+def test_each_drone_starts_with_its_underside_on_the_ground():
     assert [drone.engine.get_location() for drone in make(routers=2).drones] == [
         Location(latitude=0.0, longitude=-1.0, height=0.0),
         Location(latitude=0.0, longitude=0.0, height=0.0),
