@@ -1,4 +1,4 @@
-"""Role: what a drone does in the mesh."""
+"""Role: what a drone does in the mesh, and the body that it has."""
 
 from __future__ import annotations
 
@@ -15,3 +15,8 @@ class Role(enum.IntEnum):
     def word(self) -> str:
         """The word that people see."""
         return self.name.lower()
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Edges of the drone's box along x, y and z, in metres (reference, section 11)."""
+        return (0.2, 0.1, 0.2) if self is Role.GATEWAY else (0.2, 0.2, 0.1)
