@@ -18,5 +18,5 @@ class Role(enum.IntEnum):
 
     @property
     def size_m(self) -> tuple[float, float, float]:
-        """Edges of the drone's box along x, y and z, in metres (reference, section 11)."""
+        """Edges of its box along x, y, z, in metres (docs/protocol.md, "World and flights")."""
         return (0.2, 0.1, 0.2) if self is Role.GATEWAY else (0.2, 0.2, 0.1)
