@@ -110,16 +110,32 @@ def test_a_drag_that_ends_with_escape_sends_no_drone(page):
     assert page.page.locator(".toast").count() == 0
 
 
-def test_numbers_send_a_drone_and_a_gateway_without_a_route_is_quoted(page):
+def test_typed_numbers_send_a_drone(page):
     page.page.click("#nodes tr[data-id='13']")
     page.page.fill("#fly-x", "-3,5")
     page.page.fill("#fly-y", "14")
     page.page.click("#fly-form button")
     page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
-    page.page.fill("#fly-x", "far away")
+
+
+@pytest.mark.parametrize(
+    ("axis", "typed", "why"),
+    [
+        ("x", "far away", "x must be a number from -5000 to 5000"),
+        ("y", "", "y must be a number from -5000 to 5000"),
+        ("x", "5001", "x must be a number from -5000 to 5000"),
+        ("z", "-5", "z must be a whole number from 0 to 500"),
+        ("z", "1.5", "z must be a whole number from 0 to 500"),
+    ],
+)
+def test_a_goal_that_cannot_be_flown_to_is_refused_beside_the_field(page, axis, typed, why):
+    page.page.click("#nodes tr[data-id='13']")
+    page.page.fill(f"#fly-{axis}", typed)
     page.page.click("#fly-form button")
-    page.page.wait_for_selector(".toast.bad")
-    assert "x must be a number from -5000 to 5000" in page.page.inner_text(".toast.bad")
+    page.wait_for("a reason", lambda: page.page.inner_text("#fly-error") == why)
+    assert page.page.get_attribute(f"#fly-{axis}", "aria-invalid") == "true"
+    page.page.wait_for_timeout(500)
+    assert page.row(13, STATE) == "connected"
 
 
 def test_a_layout_starts(page):

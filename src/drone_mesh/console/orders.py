@@ -15,6 +15,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.layouts import MAX_CASE
 
 MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
+LIMITS = {"coordinate": MAX_COORDINATE_M, "height": MAX_HEIGHT_M}  # metres; for the page's form
 
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]

@@ -28,6 +28,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import (
+    LIMITS,
     MeshControls,
     NeighbourWatch,
     OrderRefused,
@@ -182,7 +183,8 @@ class ConsoleServer:
     async def _send_frames(self, page: Page) -> None:
         loop = asyncio.get_running_loop()
         try:
-            await self._send(page, json.dumps({"type": "hello", "layouts": list(self._layouts)}))
+            hello = {"type": "hello", "layouts": list(self._layouts), "limits": LIMITS}
+            await self._send(page, json.dumps(hello))
             # wait_for may swallow a cancellation that comes as a send ends (before Python 3.12).
             while page in self._pages:
                 started = loop.time()

@@ -39,7 +39,7 @@ async function order(request, button) {
 function fly(id, x, y, z) {
   const node = mesh.nodes.get(id);
   const height = z ?? Math.round(node?.path.length ? node.path[node.path.length - 1] : (node?.position?.[2] ?? 0));
-  order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: Math.max(0, height) });
+  order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: height });
 }
 
 const map = new MapView(mesh, byId("map"), byId("map-note"), (id, x, y) => fly(id, x, y));

@@ -22,6 +22,7 @@ export class Mesh extends EventTarget {
     this.clock = {};
     this.link = "";
     this.layouts = [];
+    this.limits = { coordinate: Infinity, height: Infinity }; // of goals, m
     this.nodes = new Map(); // id -> node
     this.links = { known: [], lost: [], route: [] }; // use -> [[id, higher id]]
     this.events = [];
@@ -64,8 +65,9 @@ export class Mesh extends EventTarget {
     this.#notify("detail");
   }
 
-  setLayouts(layouts) {
+  applyHello({ layouts, limits }) {
     this.layouts = layouts;
+    this.limits = limits;
     this.#notify("layouts");
   }
 

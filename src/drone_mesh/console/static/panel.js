@@ -84,15 +84,37 @@ export class NodePanel {
   #fillGoal() {
     const node = this.mesh.nodes.get(this.mesh.selected);
     const goal = node?.path.length ? node.path.slice(-3) : node?.position;
+    setText(byId("fly-error"), "");
     ["x", "y", "z"].forEach((axis, index) => {
+      byId(`fly-${axis}`).removeAttribute("aria-invalid");
       byId(`fly-${axis}`).value = goal ? String(index < 2 ? Number(goal[index].toFixed(1)) : Math.round(goal[index])) : "";
     });
   }
 
   #send(event) {
     event.preventDefault();
-    const goal = ["x", "y", "z"].map((axis) => Number(byId(`fly-${axis}`).value.trim().replace(",", ".") || NaN));
-    this.fly(this.mesh.selected, ...goal);
+    const { coordinate, height } = this.mesh.limits;
+    const goal = [
+      this.#number("x", -coordinate, coordinate, false),
+      this.#number("y", -coordinate, coordinate, false),
+      this.#number("z", 0, height, true),
+    ];
+    const wrong = goal.find((entry) => entry.error);
+    setText(byId("fly-error"), wrong?.error ?? "");
+    if (wrong) wrong.input.select();
+    else this.fly(this.mesh.selected, ...goal.map((entry) => entry.value));
+  }
+
+  /** What was typed for one axis: {input, value, error}; nothing is rounded or clipped. */
+  #number(axis, low, high, whole) {
+    const input = byId(`fly-${axis}`);
+    const text = input.value.trim().replace(",", ".");
+    const value = text === "" ? NaN : Number(text);
+    const good = Number.isFinite(value) && value >= low && value <= high && (!whole || Number.isInteger(value));
+    if (good) input.removeAttribute("aria-invalid");
+    else input.setAttribute("aria-invalid", "true");
+    const kind = whole ? "a whole number" : "a number";
+    return { input, value, error: good ? "" : `${axis} must be ${kind} from ${low} to ${high}` };
   }
 }
 
