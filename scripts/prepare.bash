@@ -78,6 +78,16 @@ pip_install() {
   done
 }
 
+# npm_install: the checks of the page's JavaScript, unless these very versions are installed.
+npm_install() {
+  local folder="$root/scripts/javascript"
+  cmp -s "$folder/package-lock.json" "$folder/node_modules/.installed" && return
+  command -v npm >/dev/null || apt_install nodejs npm
+  say "installing npm packages: scripts/javascript"
+  npm ci --prefix "$folder" --no-audit --no-fund </dev/null || fail "npm could not install them"
+  cp "$folder/package-lock.json" "$folder/node_modules/.installed"
+}
+
 # build_step WHAT COMMAND...: with its output in a log, of which the end is shown if it fails.
 build_step() {
   local log="$root/build/build.log"
@@ -124,6 +134,7 @@ prepare_unit_tests() {
 prepare_checks() {
   prepare_unit_tests
   pip_install requirements/checks.txt
+  npm_install
 }
 
 prepare_everything() {
