@@ -4,6 +4,7 @@
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$root/.venv"
+javascript="$venv/javascript"
 noetic=/opt/ros/noetic/setup.bash
 simulation_requirements=(requirements/{console,http,report,simulation}.txt)
 
@@ -80,12 +81,13 @@ pip_install() {
 
 # npm_install: the checks of the page's JavaScript, unless these very versions are installed.
 npm_install() {
-  local folder="$root/scripts/javascript"
-  cmp -s "$folder/package-lock.json" "$folder/node_modules/.installed" && return
+  cmp -s "$root/scripts/javascript/package-lock.json" "$javascript/.installed" && return
   command -v npm >/dev/null || apt_install nodejs npm
-  say "installing npm packages: scripts/javascript"
-  npm ci --prefix "$folder" --no-audit --no-fund </dev/null || fail "npm could not install them"
-  cp "$folder/package-lock.json" "$folder/node_modules/.installed"
+  say "installing npm packages into .venv: scripts/javascript"
+  rm -rf "$javascript"
+  cp -r "$root/scripts/javascript" "$javascript"
+  (cd "$javascript" && npm ci --no-audit --no-fund </dev/null) || fail "npm could not install them"
+  cp "$javascript/package-lock.json" "$javascript/.installed"
 }
 
 # build_step WHAT COMMAND...: with its output in a log, of which the end is shown if it fails.
