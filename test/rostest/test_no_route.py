@@ -8,9 +8,8 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import LogWatch, MeshWatch, call, wait_for
-
 from drone_mesh.srv import RequestDroneFlight
+from rostest_support import LogWatch, MeshWatch, call, wait_for
 
 LIMIT_S = 5.0
 

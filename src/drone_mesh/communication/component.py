@@ -78,6 +78,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._timing = timing or MeshTiming()
         self._debug = debug
         self._deadlines = Deadlines()
+        self._introduces_for_others = False  # Due.INTRODUCE answers a node that needs a gateway
         self._neighbours = Neighbours()
         self._report = Reporter(node_id, self._deadlines, observer)
         self.complaints = Complaints(node_id)
@@ -86,6 +87,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             antenna,
             routing,
             self._neighbours,
+            self._deadlines,
             self._timing.send_attempts,
             self._report,
             self._on_neighbour_lost,
@@ -105,6 +107,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._delivery,
             self.places,
             self._pilot,
+            antenna,
         )
 
     # Driven from outside ---------------------------------------------------------------------
@@ -140,6 +143,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         deadlines.now_s = now_s
         if now_s >= deadlines.get(Due.INTRODUCE):
             deadlines.set(Due.INTRODUCE, math.inf)
+            self._introduces_for_others = False
             self.search_other_nodes_in_range()
         if now_s >= deadlines.get(Due.ASK_POSITION) and self._pilot.watch():
             self._landed()
@@ -175,6 +179,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if creator not in (from_, me):
             self._learn_path(creator, from_, kind)
         if forward not in (me, BROADCAST):
+            if kind == _HEARTBEAT:
+                self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
             self._forwarding.forward(payload, now_s)
         elif kind == _HEARTBEAT:
             self._on_heartbeat(creator, from_, *HeartbeatMessage.body(payload))
@@ -182,6 +188,12 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._on_present(creator, *IntroduceMessage.body(payload))
         else:
             self._process(payload, creator, from_, kind)
+
+    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+        """Send the packet over another route, if there is one; the routes learn from this."""
+        self._deadlines.now_s = now_s
+        if not self._delivery.undelivered(payload):
+            self._forwarding.stranded(payload, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
         """Switched on: introduce soon. Switched off: a router is not connected at once."""
@@ -250,8 +262,33 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         return self._delivery.send_own(messages.addressed(self._heartbeat(), other))
 
     def send_heartbeats(self, others: Sequence[int]) -> None:
-        """A heartbeat towards each of these; those for direct neighbours leave together."""
+        """A heartbeat towards each of these; those for direct neighbours leave together.
+
+        On a busy channel, neighbours that were heard lately are left out.
+        """
+        patience = self._antenna.patience()
+        if patience > 0.0:
+            since_s = self._deadlines.now_s - patience * self._timing.check_period_s
+            heard_s = self._neighbours.last_heard_s
+            others = [other for other in others if heard_s(other, otherwise=since_s) <= since_s]
         self._delivery.send_own_to_each(self._heartbeat(), others)
+
+    def _answer_search(self, neighbour: int) -> None:
+        """A neighbour looks for a gateway. On a shared channel one PRESENT answers all who do."""
+        spread_s = self._antenna.medium.answer_spread_s
+        if not spread_s:
+            self.send_heartbeat(neighbour)
+        elif self._deadlines.get(Due.INTRODUCE) == math.inf:
+            self._introduces_for_others = True
+            self._deadlines.set(
+                Due.INTRODUCE, self._deadlines.now_s + self._rng.random() * spread_s
+            )
+
+    def _search_is_answered(self) -> None:
+        """Another node answered first."""
+        if self._introduces_for_others:
+            self._introduces_for_others = False
+            self._deadlines.set(Due.INTRODUCE, math.inf)
 
     # For the router and the gateway to fill in -----------------------------------------------
 
@@ -283,6 +320,11 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     @abc.abstractmethod
     def _took_off(self) -> None:
         """The drone leaves its place because of an order."""
+
+    def _on_passing_heartbeat(
+        self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
+    ) -> None:
+        """A heartbeat for another node is about to be forwarded."""
 
     def _on_neighbour_lost(self, node: int) -> None:
         """A packet could not be handed to a neighbour; the routes know already."""

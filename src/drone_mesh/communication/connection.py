@@ -14,7 +14,8 @@ from drone_mesh.communication.messages import HeartbeatMessage, Message, Message
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.router_states import Link, RouterEvent, RouterStates
-from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S
+
+_HOPS_UNTIL_KNOWN = 10  # our choice: for how many hops to wait for the first answer
 
 
 class Shortcut(NamedTuple):
@@ -43,6 +44,8 @@ class GatewayConnection:
         self._answered_s = -math.inf
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
+        self._unanswered = 0  # heartbeats in a row
+        self._asked_neighbour_s = -math.inf  # for its gateway
 
     def next_hop(self) -> int:
         """The neighbour that leads to the preferred gateway, or NO_ROUTE."""
@@ -55,11 +58,12 @@ class GatewayConnection:
     def send_heartbeat(self) -> bool:
         """A heartbeat to the preferred gateway, unless one is under way. False: not sent."""
         now_s, me, gateway = self._parts.now_s, self._parts.node_id, self.gateway
-        if now_s - self._heartbeat_sent_s < HEARTBEAT_ANSWER_S:
+        window_s = self._answer_window_s()
+        if now_s - self._heartbeat_sent_s < window_s:
             return True
         heartbeat = HeartbeatMessage(me, me, gateway, gateway, self._states.connected, gateway, 0)
         self._states.happened(RouterEvent.HEARTBEAT_SENT)
-        self._parts.deadlines.set(Due.ANSWER, now_s + HEARTBEAT_ANSWER_S)
+        self._parts.deadlines.set(Due.ANSWER, now_s + window_s)
         self._heartbeat_sent_s = now_s
         if self._sent_over_shortcut(heartbeat) or self._parts.delivery.send_own(
             heartbeat.to_payload()
@@ -90,7 +94,13 @@ class GatewayConnection:
         return self._parts.delivery.send(packet, to) and its_gateway == self.gateway
 
     def answer_missed(self) -> None:
-        """The time for the gateway's answer is over."""
+        """The time for the gateway's answer is over; it is asked again if the medium is lossy."""
+        self._unanswered += 1
+        if self._states.connected and self._unanswered < self._parts.antenna.medium.heartbeats:
+            self._heartbeat_sent_s = -math.inf
+            self.send_heartbeat()
+            return
+        self._unanswered = 0
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
 
@@ -100,7 +110,7 @@ class GatewayConnection:
         """A neighbour introduced itself. True if it should be sent a heartbeat."""
         connected = self._states.connected
         if know_gateway != connected:
-            return connected or not self._states.awaiting
+            return connected or not (self._states.awaiting or self._asks_a_neighbour())
         if (
             connected
             and hops + 1 < self.hops
@@ -122,6 +132,7 @@ class GatewayConnection:
         self._states.happened(RouterEvent.GATEWAY_ANSWERED)
         self.hops = min(hops, NO_ROUTE)
         self._answered_s = now_s
+        self._unanswered = 0
         self._show()
         if is_new:
             self._introduce()
@@ -135,6 +146,18 @@ class GatewayConnection:
         self._prefer(gateway)
         self._parts.delivery.drop_routes_to(gateway)
         self._parts.routing.other_can_communicate_with_node(neighbour, gateway)
+        self.send_heartbeat()
+
+    def proven(self, patience: float) -> bool:
+        """Whether the gateway answered within the last `patience` check periods."""
+        since_s = self._parts.now_s - patience * self._parts.timing.check_period_s
+        return self._answered_s > since_s
+
+    def look_after(self, patience: float) -> None:
+        """The part of a periodic check that is about a connection."""
+        if self.proven(patience):
+            return
+        self.ask_for_places()
         self.send_heartbeat()
 
     def ask_for_places(self) -> None:
@@ -160,6 +183,19 @@ class GatewayConnection:
         if self.gateway != NO_ROUTE:
             self._parts.delivery.drop_routes_to(self.gateway)
             self._parts.delivery.tell_missing(self.gateway)
+
+    def _answer_window_s(self) -> float:
+        medium = self._parts.antenna.medium
+        hops = self.hops if self.hops != NO_ROUTE else _HOPS_UNTIL_KNOWN
+        return medium.answer_s + medium.answer_per_hop_s * hops
+
+    def _asks_a_neighbour(self) -> bool:
+        """Whether a neighbour was asked for its gateway a moment ago; else it is asked now."""
+        medium, now_s = self._parts.antenna.medium, self._parts.now_s
+        if medium.shared and now_s - self._asked_neighbour_s < medium.answer_s:
+            return True
+        self._asked_neighbour_s = now_s
+        return False
 
     def _ask_for_place(self, node: int) -> None:
         me = self._parts.node_id

@@ -5,11 +5,14 @@ docs/protocol.md, "Sending" and "Missing nodes".
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
+from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import (
+    BROADCAST,
     NO_ROUTE,
     IRoutingTechnique,
     IWirelessCommunication,
@@ -33,6 +36,7 @@ class Delivery:
         antenna: IWirelessCommunication,
         routing: IRoutingTechnique,
         neighbours: Neighbours,
+        deadlines: Deadlines,
         attempts: int,
         report: NodeReport,
         on_neighbour_lost: Callable[[int], None],
@@ -42,9 +46,12 @@ class Delivery:
         self._antenna = antenna
         self._routing = routing
         self._neighbours = neighbours
+        self._deadlines = deadlines
         self._attempts = attempts
         self._report = report
         self._on_neighbour_lost = on_neighbour_lost
+        self._told_s: dict[int, float] = {}  # on a shared medium: when a node was announced missing
+        self._gave_up: set[int] = set()  # neighbours that took nothing lately, though heard
         self._missing_to_tell: deque[tuple[int, int, int]] = deque()
         self._telling = False
         self.total_sent = 0
@@ -57,12 +64,41 @@ class Delivery:
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
         """
+        if self._antenna.medium.shared:
+            return self._hand_over(payload, to)
         for _attempt in range(failures, self._attempts):
             if self._antenna.send_message_to(payload):
                 self._sent(to)
                 return True
         self._neighbour_lost(to, came_from)
         return False
+
+    def _hand_over(self, payload: bytes, to: int) -> bool:
+        """Have the antenna queue a packet; what becomes of it is known later."""
+        taken = self._antenna.send_message_to(payload)
+        if taken:
+            self._sent(to)
+        return taken
+
+    def undelivered(self, payload: bytes) -> bool:
+        """The antenna gave a packet up. True if it goes on over another route.
+
+        A neighbour that was heard a moment ago is not lost by that: the channel was busy. The
+        second time in a row it is.
+        """
+        to, other = messages.receiver(payload), messages.addressee(payload)
+        self.total_sent -= 1
+        silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
+        heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
+        if heard and to not in self._gave_up:
+            self._gave_up.add(to)
+        else:
+            self._gave_up.discard(to)
+            self._neighbour_lost(to, NO_ROUTE)
+        detour = self._routing.get_direction_to_node(other)
+        if detour in (NO_ROUTE, to):
+            return False
+        return self.send(messages.readdressed(payload, detour), detour)
 
     def send_own(self, payload: bytes) -> bool:
         """Send a packet of our own towards its addressee, over one route after the other."""
@@ -79,6 +115,10 @@ class Delivery:
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
         """As `send_own`, to each of these; the packets for direct neighbours leave together."""
         routing = self._routing
+        if self._antenna.medium.shared:
+            for other in others:
+                self.send_own(messages.addressed(payload, other))
+            return
         direct = [other for other in others if routing.get_direction_to_node(other) == other]
         packets = [messages.addressed(payload, other) for other in direct]
         for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
@@ -126,6 +166,9 @@ class Delivery:
         A neighbour that does not take the packet is lost itself. The loss is queued and not
         handled within this call, so that the call depth does not grow with the neighbours.
         """
+        if self._antenna.medium.shared:
+            self._announce_missing(missing)
+            return
         self._missing_to_tell.append((missing, first, told_by))
         if self._telling:
             return
@@ -141,6 +184,16 @@ class Delivery:
                         self.send_own(messages.addressed(packet, neighbour))
         finally:
             self._telling = False
+
+    def _announce_missing(self, missing: int) -> None:
+        """One MISSING to all neighbours, unless the same was said a moment ago."""
+        now_s, me = self._deadlines.now_s, self._node_id
+        if now_s - self._told_s.get(missing, -math.inf) < self._antenna.medium.missing_quiet_s:
+            return
+        self._told_s[missing] = now_s
+        self._antenna.broadcast_message(
+            messages.MissingMessage(me, me, BROADCAST, BROADCAST, missing).to_payload()
+        )
 
     def _neighbour_lost(self, node: int, came_from: int) -> None:
         if self._neighbours.lost(node):

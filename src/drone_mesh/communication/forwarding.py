@@ -62,6 +62,10 @@ class Forwarding:
             lost = to
         self._stranded(kind, forward, now_s)
 
+    def stranded(self, payload: bytes, now_s: float) -> None:
+        """The antenna gave a packet up, and there is no other route for it."""
+        self._stranded(messages.type_of(payload), messages.addressee(payload), now_s)
+
     def _drop_circulating(self, payload: bytes, used: int, now_s: float) -> None:
         kind, forward = messages.type_of(payload), messages.addressee(payload)
         self._complaints.dropped("a packet that circulates", payload, now_s)

@@ -114,7 +114,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
 
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
         if not know_gateway:
-            self.send_heartbeat(neighbour)
+            self._answer_search(neighbour)
 
     def _on_heartbeat(
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int

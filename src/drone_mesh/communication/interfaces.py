@@ -10,6 +10,8 @@ from __future__ import annotations
 import abc
 from typing import NamedTuple, Sequence
 
+from drone_mesh.communication.medium import UNDISTURBED, Medium
+
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
 BROADCAST = 254  # final addressee: every node in range
@@ -26,6 +28,10 @@ class IMeshNetwork(abc.ABC):
     @abc.abstractmethod
     def get_node_id(self) -> int:
         """This node's id, 0..253."""
+
+    @abc.abstractmethod
+    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+        """The antenna gives up a packet that it had taken over for the neighbour in byte 3."""
 
     @abc.abstractmethod
     def on_antenna_power(self, on: bool, now_s: float) -> None:
@@ -101,6 +107,18 @@ class IGatewayCommands(abc.ABC):
 class IWirelessCommunication(abc.ABC):
     """A radio for 32-byte packets. No method raises for a lost packet."""
 
+    @property
+    def medium(self) -> Medium:
+        """What it sends on. Never changes."""
+        return UNDISTURBED
+
+    def patience(self) -> float:
+        """For how many check periods the mesh should not probe again what is known to work.
+
+        0 on a quiet channel: everything is probed in each round. More on a busy one.
+        """
+        return 0.0
+
     @abc.abstractmethod
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Start to receive, handing each packet to `mesh`, and to be reachable as its node id."""
@@ -111,7 +129,11 @@ class IWirelessCommunication(abc.ABC):
 
     @abc.abstractmethod
     def send_message_to(self, payload: bytes) -> bool:
-        """Send to the node in byte 3. True: that node has it."""
+        """Send to the node in byte 3. True: that node has it.
+
+        On a shared medium True means that the antenna has taken the packet over; it calls
+        `on_undelivered` if it has to give up.
+        """
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
         """Send each to the node in its byte 3, in this order; for each whether that node has it.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
-from drone_mesh.communication.interfaces import IRoutingTechnique
+from drone_mesh.communication.interfaces import IRoutingTechnique, IWirelessCommunication
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
 from drone_mesh.communication.places import KnownPlaces
@@ -27,6 +27,7 @@ class NodeParts:
     delivery: Delivery
     places: KnownPlaces
     pilot: Pilot
+    antenna: IWirelessCommunication
 
     @property
     def now_s(self) -> float:

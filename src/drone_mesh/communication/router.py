@@ -76,7 +76,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def send_heartbeats(self, others: Sequence[int]) -> None:
         """A heartbeat towards each of these; the preferred gateway's is sent as by itself."""
         gateway = self._connection.gateway
-        if gateway in others:
+        if gateway in others and not self._connection.proven(self._antenna.patience()):
             self._connection.send_heartbeat()
         super().send_heartbeats([other for other in others if other != gateway])
 
@@ -85,8 +85,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         was_connected = self._states.connected
         self._routing.maintain_routing()
         if was_connected:
-            self._connection.ask_for_places()
-            self._connection.send_heartbeat()
+            self._connection.look_after(self._antenna.patience())
         elif link is Link.SEARCHING and self._states.repair is not Repair.FLYING:
             self._repair.on_unconnected_check(due_s)
 
@@ -94,8 +93,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair.on_antenna_off()
 
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
+        if know_gateway and hops <= self._connection.hops:
+            self._search_is_answered()
         if self._connection.on_present(neighbour, hops, know_gateway):
-            self.send_heartbeat(neighbour)
+            if know_gateway:
+                self.send_heartbeat(neighbour)
+            else:
+                self._answer_search(neighbour)
 
     def _on_heartbeat(
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
@@ -112,6 +116,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
                 self.send_heartbeat(creator)
             elif not self._states.awaiting:
                 self._connection.take_gateway_of(from_, preferred_gateway)
+
+    def _on_passing_heartbeat(
+        self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
+    ) -> None:
+        """On a shared channel the answer of a gateway proves the connection of each relay, too."""
+        proves = creator == preferred_gateway and self._antenna.medium.shared
+        if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
+            self._repair.on_connected()
 
     def _on_negotiation(self, bid: MovementNegotiationMessage) -> None:
         self._repair.on_bid(bid.creator, bid.cost)

@@ -1,4 +1,4 @@
-"""What a page may ask for, and the interface that carries it out."""
+"""What a page may ask for, and who carries it out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from drone_mesh.errors import MeshError
 from drone_mesh.layouts import MAX_CASE
 
 MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
-LIMITS = {"coordinate": MAX_COORDINATE_M, "height": MAX_HEIGHT_M}  # metres; for the page's form
 
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]
@@ -23,7 +22,7 @@ Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, a
 
 
 class OrderRefused(MeshError):
-    """An order was not carried out; the text is the reason, in words for the page."""
+    """An order was not carried out; the text says why, in words for the page."""
 
 
 class MeshControls(Protocol):
@@ -42,8 +41,8 @@ class _Request(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)  # "3" is not a node, 1 not a switch
 
 
-class PageOrder(_Request, abc.ABC):
-    """One order of one page; the answer carries the same `number`."""
+class Order(_Request, abc.ABC):
+    """One order of one page; `number` comes back with the answer."""
 
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
 
@@ -52,7 +51,7 @@ class PageOrder(_Request, abc.ABC):
         """A few words for the page. Raises OrderRefused."""
 
 
-class _Power(PageOrder):
+class _Power(Order):
     do: Literal["power"]
     node: NodeId
     on: bool
@@ -61,7 +60,7 @@ class _Power(PageOrder):
         return controls.power(self.node, self.on)
 
 
-class _Fly(PageOrder):
+class _Fly(Order):
     do: Literal["fly"]
     node: NodeId
     x: Coordinate
@@ -72,7 +71,7 @@ class _Fly(PageOrder):
         return controls.fly(self.node, self.x, self.y, self.z)
 
 
-class _Layout(PageOrder):
+class _Layout(Order):
     do: Literal["layout"]
     case: int = Field(ge=0, le=MAX_CASE)
 
@@ -80,7 +79,7 @@ class _Layout(PageOrder):
         return controls.layout(self.case)
 
 
-class _Speed(PageOrder):
+class _Speed(Order):
     do: Literal["speed"]
     paused: bool
     factor: float = Field(ge=0, le=MAX_REAL_TIME_FACTOR, allow_inf_nan=False)
@@ -89,7 +88,7 @@ class _Speed(PageOrder):
         return controls.speed(self.paused, self.factor)
 
 
-class NeighbourWatch(_Request):
+class Watch(_Request):
     """The page wants to see one node's neighbours in detail; None: no longer."""
 
     do: Literal["watch"]
@@ -100,13 +99,13 @@ class _Numbered(_Request):
     number: int
 
 
-_REQUESTS: TypeAdapter[PageOrder | NeighbourWatch] = TypeAdapter(
-    Annotated[Union[_Power, _Fly, _Layout, _Speed, NeighbourWatch], Field(discriminator="do")]
+_REQUESTS: TypeAdapter[Order | Watch] = TypeAdapter(
+    Annotated[Union[_Power, _Fly, _Layout, _Speed, Watch], Field(discriminator="do")]
 )
 
 
-def parse_request(text: str) -> PageOrder | NeighbourWatch:
-    """Parse a page's message. Raises OrderRefused for anything but a valid request."""
+def parse_request(text: str) -> Order | Watch:
+    """A page's message. Raises OrderRefused for anything that is not exactly a known request."""
     try:
         return _REQUESTS.validate_json(text)
     except ValidationError as error:

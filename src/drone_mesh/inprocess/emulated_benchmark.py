@@ -15,6 +15,7 @@ from drone_mesh.nrf24.emulator.measured import measured_curve
 from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
+from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
 PROGRESS_S = 5.0  # of the wall
 
@@ -27,6 +28,9 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--nodes", type=int, default=17, help="in all, 2..254 (default 17)")
     parser.add_argument("--spacing", type=float, default=6.0, help="of the grid, m (default 6)")
+    parser.add_argument(
+        "--rate", choices=DATA_RATES, default="250k", help="bits per second (default 250k)"
+    )
     parser.add_argument("--seconds", type=float, default=60.0, help="of the mesh (default 60)")
     parser.add_argument("--seed", type=int, default=1, help="of everything random (default 1)")
     parser.add_argument(
@@ -38,9 +42,6 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--wall", action="store_true", help="in real time; shows how late the emulator is"
-    )
-    parser.add_argument(
-        "--skew", action="store_true", help="give each node a retransmit delay of its own"
     )
     parser.add_argument("--trace", type=Path, help="write the last 100000 frames as pcapng")
     arguments = parser.parse_args(argv)
@@ -73,7 +74,8 @@ def main(argv: list[str] | None = None) -> int:
     arguments = _arguments(argv)
     clock = WallClock() if arguments.wall else VirtualClock()
     links = _links(arguments.links, random.Random(f"{arguments.seed} links"))
-    mesh = EmulatedMesh(clock, links, arguments.seed, skew=arguments.skew)
+    settings = RadioSettings(data_rate=DATA_RATES[arguments.rate])
+    mesh = EmulatedMesh(clock, links, arguments.seed, settings=settings)
     trace = FrameTrace()
     if arguments.trace:
         mesh.air.observe(trace.see)

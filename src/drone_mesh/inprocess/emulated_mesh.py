@@ -103,15 +103,12 @@ class EmulatedMesh:
         *,
         settings: RadioSettings = RadioSettings(),  # noqa: B008 (frozen)
         timing: MeshTiming | None = None,
-        skew: bool = False,
     ) -> None:
-        """`skew`: each node has a retransmit delay of its own, see RadioSettings.skewed."""
         self.clock = clock
         self.air = Air(self.clock, links, random.Random(f"{seed} air"))
         self.nodes: dict[int, EmulatedNode] = {}
         self._seed = seed
         self._settings = settings
-        self._skew = skew
         self._timing = timing or MeshTiming()
 
     def add_gateway(self, node_id: int, place: Position) -> None:
@@ -124,8 +121,7 @@ class EmulatedMesh:
 
     def _add(self, node_id: int, place: Position, *, gateway: bool) -> None:
         rng = random.Random(f"{self._seed} radio {node_id}")
-        settings = self._settings.skewed(node_id) if self._skew else self._settings
-        node = EmulatedNode(self.air, node_id, place, settings, rng)
+        node = EmulatedNode(self.air, node_id, place, self._settings, rng)
         engine = GroundEngine(node_id, Location.from_vector(place))
         node.component = assemble_component(
             node_id,

@@ -22,10 +22,15 @@ from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.roles import Role
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
+from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.inprocess.status import event_records, mesh_status
+from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel
+from drone_mesh.nrf24.settings import RadioSettings, data_rate
 from drone_mesh.state.model import EventRecord, MeshStatus
 
 STEP_S = 0.1  # how closely run_until looks
@@ -45,11 +50,21 @@ class Node:
     """One drone of the network with all that it carries, driven by the virtual clock."""
 
     def __init__(
-        self, clock: VirtualClock, air: InProcessAir, node_id: int, start: Location
+        self,
+        clock: VirtualClock,
+        air: InProcessAir | SharedAir,
+        node_id: int,
+        start: Location,
+        rng: random.Random,
     ) -> None:
+        """`rng` is the antenna's."""
         self._clock = clock
         self.drone = InProcessDrone(clock, start, functools.partial(air.flight, node_id))
-        self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
+        self.antenna: InProcessAntenna | SharedAntenna
+        if isinstance(air, SharedAir):
+            self.antenna = SharedAntenna(air, node_id, self.drone, self.submit, rng)
+        else:
+            self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
         self.component: MeshnetworkComponent
         self._planned_s = math.inf
 
@@ -68,6 +83,12 @@ class Node:
         component = self.component
         component.on_msg(payload, self._clock.now_s)
         if component.next_tick_s != self._planned_s:
+            self.plan()
+
+    def submit(self, work: Callable[[float], None]) -> None:
+        """Something is to be done in the component."""
+        work(self._clock.now_s)
+        if self.component.next_tick_s != self._planned_s:
             self.plan()
 
     def plan(self) -> None:
@@ -100,20 +121,37 @@ class Network:
         loss: float = 0.0,
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,
+        radio: str = "disc",
+        rate: str = "250k",
+        links: LinkModel | None = None,
     ) -> None:
-        """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file."""
+        """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file.
+
+        `radio`: "disc", on which packets never meet, or "shared", the channel of nRF24L01+ radios
+        at `rate` (250k, 1M or 2M) with the space between them as `links` says (default: an ideal
+        disc). `loss`, `delay_s` and `jitter_s` are for the disc. Raises ConfigurationError.
+        """
+        self._seed = seed
         self._rng = random.Random(seed)
         self._timing = timing or MeshTiming()
         self._routing = routing
         self.clock = VirtualClock()
-        self.air = InProcessAir(
-            self.clock,
-            random.Random(self._rng.random()),
-            max_distance_m,
-            loss,
-            delay_s,
-            jitter_s,
-        )
+        self.air: InProcessAir | SharedAir
+        if radio == "shared":
+            settings = RadioSettings(data_rate=data_rate(rate))
+            links = links or IdealDisc(max_distance_m)
+            self.air = SharedAir(self.clock, links, settings, max_distance_m)
+        elif radio == "disc":
+            self.air = InProcessAir(
+                self.clock,
+                random.Random(self._rng.random()),
+                max_distance_m,
+                loss,
+                delay_s,
+                jitter_s,
+            )
+        else:
+            raise ConfigurationError(f"invalid radio {radio!r}: use disc or shared")
         self.nodes: dict[int, Node] = {}
         self.events: list[MeshEvent] = []
 
@@ -148,7 +186,8 @@ class Network:
     def _add(self, node_id: int, x: float, y: float, start_s: float, gateway: bool) -> None:
         if node_id in self.nodes:
             raise ValueError(f"node {node_id} already exists")
-        node = Node(self.clock, self.air, node_id, Location(y, x, 0.0))
+        radio_rng = random.Random(f"{self._seed} radio {node_id}")
+        node = Node(self.clock, self.air, node_id, Location(y, x, 0.0), radio_rng)
         node.component = assemble_component(
             node_id,
             node.antenna,
@@ -168,7 +207,7 @@ class Network:
         """Switch a node's antenna."""
         node = self.nodes[node_id]
         if node.antenna.powered != on:
-            node.antenna.powered = on
+            node.antenna.switch_power(on)
             node.component.on_antenna_power(on, self.clock.now_s)
             node.plan()
 

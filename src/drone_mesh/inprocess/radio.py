@@ -184,6 +184,10 @@ class InProcessAntenna(IWirelessCommunication):
         """Whether it has power."""
         return self.powered
 
+    def switch_power(self, on: bool) -> None:
+        """Power on or off."""
+        self.powered = on
+
     def receive(self, payload: bytes) -> None:
         """A packet arrives; a node that is off hears nothing."""
         if self.powered and self._started:

@@ -37,11 +37,6 @@ def ard_s(delay: int) -> float:
     return (delay + 1) * ARD_STEP_NS / NS_PER_S
 
 
-def acknowledged_cycle_ns(data_ns: int, ack_ns: int) -> int:
-    """From the rise of CE to TX_DS, when the first attempt is acknowledged."""
-    return SETTLING_NS + data_ns + SETTLING_NS + ack_ns
-
-
 def failed_cycle_ns(data_ns: int, ard_ns: int, retransmits: int) -> int:
     """From the rise of CE to MAX_RT.
 

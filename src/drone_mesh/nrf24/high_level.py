@@ -14,10 +14,14 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
+from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.messages import readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.medium_access import EVERYBODY
+from drone_mesh.nrf24.pace import medium_of
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
+from drone_mesh.nrf24.sender import Sender
 from drone_mesh.nrf24.settings import BROADCAST_PIPE
 from drone_mesh.nrf24.statistics import RadioStatistics
 from drone_mesh.nrf24.transceiver import Received
@@ -32,10 +36,11 @@ Submit = Callable[[Callable[[float], None]], None]
 
 
 class NRF24HighLevelInterface(IWirelessCommunication):
-    """Turns node ids into addresses, and hands on what arrives.
+    """Turns node ids into addresses, queues what the mesh sends, and hands on what arrives.
 
-    Threads: `start_antenna` starts one that receives; it owns the memory for duplicates. Sending
-    happens in the thread that calls. What arrives reaches the mesh through `submit`.
+    Threads: `start_antenna` starts one that receives, which owns the memory for duplicates, and one
+    that sends. No call of the mesh waits for the radio. What arrives, and what could not be
+    delivered, reaches the mesh through `submit`.
     """
 
     def __init__(
@@ -50,6 +55,8 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._radio = radio
         self._submit = submit
         self._runtime = runtime or SystemRuntime()
+        self._sender = Sender(radio, self._runtime, self._given_up)
+        self._medium = medium_of(radio.settings)
         self._on_payload = on_payload
         self._mesh: IMeshNetwork | None = None
         self._receiving: Task | None = None
@@ -59,6 +66,13 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._silent = False  # set by any thread
         self._seen: dict[int, tuple[bytes, float]] = {}  # node -> its last payload, and when
         self._duplicates = 0
+
+    @property
+    def medium(self) -> Medium:
+        return self._medium
+
+    def patience(self) -> float:
+        return self._sender.patience
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Set the radio up and listen; RadioError if there is none."""
@@ -74,6 +88,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._powered = True
         self._ending = False
         self._receiving = self._runtime.start(self._receive, f"nRF24 {self._radio.node_id}")
+        self._sender.start()
 
     def stop_antenna(self) -> None:
         receiving, self._receiving = self._receiving, None
@@ -81,6 +96,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
             return
         self._powered = False
         self._ending = True
+        self._sender.stop()
         receiving.join()
         self._radio.close()
         self._mesh = None
@@ -96,30 +112,32 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         if on:
             self._radio.begin()
         else:
+            self._sender.clear()
             self._radio.power_down()
         self._powered = on
         self._submit(lambda now_s: mesh.on_antenna_power(on, now_s))
 
     def fall_silent(self) -> None:
-        """Have every send fail at once from now on. Any thread.
+        """Send nothing more; every send fails at once from now on. Any thread.
 
         For an end that comes soon: on a busy channel a node may have seconds of sends before it.
         """
         self._silent = True
+        self._sender.clear()
 
     def send_message_to(self, payload: bytes) -> bool:
-        """See the interface; what cannot be sent (not 32 bytes, no such node) is not sent."""
+        """Queue a packet for the node in byte 3. False: invalid, no power, or too many wait."""
         if self._silent or not self._powered or len(payload) != PAYLOAD_BYTES:
             return False
         to = receiver(payload)
         if to > MAX_NODE_ID or to == self._radio.node_id:
             return False
-        return self._radio.send(to, bytes(payload))
+        return self._sender.offer(to, bytes(payload))
 
     def broadcast_message(self, payload: bytes) -> None:
-        """One frame for all; each receiver's antenna puts its own id into byte 3."""
+        """Queue one frame for all; each receiver's antenna puts its own id into byte 3."""
         if self._powered and not self._silent and len(payload) == PAYLOAD_BYTES:
-            self._radio.broadcast(readdressed(payload, BROADCAST))
+            self._sender.offer(EVERYBODY, readdressed(payload, BROADCAST))
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         self._info = info if on else None
@@ -136,6 +154,11 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         """Counters of the radio, and the duplicates that were seen."""
         return replace(self._radio.statistics(), duplicates=self._duplicates)
 
+    def _given_up(self, payload: bytes) -> None:
+        mesh = self._mesh
+        if mesh is not None and self._powered and not self._silent:
+            self._submit(lambda now_s: mesh.on_undelivered(payload, now_s))
+
     def _receive(self) -> None:
         while not self._ending:
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):
@@ -146,6 +169,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         if mesh is None or not self._powered:
             return
         self._note(payload)
+        self._sender.heard(sender(payload), broadcast=received.pipe == BROADCAST_PIPE)
         if received.pipe == BROADCAST_PIPE:
             payload = readdressed(payload, self._radio.node_id)
         if self._on_payload is not None:

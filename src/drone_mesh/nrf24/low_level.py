@@ -10,6 +10,14 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch
+from drone_mesh.nrf24.medium_access import (
+    AccessRules,
+    Fate,
+    MediumAccess,
+    Outgoing,
+    Priority,
+)
+from drone_mesh.nrf24.pace import access_rules
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
@@ -21,23 +29,15 @@ logger = logging.getLogger(__name__)
 POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
 VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed by a listener
 RESTART_PERIOD_S = 1.0  # our choice: a chip that is gone is looked for no more often
-# Our choices for when many want to send at once. The chip hears no carrier before it sends, so
-# that all depends on chance; found by trial with 17 emulated nodes, which never got connected
-# with pauses of at most 40 ms.
-SHORTEST_PAUSE_S = 5e-3
-BACK_OFF_S = 0.2  # the longest pause after the first try; twice that after each further one
-ANSWER_JITTER_S = 0.1  # a broadcast makes all who hear it answer at once (RFC 5148, jitter)
-RETRY_DELAYS = range(2, 10)  # 750 us to 2.5 ms: the same two do not collide again and again
-RETRY_COUNT = 5  # fewer than the first time: a busy channel is not helped by more frames
 
 
 class NRF24LowLevelInterface:
     """One radio: sends with and without acknowledgement, and receives.
 
     `spi`, `ce` and `irq` are handed in, so anything that behaves like a chip can stand below;
-    without `irq` it is polled. Any number of threads may send, one may call `receive`; a lock
-    makes each sequence of SPI transfers one whole. While it sends, a node is deaf: 1.9 ms if all
-    goes well, 47 ms for each try if nobody answers.
+    without `irq` it is polled. One thread may send and one may call `receive`; a lock, held for one
+    try at most, makes each sequence of SPI transfers one whole. While it sends, a node is deaf: for
+    1.9 ms at 250 kbit/s if all goes well, and for twice to four times as long if no node answers.
 
     Use it as a context manager, or call `begin` and `close`. Everything but `begin` puts up with
     a chip that fails: it is set up anew, at most once a second, and until then nothing can be
@@ -54,12 +54,14 @@ class NRF24LowLevelInterface:
         settings: RadioSettings = RadioSettings(),  # noqa: B008 (frozen)
         runtime: Runtime | None = None,
         rng: random.Random | None = None,
+        rules: AccessRules | None = None,
     ) -> None:
+        """`rules`: of access to the channel; those of `pace.access_rules` if not given."""
         self.node_id = node_id
         self.settings = settings
         self._spi, self._ce, self._irq = spi, ce, irq
         self._runtime = runtime or SystemRuntime()
-        self._rng = rng or random.Random()
+        self.access = MediumAccess(rules or access_rules(settings), rng or random.Random())
         self._lock = self._runtime.lock()  # guards the chip and all that follows
         self._statistics = RadioStatistics()
         self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self._statistics)
@@ -100,8 +102,8 @@ class NRF24LowLevelInterface:
         self._spi.close()
 
     def statistics(self) -> RadioStatistics:
-        """A copy of the counters."""
-        return replace(self._statistics)
+        """The counters as they are now."""
+        return replace(self._statistics, **self.access.figures())
 
     @property
     def working(self) -> bool:
@@ -111,23 +113,57 @@ class NRF24LowLevelInterface:
     def send(self, node_id: int, payload: bytes) -> bool:
         """Send 32 bytes to a node, and wait; True once its chip has acknowledged them.
 
-        Up to `send_tries` times; in the random pause between it listens, so that two nodes that
-        call each other get through. Each try sends the very same packet, which cannot arrive
-        twice.
+        Follows the rules of access, one packet at a time; `Sender` serves several receivers at
+        once. In the random pauses between the tries it listens, so that two nodes that call each
+        other get through. Each try sends the very same packet, which cannot arrive twice.
+        """
+        _check(payload)
+        access = self.access
+        packet = Outgoing(node_id, payload, Priority.CONTROL, self._runtime.now_s(), 0.0)
+        while True:
+            retransmits, delay = access.retransmits()
+            done = self.try_once(node_id, payload, packet.tries > 0, retransmits, delay)
+            fate = access.tried(packet, done, self._runtime.now_s())
+            if fate is Fate.GIVEN_UP:
+                self.drop()
+            if fate is not Fate.WAITS:
+                return done
+            self._pause(packet.not_before_s - self._runtime.now_s())
+
+    def try_once(
+        self, node_id: int, payload: bytes, again: bool, retransmits: int, delay: int
+    ) -> bool:
+        """Send a packet to a node in one go; True once its chip has acknowledged it.
+
+        `again`: it was tried before. `retransmits`, `delay`: the chip's own, for this try.
 
         The acknowledgement comes back to pipe 0, which holds the receiver's address as long as
         this takes. The program of 2019 opened pipe 3 for it, at the address of another node: the
-        sender then heard, and acknowledged, mail that was not for it. So pipe 3 stays shut.
+        sender then received, and acknowledged, packets of that node. So pipe 3 stays shut.
         """
-        _check(payload)
+        chip, address = self._chip, self.settings.node_address(node_id)
         with self._lock:
-            done = self._send(self.settings.node_address(node_id), payload)
-            self._statistics.sent += 1
-            if done:
-                self._statistics.acknowledged += 1
-            else:
-                self._statistics.lost += 1
+            if not self._ready():
+                return False
+            try:
+                chip.become_transmitter(address)
+                chip.load(address, payload, again=again)
+                chip.set_retries(delay, retransmits)
+                done = chip.transmit() is not None
+                chip.listen()
+            except RadioError as error:
+                self._failed(error)
+                return False
             return done
+
+    def drop(self) -> None:
+        """The packet that was tried last is given up: take it out of the chip."""
+        with self._lock:
+            try:
+                if self._working:
+                    self._chip.drop()
+            except RadioError as error:
+                self._failed(error)
 
     def broadcast(self, payload: bytes) -> bool:
         """Send 32 bytes to all that hear them; True if they were sent, whoever heard them."""
@@ -140,7 +176,6 @@ class NRF24LowLevelInterface:
             except RadioError as error:
                 self._failed(error)
                 return False
-            self._statistics.broadcasts += 1
             return True
 
     def receive(self, timeout_s: float) -> list[Received]:
@@ -160,35 +195,6 @@ class NRF24LowLevelInterface:
             else:
                 self._irq_watch.woken(self._irq.wait_low(left_s))
 
-    def _send(self, address: bytes, payload: bytes) -> bool:
-        if not self._ready():
-            return False
-        chip = self._chip
-        try:
-            if self._runtime.now_s() - chip.broadcast_heard_s < ANSWER_JITTER_S:
-                self._pause(self._rng.uniform(0.0, ANSWER_JITTER_S))
-            chip.become_transmitter(address)
-            chip.load(address, payload)
-            done = chip.transmit()
-            longest_s = BACK_OFF_S
-            for _ in range(self.settings.send_tries - 1):
-                if done:
-                    break
-                self._statistics.tries += 1
-                chip.listen()
-                self._pause(self._rng.uniform(SHORTEST_PAUSE_S, longest_s))
-                longest_s *= 2
-                chip.become_transmitter(address)
-                chip.set_retries(self._rng.choice(RETRY_DELAYS), RETRY_COUNT)
-                done = chip.transmit()
-            if not done:
-                chip.drop()
-            chip.listen()
-        except RadioError as error:
-            self._failed(error)
-            return False
-        return done
-
     def _pause(self, duration_s: float) -> None:
         """Wait, and keep taking what arrives."""
         until_s = self._runtime.now_s() + duration_s
@@ -197,7 +203,8 @@ class NRF24LowLevelInterface:
             if left_s <= 0:
                 return
             self._runtime.sleep(min(left_s, POLL_S))
-            self._chip.drain()
+            with self._lock:
+                self._look()
 
     def _look(self) -> None:
         """Take what is in the FIFO, and see now and then that the chip still holds its settings."""

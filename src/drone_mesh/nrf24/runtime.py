@@ -16,6 +16,21 @@ class Task(abc.ABC):
         """Wait until it has ended."""
 
 
+class Signal(abc.ABC):
+    """Has those who wait for a condition look at it again."""
+
+    @abc.abstractmethod
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Return when the condition holds, or when the time is over; whether it holds.
+
+        It is evaluated first, and again at each `notify`. The caller must hold no lock.
+        """
+
+    @abc.abstractmethod
+    def notify(self) -> None:
+        """A condition may have changed."""
+
+
 class Runtime(abc.ABC):
     """What the driver needs to wait, and to be used by several threads."""
 
@@ -32,6 +47,10 @@ class Runtime(abc.ABC):
         """A new mutual exclusion lock, not reentrant."""
 
     @abc.abstractmethod
+    def signal(self) -> Signal:
+        """A new signal."""
+
+    @abc.abstractmethod
     def start(self, run: Callable[[], None], name: str) -> Task:
         """Run something beside the caller."""
 
@@ -42,6 +61,21 @@ class _ThreadTask(Task):
 
     def join(self) -> None:
         self._thread.join()
+
+
+class ThreadSignal(Signal):
+    """A signal between threads."""
+
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        with self._condition:
+            return self._condition.wait_for(condition, min(timeout_s, threading.TIMEOUT_MAX))
+
+    def notify(self) -> None:
+        with self._condition:
+            self._condition.notify_all()
 
 
 class SystemRuntime(Runtime):
@@ -55,6 +89,9 @@ class SystemRuntime(Runtime):
 
     def lock(self) -> ContextManager[object]:
         return threading.Lock()
+
+    def signal(self) -> Signal:
+        return ThreadSignal()
 
     def start(self, run: Callable[[], None], name: str) -> Task:
         thread = threading.Thread(target=run, name=name, daemon=True)

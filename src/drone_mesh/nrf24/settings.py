@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, acknowledged_cycle_ns, frame_bits
+from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, frame_bits
 from drone_mesh.nrf24.registers import (
     ADDRESS_BYTES,
     ARC,
@@ -39,6 +39,22 @@ class DataRate(enum.Enum):
     MBPS_2 = 2_000_000
 
 
+DATA_RATES = {
+    "250k": DataRate.KBPS_250,
+    "1M": DataRate.MBPS_1,
+    "2M": DataRate.MBPS_2,
+}
+
+
+def data_rate(name: str) -> DataRate:
+    """The rate of that name. Raises ConfigurationError for another name."""
+    try:
+        return DATA_RATES[name]
+    except KeyError:
+        known = ", ".join(DATA_RATES)
+        raise ConfigurationError(f"invalid data rate {name!r}: use one of {known}") from None
+
+
 class TxPower(enum.Enum):
     """Output power in dBm [DS Table 17]."""
 
@@ -68,9 +84,8 @@ class RadioSettings:
     data_rate: DataRate = DataRate.KBPS_250
     power: TxPower = TxPower.DBM_0
     crc_bytes: int = 2
-    retransmit_delay: int = 5  # ARD = (n + 1) * 250 us
-    retransmits: int = 15  # ARC, by the chip itself
-    send_tries: int = 4  # by the driver, after a random pause
+    retransmit_delay: int = 5  # ARD = (n + 1) * 250 us, while it listens; see AccessRules
+    retransmits: int = 15  # ARC, while it listens
     broadcast_mode: BroadcastMode = BroadcastMode.NO_ACK
     base_address: int = 0x544D526800  # a node's address is this + its id
     broadcast_id: int = BROADCAST
@@ -81,7 +96,6 @@ class RadioSettings:
             ("crc_bytes", 1, 2),
             ("retransmit_delay", 0, 15),
             ("retransmits", 0, 15),
-            ("send_tries", 1, 100),
             ("base_address", 0, (1 << 8 * ADDRESS_BYTES) - 256),
             ("broadcast_id", MAX_NODE_ID + 1, 255),
         ):
@@ -96,13 +110,6 @@ class RadioSettings:
             raise ConfigurationError(
                 "radio: retransmit_delay must be at least 1 (500 us) at 250 kbit/s"
             )
-
-    def skewed(self, node_id: int) -> RadioSettings:
-        """With a retransmit delay of this node's own: 750 us to 4 ms.
-
-        Two nodes that send to a third do not collide again and again then [DS 7.6].
-        """
-        return replace(self, retransmit_delay=2 + node_id % 14)
 
     def node_address(self, node_id: int) -> bytes:
         """Five bytes, LSByte first, as the chip wants them."""
@@ -171,15 +178,21 @@ class RadioSettings:
         }
 
     @property
+    def frame_s(self) -> float:
+        """Duration of a frame with a payload."""
+        return frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) / self.data_rate.value
+
+    @property
+    def answer_frame_s(self) -> float:
+        """Duration of an acknowledgement."""
+        return frame_bits(ADDRESS_BYTES, 0, self.crc_bytes) / self.data_rate.value
+
+    @property
     def broadcast_s(self) -> float:
         """From the rise of CE until a broadcast is sent."""
-        bits = frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes)
-        return SETTLING_NS / NS_PER_S + bits / self.data_rate.value
+        return SETTLING_NS / NS_PER_S + self.frame_s
 
     @property
     def acknowledged_s(self) -> float:
         """From the rise of CE until a packet is acknowledged, if nothing goes wrong."""
-        ack_bits = frame_bits(ADDRESS_BYTES, 0, self.crc_bytes)
-        bit_ns = NS_PER_S // self.data_rate.value
-        data_ns = frame_bits(ADDRESS_BYTES, PAYLOAD_BYTES, self.crc_bytes) * bit_ns
-        return acknowledged_cycle_ns(data_ns, ack_bits * bit_ns) / NS_PER_S
+        return 2 * SETTLING_NS / NS_PER_S + self.frame_s + self.answer_frame_s

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from typing import NamedTuple
 
@@ -29,7 +28,6 @@ from drone_mesh.nrf24.registers import (
 )
 from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import (
-    BROADCAST_PIPE,
     BroadcastMode,
     DataRate,
     RadioSettings,
@@ -77,7 +75,7 @@ class Transceiver:
         self._registers = settings.registers(node_id)
         self._retries = (settings.retransmit_delay, settings.retransmits)  # as the chip is set now
         self.inbox: deque[Received] = deque()
-        self.broadcast_heard_s = -math.inf  # when the last one was taken from the chip
+        self._loaded: tuple[bytes, bytes] | None = None  # address and payload in the TX FIFO
         self._pid = 0  # of the last payload written; counts from where the chip stood, not from 0
         self._last_sent: dict[bytes, tuple[int, bytes]] = {}  # address -> PID and payload
 
@@ -89,6 +87,7 @@ class Transceiver:
         self._link.write_byte(Register.CONFIG, settings.config_power_down)
         self._link.write_and_verify(self._registers)
         self._link.command(Command.FLUSH_TX)
+        self._loaded = None
         self._link.command(Command.FLUSH_RX)
         self._link.write_byte(Register.STATUS, STATUS_FLAGS)
         self._link.write_byte(Register.CONFIG, settings.config_listening)
@@ -137,33 +136,43 @@ class Transceiver:
         self._link.write(Register.RX_ADDR_P0, address)
         self._link.write_byte(Register.EN_RXADDR, self._settings.listening_pipes | ERX[0].mask)
 
-    def load(self, address: bytes, payload: bytes, *, no_ack: bool = False) -> None:
-        """Write the payload, under another packet number than the same bytes had before.
+    def load(self, address: bytes, payload: bytes, *, again: bool = False) -> None:
+        """Have the payload in the chip, under the right packet number (PID).
 
         The receiver's chip takes a packet with the PID and CRC of the one before for a repetition:
-        it acknowledges it, and throws it away. The PID has two bits, so a node that repeats itself
-        (heartbeats do) would lose packets that were acknowledged. Writing a payload and dropping it
-        uses up a PID.
+        it acknowledges it, and drops it. So `again`, another try of a packet that may have arrived
+        while its acknowledgement was lost, has the PID of the try before, and any other packet has
+        another PID than the same bytes had before. The PID has two bits and counts the payloads
+        that are written: writing one and flushing it uses up a PID.
         """
-        command = Command.W_TX_PAYLOAD_NO_ACK if no_ack else Command.W_TX_PAYLOAD
-        self._pid = self._pid + 1 & 3
-        if self._last_sent.get(address) == (self._pid, payload):
-            self._link.command(command, payload)
-            self._link.command(Command.FLUSH_TX)
-            self._pid = self._pid + 1 & 3
-        self._last_sent[address] = (self._pid, payload)
-        self._link.command(command, payload)
+        before = self._last_sent.get(address)
+        if again and self._loaded == (address, payload):
+            return  # it is still there
+        self.drop()
+        pid = self._pid + 1 & 3
+        if before is not None and before[1] == payload:
+            wanted = before[0] if again else pid + (before[0] == pid) & 3
+            while pid != wanted:
+                self._write_payload(payload)
+                self._link.command(Command.FLUSH_TX)
+                pid = self._pid + 1 & 3
+        self._write_payload(payload)
+        self._loaded = (address, payload)
+        self._last_sent[address] = (pid, payload)
 
-    def transmit(self) -> bool:
-        """Have what was loaded sent to a node; whether that has acknowledged it.
+    def transmit(self) -> int | None:
+        """Have what was loaded sent to a node; the chip's retransmits, None if not acknowledged.
 
-        If not, it is still in the chip: sending it once more is the same packet, which cannot
-        arrive twice; or `drop` it.
+        If not, it stays in the chip for another try.
         """
         flags = self._pulse(self._settings.acknowledged_s)
-        self._statistics.retries += ARC_CNT.get(self._link.read_byte(Register.OBSERVE_TX))
+        retransmits = ARC_CNT.get(self._link.read_byte(Register.OBSERVE_TX))
+        self._statistics.retries += retransmits
         self._link.write_byte(Register.STATUS, TX_DS.mask | MAX_RT.mask)
-        return bool(flags & TX_DS.mask)
+        if not flags & TX_DS.mask:
+            return None
+        self._loaded = None
+        return retransmits
 
     def transmit_to_all(self, payload: bytes) -> None:
         """Broadcast, and listen again; nobody acknowledges."""
@@ -172,16 +181,13 @@ class Transceiver:
         self.become_transmitter(settings.broadcast_address)
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes & ~ENAA[0].mask)
-        self.load(settings.broadcast_address, payload, no_ack=True)
+        self.drop()
+        self._write_payload(payload, Command.W_TX_PAYLOAD_NO_ACK)
         self._pulse(settings.broadcast_s)
         self._link.write_byte(Register.STATUS, TX_DS.mask)
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes)
         self.listen()
-
-    def drop(self) -> None:
-        """Forget what was loaded."""
-        self._link.command(Command.FLUSH_TX)
 
     def drain(self) -> bool:
         """Move payloads from the FIFO to the inbox; whether there were any.
@@ -205,8 +211,6 @@ class Transceiver:
                 pipe = RX_P_NO.get(self._link.status)
                 payload = self._link.command(Command.R_RX_PAYLOAD, bytes(PAYLOAD_BYTES))
                 self.inbox.append(Received(pipe, payload))
-                if pipe == BROADCAST_PIPE:
-                    self.broadcast_heard_s = self._runtime.now_s()
                 self._statistics.received += 1
             self._link.write_byte(Register.STATUS, RX_DR.mask)
         return found
@@ -221,6 +225,16 @@ class Transceiver:
         if (delay, count) != self._retries:
             self._retries = (delay, count)
             self._link.write_byte(Register.SETUP_RETR, ARD.put(delay) | ARC.put(count))
+
+    def drop(self) -> None:
+        """Forget the payload of a failed try: it was given up, or another one goes first."""
+        if self._loaded is not None:
+            self._loaded = None
+            self._link.command(Command.FLUSH_TX)
+
+    def _write_payload(self, payload: bytes, command: Command = Command.W_TX_PAYLOAD) -> None:
+        self._link.command(command, payload)
+        self._pid = self._pid + 1 & 3
 
     def _raise_ce(self) -> None:
         self._ce.value = True

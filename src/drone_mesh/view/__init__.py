@@ -1,1 +1,1 @@
-"""Views of the mesh: palette, table, window and snapshots of the world. No ROS."""
+"""Pictures of the mesh in its world: window, snapshots, palette. No ROS."""

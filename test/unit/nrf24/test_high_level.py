@@ -16,13 +16,16 @@ class Mesh(IMeshNetwork):
 
     def __init__(self, node_id):
         self.node_id = node_id
-        self.heard, self.power = [], []
+        self.heard, self.power, self.undelivered = [], [], []
 
     def get_node_id(self):
         return self.node_id
 
     def on_msg(self, payload, now_s):
         self.heard.append(payload)
+
+    def on_undelivered(self, payload, now_s):
+        self.undelivered.append(payload)
 
     def on_antenna_power(self, on, now_s):
         self.power.append(on)
@@ -62,7 +65,7 @@ def packet(to, *, sender=0, filling=0x55):
 
 def test_a_packet_reaches_the_node_in_byte_3_and_no_other(lab, nodes):
     assert nodes[0].antenna.send_message_to(packet(2))
-    lab.clock.sleep(0.01)
+    lab.clock.sleep(0.1)
     assert [node.mesh.heard for node in nodes] == [[], [], [packet(2)]]
     assert nodes[2].shown == [packet(2)]
 
@@ -70,14 +73,29 @@ def test_a_packet_reaches_the_node_in_byte_3_and_no_other(lab, nodes):
 def test_a_broadcast_is_one_frame_and_each_receiver_finds_its_own_id_in_byte_3(lab, nodes):
     frames = len(lab.trace.frames)
     nodes[0].antenna.broadcast_message(packet(254))
-    lab.clock.sleep(0.01)
+    lab.clock.sleep(0.5)
     assert len(lab.trace.frames) == frames + 1
     expected = [bytes((0, 0, 3, node, 254)) + b"\x55" * 27 for node in (1, 2)]
     assert [node.mesh.heard for node in nodes] == [[], [expected[0]], [expected[1]]]
 
 
-def test_a_node_that_is_not_there_does_not_have_the_packet(nodes):
-    assert not nodes[0].antenna.send_message_to(packet(9))
+def test_a_packet_for_a_node_that_is_not_there_is_reported_as_undelivered(lab, nodes):
+    assert nodes[0].antenna.send_message_to(packet(9))
+    assert nodes[0].mesh.undelivered == []
+    lab.clock.sleep(12.0)
+    assert nodes[0].mesh.undelivered == [packet(9)]
+
+
+def test_a_node_that_is_not_there_does_not_delay_packets_for_others(lab, nodes):
+    nodes[0].antenna.send_message_to(packet(9))
+    lab.clock.sleep(0.1)  # the tries for node 9 go on for seconds
+    began_s = lab.clock.now_s()
+    for number in range(10):
+        nodes[0].antenna.send_message_to(packet(1, filling=number))
+    lab.clock.sleep(0.2)
+    assert [payload[5] for payload in nodes[1].mesh.heard] == list(range(10))
+    assert nodes[0].mesh.undelivered == []
+    assert lab.clock.now_s() - began_s < 0.3
 
 
 @pytest.mark.parametrize("bad", [packet(254), packet(255), packet(0), bytes(31), bytes(33)])
@@ -97,18 +115,29 @@ def test_an_antenna_that_fell_silent_sends_nothing_and_says_so_at_once(lab, node
     assert nodes[1].mesh.heard == nodes[2].mesh.heard == []
 
 
+def test_an_antenna_that_falls_silent_drops_what_waits(lab, nodes):
+    frames = len(lab.trace.frames)
+    for number in range(10):
+        nodes[0].antenna.send_message_to(packet(9, filling=number))
+    nodes[0].antenna.fall_silent()
+    lab.clock.sleep(1.0)
+    assert len(lab.trace.frames) <= frames + 2  # the try that was under way
+    assert nodes[0].mesh.undelivered == []
+
+
 def test_an_antenna_that_is_off_neither_sends_nor_hears_and_says_so_to_the_mesh(lab, nodes):
     off = nodes[1].antenna
     off.switch_power(False)
     assert not off.on()
     assert not off.send_message_to(packet(2, sender=1))
-    assert not nodes[0].antenna.send_message_to(packet(1))
-    lab.clock.sleep(0.01)
+    nodes[0].antenna.send_message_to(packet(1))
+    lab.clock.sleep(12.0)
+    assert nodes[0].mesh.undelivered == [packet(1)]
     assert nodes[1].mesh.heard == []
     off.switch_power(True)
     assert off.on()
     assert nodes[0].antenna.send_message_to(packet(1))
-    lab.clock.sleep(0.01)
+    lab.clock.sleep(0.1)
     assert nodes[1].mesh.heard == [packet(1)]
     assert nodes[1].mesh.power == [False, True]
 
@@ -117,19 +146,20 @@ def test_what_arrives_after_the_antenna_was_stopped_is_not_handed_on(lab, nodes)
     nodes[1].antenna.stop_antenna()
     nodes[1].antenna.stop_antenna()
     assert not nodes[1].antenna.on()
-    assert not nodes[0].antenna.send_message_to(packet(1))
+    nodes[0].antenna.send_message_to(packet(1))
+    lab.clock.sleep(1.0)
     assert nodes[1].mesh.heard == []
 
 
 def test_statistics_count_what_was_sent_lost_and_seen_twice(lab, nodes):
-    nodes[0].antenna.send_message_to(packet(1))
-    nodes[0].antenna.send_message_to(packet(1))
-    nodes[0].antenna.send_message_to(packet(9))
+    for to in (1, 1, 9):
+        nodes[0].antenna.send_message_to(packet(to))
+        lab.clock.sleep(0.2)
     nodes[0].antenna.broadcast_message(packet(254))
-    lab.clock.sleep(0.01)
+    lab.clock.sleep(12.0)
     sent = nodes[0].antenna.statistics()
     assert (sent.sent, sent.acknowledged, sent.lost, sent.broadcasts) == (3, 2, 1, 1)
-    assert sent.tries == 3
+    assert sent.tries == 8
     heard = nodes[1].antenna.statistics()
     assert (heard.received, heard.duplicates) == (3, 1)
 

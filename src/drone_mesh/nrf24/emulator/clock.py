@@ -9,22 +9,7 @@ from __future__ import annotations
 import abc
 from typing import Callable, ContextManager
 
-from drone_mesh.nrf24.runtime import Runtime
-
-
-class Signal(abc.ABC):
-    """Tells those who wait for something that they should look again."""
-
-    @abc.abstractmethod
-    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Return when the condition holds, or when the time is over; whether it holds.
-
-        It is looked at first, and again at each `notify`. The caller must hold no access.
-        """
-
-    @abc.abstractmethod
-    def notify(self) -> None:
-        """A condition may have changed."""
+from drone_mesh.nrf24.runtime import Runtime, Signal
 
 
 class EmulatorClock(abc.ABC):

@@ -14,6 +14,7 @@ from typing import Callable, Hashable, NamedTuple
 SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
 _FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
 _NEAREST_M = 0.1  # antennas may share a point; log10(0) may not
+_ADDRESS_LOST_BER = 0.1  # our choice: with more wrong bits the address is not recognised either
 _SAME_POINT_DBM = 0.0  # the strongest input that is specified [DS 5.7]
 
 
@@ -40,6 +41,10 @@ class LinkModel(abc.ABC):
     def bit_errors(self, hop: Hop) -> int | None:
         """How many bits arrive wrong; None: the receiver does not notice the frame at all."""
 
+    def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
+        """Whether a frame can arrive over that distance at all, with luck; True if unknown."""
+        return True
+
 
 def free_space_dbm(distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
     """Power between isotropic antennas (ITU-R P.525); 40.06 dB are lost on 1 m at 2401 MHz."""
@@ -59,6 +64,9 @@ class IdealDisc(LinkModel):
 
     def bit_errors(self, hop: Hop) -> int | None:
         return 0 if hop.distance_m < self._range_m else None
+
+    def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
+        return distance_m < self._range_m
 
 
 def bit_error_rate(margin_db: float) -> float:
@@ -105,11 +113,14 @@ class LogDistance(LinkModel):
         rate = bit_error_rate(hop.power_dbm - SENSITIVITY_DBM[hop.bits_per_s])
         if rate < 1e-12:
             return 0
-        if rate > 0.1:
+        if rate > _ADDRESS_LOST_BER:
             return None  # not even the address is found
         if self._rng.random() < (1 - rate) ** hop.bit_count:
             return 0
         return max(1, round(rate * hop.bit_count))
+
+    def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
+        return bit_error_rate(power_dbm - SENSITIVITY_DBM[bits_per_s]) <= _ADDRESS_LOST_BER
 
 
 class ScriptedLoss(LinkModel):
@@ -124,6 +135,9 @@ class ScriptedLoss(LinkModel):
 
     def bit_errors(self, hop: Hop) -> int | None:
         return None if self._loses(hop) else self._model.bit_errors(hop)
+
+    def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
+        return self._model.reaches(distance_m, power_dbm, bits_per_s)
 
 
 class LossCurve(LinkModel):

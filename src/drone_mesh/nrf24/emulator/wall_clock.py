@@ -17,8 +17,8 @@ import time
 from typing import Any, Callable, Iterator
 
 from drone_mesh.nrf24.airtime import NS_PER_S
-from drone_mesh.nrf24.emulator.clock import EmulatorClock, Signal
-from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
+from drone_mesh.nrf24.emulator.clock import EmulatorClock
+from drone_mesh.nrf24.runtime import Runtime, Signal, SystemRuntime, ThreadSignal
 
 logger = logging.getLogger(__name__)
 
@@ -71,7 +71,7 @@ class WallClock(EmulatorClock):
         """An emulated transfer takes the time it takes: the host is slower than SPI anyway."""
 
     def signal(self) -> Signal:
-        return _WallSignal()
+        return ThreadSignal()
 
     def _catch_up(self) -> None:
         while True:
@@ -96,16 +96,3 @@ class WallClock(EmulatorClock):
                     self._earlier.wait(max(due_ns, 0) / NS_PER_S)
                 else:
                     self._earlier.wait()
-
-
-class _WallSignal(Signal):
-    def __init__(self) -> None:
-        self._condition = threading.Condition()
-
-    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        with self._condition:
-            return self._condition.wait_for(condition, timeout_s)
-
-    def notify(self) -> None:
-        with self._condition:
-            self._condition.notify_all()

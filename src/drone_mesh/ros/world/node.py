@@ -18,11 +18,11 @@ from drone_mesh.ros.host.emulated_nrf24 import EmulatedRadios
 from drone_mesh.ros.host.fleet import mesh_settings, tell_hosts
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.virtual_raspberry_pi import MeshSettings
-from drone_mesh.ros.world.drone_views import drone_views
 from drone_mesh.ros.world.engine_server import EngineServer, PositionReporter
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.ros.world.world_window import window_of
+from drone_mesh.state.observation import view_drone
 from drone_mesh.view.window_process import require_screen
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
@@ -105,7 +105,7 @@ def main() -> None:
             state = MeshStatePublisher(
                 lambda: WorldView(
                     world.now_s,
-                    drone_views(factory.drones, world.now_s),
+                    [view_drone(drone, world.now_s) for drone in factory.drones],
                     runner.wanted_factor,
                     runner.paused,
                 ),

@@ -1,0 +1,37 @@
+"""What kind of medium an antenna sends on: the mesh keeps its pace accordingly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S
+
+
+@dataclass(frozen=True)
+class Medium:
+    """Properties of a medium. The defaults are those of links that do not disturb each other.
+
+    On a shared channel every packet costs all nodes in range airtime, and one packet that got
+    lost says little. There the antenna queues packets and owns all tries (the mesh adds none), and
+    it reports later what it could not deliver. The mesh sends fewer packets:
+
+    * MISSING is one broadcast, and the same node is not announced again within `missing_quiet_s`;
+    * a node that looks for a gateway is answered by one PRESENT for all, after a random part of
+      `answer_spread_s`, unless another node answered first (Trickle, RFC 6206: suppression);
+    * a router asks one neighbour at a time for its gateway, for `answer_s`;
+    * what is known to work is not probed in each round; see IWirelessCommunication.patience. A
+      gateway's answer that a router forwards proves its own connection, too (the data-path
+      validation of CTP: Gnawali et al., Collection Tree Protocol, 2009);
+    * a gateway counts as lost after `heartbeats` unanswered ones.
+    """
+
+    shared: bool = False
+    answer_s: float = HEARTBEAT_ANSWER_S  # wait so long for the answer to a heartbeat
+    answer_per_hop_s: float = 0.0  # and so much longer for each hop to the gateway
+    heartbeats: int = 1
+    answer_spread_s: float = 0.0
+    missing_quiet_s: float = 0.0
+    silence_s: float = 0.0  # a neighbour heard since then is not lost by one undelivered packet
+
+
+UNDISTURBED = Medium()

@@ -1,0 +1,214 @@
+"""The shared channel, packet by packet: a fast model of nRF24L01+ radios on one air.
+
+It knows what decides the fate of a packet: the time that frames take, that a radio cannot hear
+while it sends, acknowledgements and their loss, frames that overlap (with capture), the FIFO of
+three payloads, and the rules by which the driver uses the channel. Those rules are the driver's own
+(`nrf24.medium_access`), as are the link models (`nrf24.emulator.links`). What it leaves out is the
+chip: registers, SPI and bits. `python3 -m drone_mesh.lab.air_validation` compares the two.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.nrf24.emulator.air import CAPTURE_DB
+from drone_mesh.nrf24.emulator.links import Hop, LinkModel
+from drone_mesh.nrf24.medium_access import EVERYBODY, Outgoing
+from drone_mesh.nrf24.settings import RadioSettings
+
+
+class Transmission:
+    """One frame on the air."""
+
+    __slots__ = ("answers", "end_s", "others", "packet", "sender", "start_s")
+
+    def __init__(
+        self,
+        sender: SharedRadio,
+        packet: Outgoing,
+        answers: SharedRadio | None,
+        start_s: float,
+        end_s: float,
+    ) -> None:
+        self.sender = sender
+        self.packet = packet
+        self.answers = answers  # an acknowledgement for that radio; None: the packet itself
+        self.start_s = start_s
+        self.end_s = end_s
+        self.others: list[Transmission] = []  # that overlap with it
+
+
+class SharedRadio(abc.ABC):
+    """What the air sees of a radio."""
+
+    node_id: int
+    drone: IDroneEngine
+    powered: bool
+    listening_since_s: float | None  # None: it sends, turns round or has no power
+
+    @abc.abstractmethod
+    def frame_left(self, frame: Transmission) -> None:
+        """The radio's own frame has ended."""
+
+    @abc.abstractmethod
+    def frame_arrived(self, frame: Transmission) -> None:
+        """A frame for this radio has arrived undamaged."""
+
+
+class SharedAir:
+    """All radios on one channel, and the frames between them."""
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        links: LinkModel,
+        settings: RadioSettings,
+        max_distance_m: float,
+    ) -> None:
+        """`max_distance_m`: where pictures and path searches believe the range to end."""
+        self.clock = clock
+        self.links = links
+        self.settings = settings
+        self.max_distance_m = max_distance_m
+        self.frames = 0  # that have been on the air
+        self.collisions = 0  # receptions that another frame destroyed
+        self.delivered = 0  # payloads that reached a mesh component
+        self.airtime_s = 0.0  # of all frames together
+        self._bits_per_s = settings.data_rate.value
+        self._carrier_mhz = 2400 + settings.channel
+        self._capture_db = CAPTURE_DB[self._bits_per_s]
+        self._packet_s = settings.frame_s
+        self._answer_s = settings.answer_frame_s
+        self._packet_bits = round(self._packet_s * self._bits_per_s)
+        self._answer_bits = round(self._answer_s * self._bits_per_s)
+        self._radios: dict[int, SharedRadio] = {}
+        self._active: list[Transmission] = []
+        self._power_dbm: dict[tuple[int, int], float] = {}  # sender, receiver; of standing pairs
+        self._reached: dict[int, list[SharedRadio]] = {}  # by a standing sender
+        self._flying: set[int] = set()
+
+    # Who is there ----------------------------------------------------------------------------
+
+    def add(self, radio: SharedRadio) -> None:
+        """A radio appears."""
+        self._radios[radio.node_id] = radio
+        self._forget(radio.node_id)
+
+    def remove(self, radio: SharedRadio) -> None:
+        """A radio is gone."""
+        self._radios.pop(radio.node_id, None)
+        self._forget(radio.node_id)
+
+    def flight(self, node: int, started: bool) -> None:
+        """A drone took off (True) or came to a stop."""
+        (self._flying.add if started else self._flying.discard)(node)
+        self._forget(node)
+
+    def in_range(self, node: int) -> dict[int, SharedRadio]:
+        """The radios that a node could reach on an undisturbed channel, by id."""
+        if node not in self._radios:
+            return {}
+        return {radio.node_id: radio for radio in self._in_reach(node)}
+
+    # Frames ----------------------------------------------------------------------------------
+
+    def transmit(
+        self, sender: SharedRadio, packet: Outgoing, answers: SharedRadio | None = None
+    ) -> None:
+        """A frame begins now."""
+        now_s = self.clock.now_s
+        duration_s = self._packet_s if answers is None else self._answer_s
+        frame = Transmission(sender, packet, answers, now_s, now_s + duration_s)
+        for other in self._active:
+            other.others.append(frame)
+            frame.others.append(other)
+        self._active.append(frame)
+        self.airtime_s += duration_s
+        self.clock.call_at(frame.end_s, self._end, frame)
+
+    def _end(self, frame: Transmission) -> None:
+        self.frames += 1
+        self._active.remove(frame)
+        frame.sender.frame_left(frame)
+        if frame.answers is not None:
+            self._arrive(frame, frame.answers)
+        elif frame.packet.receiver != EVERYBODY:
+            receiver = self._radios.get(frame.packet.receiver)
+            if receiver is not None:
+                self._arrive(frame, receiver)
+        else:
+            for receiver in self._in_reach(frame.sender.node_id):
+                self._arrive(frame, receiver)
+
+    def _arrive(self, frame: Transmission, receiver: SharedRadio) -> None:
+        since_s = receiver.listening_since_s
+        if since_s is None or since_s > frame.start_s:
+            return
+        sender_id, receiver_id = frame.sender.node_id, receiver.node_id
+        power_dbm = self._power(sender_id, receiver_id)
+        hop = Hop(
+            sender_id,
+            receiver_id,
+            self._distance_m(sender_id, receiver_id),
+            power_dbm,
+            self._bits_per_s,
+            self._packet_bits if frame.answers is None else self._answer_bits,
+            frame.packet if frame.answers is None else None,
+        )
+        errors = self.links.bit_errors(hop)
+        if errors is None:
+            return
+        if frame.others:
+            strongest_dbm = power_dbm - self._capture_db
+            for other in frame.others:
+                if self._power(other.sender.node_id, receiver_id) > strongest_dbm:
+                    self.collisions += 1
+                    return
+        if errors == 0:
+            receiver.frame_arrived(frame)
+
+    # Places ----------------------------------------------------------------------------------
+
+    def _forget(self, node: int) -> None:
+        self._reached.clear()
+        self._power_dbm = {pair: dbm for pair, dbm in self._power_dbm.items() if node not in pair}
+
+    def _distance_m(self, one: int, other: int) -> float:
+        radios = self._radios
+        if one not in radios or other not in radios:
+            return math.inf
+        return math.dist(radios[one].drone.get_location(), radios[other].drone.get_location())
+
+    def _power(self, sender: int, receiver: int) -> float:
+        power_dbm = self._power_dbm.get((sender, receiver))
+        if power_dbm is not None:
+            return power_dbm
+        if sender == receiver:
+            return -math.inf  # it did not listen then
+        distance_m = self._distance_m(sender, receiver)
+        if distance_m == math.inf:
+            return -math.inf
+        power_dbm = self.links.received_dbm(
+            distance_m, float(self.settings.power.value), self._carrier_mhz
+        )
+        if not self._flying.intersection((sender, receiver)):
+            self._power_dbm[sender, receiver] = power_dbm
+        return power_dbm
+
+    def _in_reach(self, node: int) -> list[SharedRadio]:
+        reached = self._reached.get(node)
+        if reached is None:
+            reached = [
+                radio
+                for other, radio in self._radios.items()
+                if other != node
+                and self.links.reaches(
+                    self._distance_m(node, other), self._power(node, other), self._bits_per_s
+                )
+            ]
+            if not self._flying:
+                self._reached[node] = reached
+        return reached

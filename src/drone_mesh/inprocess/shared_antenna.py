@@ -1,0 +1,228 @@
+"""The antenna of one node on the shared channel: the driver's behaviour in virtual time."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Callable
+
+from drone_mesh.communication.interfaces import (
+    MAX_NODE_ID,
+    IMeshDebugInfo,
+    IMeshNetwork,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.messages import readdressed, receiver
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
+from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
+from drone_mesh.nrf24.medium_access import EVERYBODY, Fate, MediumAccess, Outgoing
+from drone_mesh.nrf24.pace import access_rules, medium_of
+from drone_mesh.nrf24.registers import FIFO_DEPTH
+from drone_mesh.nrf24.transceiver import TX_DELAY_S
+
+SETTLING_S = SETTLING_NS / NS_PER_S
+# What the driver's SPI transfers take at 8 MHz, as the emulator counts them.
+PREPARE_S = 60e-6  # from a listening chip to the rise of CE, without the pause of TX_DELAY_S
+FINISH_S = 20e-6  # from TX_DS or MAX_RT to CE high again
+READ_S = 80e-6  # from the end of a frame until its payload is in the driver
+
+Submit = Callable[[Callable[[float], None]], None]
+"""Run a function with now_s in the component of the node, and look after what that wants next."""
+
+
+class SharedAntenna(IWirelessCommunication, SharedRadio):
+    """One node's radio."""
+
+    def __init__(
+        self,
+        air: SharedAir,
+        node_id: int,
+        drone: IDroneEngine,
+        submit: Submit,
+        rng: random.Random,
+    ) -> None:
+        self.node_id = node_id
+        self.drone = drone
+        self.listening_since_s: float | None = None
+        self.access = MediumAccess(access_rules(air.settings), rng)
+        self._air = air
+        self._clock: VirtualClock = air.clock
+        self._submit = submit
+        self._settings = air.settings
+        self._tx_delay_s = TX_DELAY_S[air.settings.data_rate]
+        self._medium = medium_of(air.settings)
+        self._mesh: IMeshNetwork | None = None
+        self.powered = True
+        self._planned_s = math.inf
+        self._trying: Outgoing | None = None
+        self._retransmits = 0
+        self._ard_s = 0.0
+        self._ce_rose_s = 0.0
+        self._answered = False
+        self._last_taken: Outgoing | None = None  # the packet that came last on the own address
+        self._unread = 0  # payloads in the FIFO
+        self.given_up = 0
+        self.packets = 0
+
+    # IWirelessCommunication ------------------------------------------------------------------
+
+    @property
+    def medium(self) -> Medium:
+        return self._medium
+
+    def patience(self) -> float:
+        return self.access.patience
+
+    def start_antenna(self, mesh: IMeshNetwork) -> None:
+        """Be reachable."""
+        self._mesh = mesh
+        self.listening_since_s = self._clock.now_s
+        self._air.add(self)
+
+    def stop_antenna(self) -> None:
+        """Be gone."""
+        self._mesh = None
+        self.listening_since_s = None
+        self.access.clear()
+        self._air.remove(self)
+
+    def send_message_to(self, payload: bytes) -> bool:
+        """Queue it for the node in byte 3."""
+        to = receiver(payload)
+        if not self.powered or to > MAX_NODE_ID or to == self.node_id:
+            return False
+        taken = self.access.offer(to, payload, self._clock.now_s)
+        self._plan()
+        return taken
+
+    def broadcast_message(self, payload: bytes) -> None:
+        """Queue one frame for all."""
+        if self.powered:
+            self.access.offer(EVERYBODY, payload, self._clock.now_s)
+            self._plan()
+
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        """Nothing: the owner of the network has its nodes."""
+
+    def on(self) -> bool:
+        """Whether it has power."""
+        return self.powered
+
+    def switch_power(self, on: bool) -> None:
+        """Power on or off; what waits to be sent is dropped."""
+        self.powered = on
+        self.access.clear()
+        self.listening_since_s = self._clock.now_s if on and self._trying is None else None
+
+    # Sending ---------------------------------------------------------------------------------
+
+    def _plan(self) -> None:
+        if self._trying is not None:
+            return
+        at_s = max(self.access.next_try_s, self._clock.now_s)
+        if at_s < self._planned_s:
+            self._planned_s = at_s
+            self._clock.call_at(at_s, self._try, at_s)
+
+    def _try(self, planned_s: float) -> None:
+        if planned_s != self._planned_s:
+            return
+        self._planned_s = math.inf
+        packet = self.access.due(self._clock.now_s)
+        if packet is None or not self.powered:
+            self._plan()
+            return
+        self._trying, self._answered = packet, False
+        self.listening_since_s = None
+        self._retransmits, delay = self.access.retransmits()
+        self._ard_s = ard_s(delay)
+        self._ce_rose_s = self._clock.now_s + self._tx_delay_s + PREPARE_S
+        self._clock.call_at(self._ce_rose_s + SETTLING_S, self._send_frame, packet)
+
+    def _send_frame(self, packet: Outgoing) -> None:
+        if packet is self._trying:
+            self._air.transmit(self, packet)
+
+    def frame_left(self, frame: Transmission) -> None:
+        now_s = self._clock.now_s
+        if frame.answers is not None:
+            if self._trying is None and self.powered:
+                self.listening_since_s = now_s + SETTLING_S
+        elif frame.packet.receiver == EVERYBODY:
+            self._finish(True)
+        else:
+            self.listening_since_s = now_s + SETTLING_S  # for the acknowledgement
+            self._clock.call_at(now_s + self._ard_s, self._no_answer, frame)
+
+    def _no_answer(self, frame: Transmission) -> None:
+        if self._answered or frame.packet is not self._trying:
+            return
+        self.listening_since_s = None
+        if self._retransmits > 0:
+            self._retransmits -= 1
+            self._clock.call_at(self._clock.now_s + SETTLING_S, self._send_frame, frame.packet)
+        else:
+            self._finish(False)
+
+    def _finish(self, acknowledged: bool) -> None:
+        """TX_DS or MAX_RT; the driver notices when it looks next."""
+        self.listening_since_s = None
+        now_s, expected_s = self._clock.now_s, self._settings.acknowledged_s
+        looks_s = self._ce_rose_s + expected_s
+        if now_s > looks_s:
+            looks_s += math.ceil((now_s - looks_s) / self._ard_s) * self._ard_s
+        self._clock.call_at(max(looks_s, now_s) + FINISH_S, self._listen_again, acknowledged)
+
+    def _listen_again(self, acknowledged: bool) -> None:
+        packet, self._trying = self._trying, None
+        now_s = self._clock.now_s
+        if self.powered and self._mesh is not None:
+            self.listening_since_s = now_s + SETTLING_S
+        if packet is None:
+            return
+        fate = self.access.tried(packet, acknowledged, now_s)
+        if fate is Fate.GIVEN_UP and self._mesh is not None:
+            self.given_up += 1
+            mesh = self._mesh
+            self._submit(lambda now_s: mesh.on_undelivered(packet.payload, now_s))
+        self._plan()
+
+    # Receiving -------------------------------------------------------------------------------
+
+    def frame_arrived(self, frame: Transmission) -> None:
+        if frame.answers is self:
+            if frame.packet is self._trying and not self._answered:
+                self._answered = True
+                self._finish(True)
+            return
+        if self._trying is not None:
+            return  # waits for an acknowledgement, on another pipe
+        if self._unread == FIFO_DEPTH:
+            return
+        packet, now_s = frame.packet, self._clock.now_s
+        broadcast = packet.receiver == EVERYBODY
+        if broadcast or packet is not self._last_taken:
+            self._unread += 1
+            self._clock.call_at(now_s + READ_S, self._read, (frame.sender.node_id, packet))
+        if not broadcast:
+            self._last_taken = packet
+            self.listening_since_s = None
+            self._clock.call_at(now_s + SETTLING_S, self._answer, frame)
+
+    def _answer(self, frame: Transmission) -> None:
+        self._air.transmit(self, frame.packet, answers=frame.sender)
+
+    def _read(self, arrived: tuple[int, Outgoing]) -> None:
+        self._unread -= 1
+        sender_id, packet = arrived
+        mesh = self._mesh
+        if mesh is None or not self.powered:
+            return
+        broadcast = packet.receiver == EVERYBODY
+        self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast)
+        payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
+        self._air.delivered += 1
+        self._submit(lambda now_s: mesh.on_msg(payload, now_s))

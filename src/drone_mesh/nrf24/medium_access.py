@@ -1,0 +1,254 @@
+"""When a node may use the shared channel, and how long it tries to deliver a packet.
+
+The chip hears no carrier before it sends (RPD notices only neighbours within a fraction of the
+range), so that the channel is ALOHA: what keeps it from collapsing are the senders' own rules.
+Those rules are here, apart from chips, threads and clocks; the driver and the fast model of the
+air (`inprocess.shared_air`) both follow this one implementation.
+
+1. Tries are bounded, and the pauses between them are random and double with each try (binary
+   exponential back-off; Metcalfe and Boggs, Ethernet, 1976). A fixed number of tries at a fixed
+   distance, as the chip makes by itself, keeps two senders colliding with each other.
+2. The pauses of a node that sees its first tries fail are longer from the start, and so is the
+   distance between its packets. That is what keeps ALOHA stable (Lam and Kleinrock, 1975: the
+   retransmission rate must fall as the backlog grows). The node judges by its own failures, as
+   no carrier sense is at hand.
+3. What many would do at the same moment gets a random delay: broadcasts, and answers to one
+   (RFC 5148, jitter).
+4. A node leaves a gap after each of its packets, so that a burst of them (a check of all
+   neighbours) does not occupy the channel as a block.
+5. Each receiver has a line of its own: waiting for one of them does not delay the others. A
+   receiver that let a packet fail and was not heard since gets fewer tries for the next one.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import random
+from collections import deque
+from dataclasses import dataclass
+
+from drone_mesh.errors import ConfigurationError
+
+EVERYBODY = -1  # receiver of a broadcast
+
+
+@dataclass(frozen=True)
+class AccessRules:
+    """Numbers of the rules; `for_cycle` scales them to the time that one packet takes."""
+
+    tries: int  # of one packet
+    retransmits: int  # by the chip itself, in each try
+    retransmit_delays: tuple[int, int]  # settings of ARD, from..to; a random one for each try
+    tries_when_silent: int  # of one packet for a receiver that let the last one fail
+    first_pause_s: float  # mean pause after the first try; doubles with each further one
+    longest_pause_s: float  # mean pause, at most
+    gap_s: float  # mean distance between two packets of one node
+    broadcast_jitter_s: float  # a broadcast waits for a random part of this
+    answer_jitter_s: float  # as does whatever is sent within that time after a broadcast was heard
+    lifetime_s: float  # a packet that waited for so long is of no use to anyone
+    queue_length: int  # packets that may wait, in all
+    most_patience: float  # check periods without probes on a busy channel
+    busy_at: float  # share of first tries that fail from which on a channel counts as busy
+
+    @classmethod
+    def for_cycle(cls, cycle_s: float) -> AccessRules:
+        """`cycle_s`: one packet and its acknowledgement, from the decision to listening again."""
+        return cls(
+            tries=9,
+            retransmits=1,
+            retransmit_delays=(2, 9),
+            tries_when_silent=3,
+            first_pause_s=8 * cycle_s,
+            longest_pause_s=400 * cycle_s,
+            gap_s=2 * cycle_s,
+            broadcast_jitter_s=60 * cycle_s,
+            answer_jitter_s=60 * cycle_s,
+            lifetime_s=10.0,
+            queue_length=300,
+            most_patience=2.5,
+            busy_at=0.3,
+        )
+
+    def __post_init__(self) -> None:
+        for name in ("tries", "tries_when_silent", "queue_length"):
+            if getattr(self, name) < 1:
+                raise ConfigurationError(f"medium access: {name} must be at least 1")
+
+
+class Priority(enum.IntEnum):
+    """Which packets go first."""
+
+    CONTROL = 0  # packets of the mesh itself
+    DATA = 1
+
+
+class Fate(enum.Enum):
+    """What became of a packet with a try."""
+
+    WAITS = "waits"  # there will be another try
+    DELIVERED = "delivered"  # acknowledged, or, if a broadcast, sent
+    GIVEN_UP = "given up"
+
+
+class Outgoing:
+    """One packet on its way out."""
+
+    __slots__ = ("not_before_s", "payload", "priority", "queued_s", "receiver", "tries")
+
+    def __init__(
+        self, receiver: int, payload: bytes, priority: Priority, now_s: float, not_before_s: float
+    ) -> None:
+        self.receiver = receiver
+        self.payload = payload
+        self.priority = priority
+        self.queued_s = now_s
+        self.not_before_s = not_before_s
+        self.tries = 0
+
+
+_LEARNING = 0.1  # weight of the latest first try in the estimate of contention
+_MOST_CONTENTION = 0.9
+
+
+class MediumAccess:
+    """The packets that one node wants to send, and when it may try which of them.
+
+    Belongs to one thread at a time. `due` says what to try now; the result of the try goes to
+    `tried`.
+    """
+
+    def __init__(self, rules: AccessRules, rng: random.Random) -> None:
+        self.rules = rules
+        self._rng = rng
+        self._lines: dict[int, deque[Outgoing]] = {}  # by receiver
+        self._waiting = 0
+        self._free_s = -math.inf  # the gap after the last packet ends
+        self._broadcast_heard_s = -math.inf
+        self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
+        self._counts = {"sent": 0, "acknowledged": 0, "lost": 0, "tries": 0, "broadcasts": 0}
+        self.contention = 0.0  # share of first tries that failed lately, 0 to _MOST_CONTENTION
+
+    def __len__(self) -> int:
+        """Packets that wait."""
+        return self._waiting
+
+    def offer(
+        self, receiver: int, payload: bytes, now_s: float, priority: Priority = Priority.CONTROL
+    ) -> bool:
+        """Queue a packet for a node, or for EVERYBODY. False: too many packets wait already.
+
+        Bytes that already wait for the same receiver are not queued twice.
+        """
+        line = self._lines.get(receiver)
+        if line is not None and any(waiting.payload == payload for waiting in line):
+            return True
+        if self._waiting >= self.rules.queue_length:
+            return False
+        rules, not_before_s = self.rules, now_s
+        if receiver == EVERYBODY:
+            not_before_s += self._rng.random() * rules.broadcast_jitter_s
+        elif now_s - self._broadcast_heard_s < rules.answer_jitter_s:
+            not_before_s += self._rng.random() * rules.answer_jitter_s
+        if line is None:
+            line = self._lines[receiver] = deque()
+        line.append(Outgoing(receiver, payload, priority, now_s, not_before_s))
+        self._waiting += 1
+        return True
+
+    def replace_broadcast(self, payload: bytes, prefix: int) -> bool:
+        """Have a broadcast that waits and begins with the same bytes carry the newer content."""
+        for waiting in self._lines.get(EVERYBODY, ()):
+            if waiting.payload[:prefix] == payload[:prefix]:
+                waiting.payload = payload
+                return True
+        return False
+
+    def heard(self, sender: int, now_s: float, *, broadcast: bool) -> None:
+        """A packet came in."""
+        self._silent.discard(sender)
+        if broadcast:
+            self._broadcast_heard_s = now_s
+
+    @property
+    def next_try_s(self) -> float:
+        """When `due` will have something; infinity while nothing waits."""
+        if not self._waiting:
+            return math.inf
+        first_s = min(line[0].not_before_s for line in self._lines.values())
+        return max(first_s, self._free_s)
+
+    def due(self, now_s: float) -> Outgoing | None:
+        """The packet to try now. It stays in its line until `tried` says otherwise."""
+        if not self._waiting or now_s < self._free_s:
+            return None
+        ready = [line[0] for line in self._lines.values() if line[0].not_before_s <= now_s]
+        if not ready:
+            return None
+        return min(ready, key=lambda packet: (packet.priority, packet.not_before_s))
+
+    def tried(self, packet: Outgoing, acknowledged: bool, now_s: float) -> Fate:
+        """The result of a try that has just ended."""
+        rules, receiver = self.rules, packet.receiver
+        packet.tries += 1
+        gap_s = rules.gap_s / (1.0 - self.contention)
+        self._free_s = now_s + 2.0 * self._rng.random() * gap_s
+        counts = self._counts
+        if receiver == EVERYBODY:
+            counts["broadcasts"] += acknowledged
+            self._remove(packet)
+            return Fate.DELIVERED
+        counts["tries"] += packet.tries > 1
+        if packet.tries == 1 and receiver not in self._silent:
+            failed = 0.0 if acknowledged else _MOST_CONTENTION
+            self.contention += _LEARNING * (failed - self.contention)
+        if acknowledged:
+            counts["sent"] += 1
+            counts["acknowledged"] += 1
+            self._silent.discard(receiver)
+            self._remove(packet)
+            return Fate.DELIVERED
+        most = rules.tries_when_silent if receiver in self._silent else rules.tries
+        if packet.tries >= most or now_s - packet.queued_s > rules.lifetime_s:
+            counts["sent"] += 1
+            counts["lost"] += 1
+            self._silent.add(receiver)
+            self._remove(packet)
+            return Fate.GIVEN_UP
+        packet.not_before_s = now_s + self._pause_s(packet.tries)
+        return Fate.WAITS
+
+    def figures(self) -> dict[str, int]:
+        """Packets by what became of them, as RadioStatistics names them."""
+        return dict(self._counts)
+
+    @property
+    def patience(self) -> float:
+        """For how many check periods the mesh should not probe again what works; see rule 6."""
+        return self.rules.most_patience * min(1.0, self.contention / self.rules.busy_at)
+
+    def retransmits(self) -> tuple[int, int]:
+        """How often the chip repeats a frame by itself, and its ARD setting, for one try."""
+        low, high = self.rules.retransmit_delays
+        return self.rules.retransmits, self._rng.randint(low, high)
+
+    def clear(self) -> list[Outgoing]:
+        """Give up all that waits."""
+        dropped = [packet for line in self._lines.values() for packet in line]
+        self._lines.clear()
+        self._waiting = 0
+        return dropped
+
+    def _pause_s(self, tries: int) -> float:
+        rules = self.rules
+        mean_s = rules.first_pause_s / (1.0 - self.contention) * 2.0 ** (tries - 1)
+        return min(mean_s, rules.longest_pause_s) * 2.0 * self._rng.random()
+
+    def _remove(self, packet: Outgoing) -> None:
+        line = self._lines.get(packet.receiver)
+        if line is None or packet not in line:
+            return  # all was given up meanwhile
+        line.remove(packet)
+        self._waiting -= 1
+        if not line:
+            del self._lines[packet.receiver]

@@ -1,0 +1,28 @@
+"""The pace of a mesh on this radio: rules of access and what the mesh must know of the channel."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.medium import Medium
+from drone_mesh.nrf24.medium_access import AccessRules
+from drone_mesh.nrf24.settings import DataRate, RadioSettings
+
+CYCLE_S = {DataRate.KBPS_250: 2.6e-3, DataRate.MBPS_1: 1.1e-3, DataRate.MBPS_2: 0.9e-3}
+
+
+def access_rules(settings: RadioSettings) -> AccessRules:
+    """The rules for radios with these settings."""
+    return AccessRules.for_cycle(CYCLE_S[settings.data_rate])
+
+
+def medium_of(settings: RadioSettings) -> Medium:
+    """What the mesh has to know of a channel with these settings."""
+    cycle_s = CYCLE_S[settings.data_rate]
+    return Medium(
+        shared=True,
+        answer_s=1.0,
+        answer_per_hop_s=100 * cycle_s,
+        heartbeats=3,
+        answer_spread_s=200 * cycle_s,
+        missing_quiet_s=5.0,
+        silence_s=3.0,
+    )

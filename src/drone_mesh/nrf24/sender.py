@@ -1,0 +1,103 @@
+"""Sender: the queue of one radio, and the task that works it off by the rules of access."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.medium_access import EVERYBODY, Fate, Outgoing, Priority
+from drone_mesh.nrf24.runtime import Runtime, Task
+
+
+class Sender:
+    """Sends what is offered, several receivers at once.
+
+    Threads: `start` starts one that sends. Any thread may call the other methods; none of them
+    waits for the radio. A lock guards the queue, and is never held during a send.
+    """
+
+    def __init__(
+        self,
+        radio: NRF24LowLevelInterface,
+        runtime: Runtime,
+        on_given_up: Callable[[bytes], None],
+    ) -> None:
+        """`on_given_up` takes a packet that no try could deliver; called in the sending thread."""
+        self._radio = radio
+        self._access = radio.access
+        self._runtime = runtime
+        self._on_given_up = on_given_up
+        self._lock = runtime.lock()
+        self._news = runtime.signal()
+        self._has_news = False
+        self._closed = False
+        self._task: Task | None = None
+
+    def start(self) -> None:
+        """Begin to send."""
+        self._closed = False
+        self._task = self._runtime.start(self._run, f"nRF24 sender {self._radio.node_id}")
+
+    def stop(self) -> None:
+        """Give up what waits, without a report, and end the thread."""
+        self._closed = True
+        self.clear()
+        task, self._task = self._task, None
+        if task is not None:
+            task.join()
+
+    def offer(self, receiver: int, payload: bytes, priority: Priority = Priority.CONTROL) -> bool:
+        """Queue a packet for a node or EVERYBODY. False: the queue is full or closed."""
+        if self._closed:
+            return False
+        with self._lock:
+            taken = self._access.offer(receiver, payload, self._runtime.now_s(), priority)
+        self._wake()
+        return taken
+
+    def heard(self, sender: int, *, broadcast: bool) -> None:
+        """A packet of that node came in."""
+        with self._lock:
+            self._access.heard(sender, self._runtime.now_s(), broadcast=broadcast)
+
+    def clear(self) -> None:
+        """Give up what waits, without a report."""
+        with self._lock:
+            self._access.clear()
+        self._wake()
+
+    @property
+    def patience(self) -> float:
+        """See MediumAccess."""
+        return self._access.patience
+
+    def _wake(self) -> None:
+        self._has_news = True
+        self._news.notify()
+
+    def _run(self) -> None:
+        while not self._closed:
+            with self._lock:
+                now_s = self._runtime.now_s()
+                packet = self._access.due(now_s)
+                wait_s = self._access.next_try_s - now_s
+                self._has_news = False
+            if packet is None:
+                self._news.wait_for(lambda: self._has_news or self._closed, wait_s)
+            else:
+                self._try(packet)
+
+    def _try(self, packet: Outgoing) -> None:
+        radio, payload = self._radio, packet.payload
+        if packet.receiver == EVERYBODY:
+            done = radio.broadcast(payload)
+        else:
+            retransmits, delay = self._access.retransmits()
+            again = packet.tries > 0
+            done = radio.try_once(packet.receiver, payload, again, retransmits, delay)
+        with self._lock:
+            fate = self._access.tried(packet, done, self._runtime.now_s())
+        if fate is Fate.GIVEN_UP:
+            radio.drop()
+            if not self._closed:
+                self._on_given_up(payload)
