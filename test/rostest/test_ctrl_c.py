@@ -64,13 +64,13 @@ class CtrlCTest(unittest.TestCase):
             self.assertEqual(processes_of(port), [])
 
     def test_while_the_mesh_runs(self) -> None:
-        self.run_and_interrupt("31 nodes are on", "routers:=30")
+        self.run_and_interrupt("started 31 nodes", "routers:=30")
 
     def test_while_the_nodes_are_being_started(self) -> None:
         self.run_and_interrupt("1 gateways and 30 routers", "routers:=30")
 
     def test_while_emulated_radios_are_in_each_others_way(self) -> None:
-        self.run_and_interrupt("18 nodes are on", "radio:=nrf24")
+        self.run_and_interrupt("started 18 nodes", "radio:=nrf24")
 
 
 if __name__ == "__main__":

@@ -91,9 +91,9 @@ class FactoryTest(unittest.TestCase):
         for _ in range(20):
             self.fly(1, latitude=math.nan, longitude=0.0, height=0)
             self.fly(1, latitude=0.0, longitude=5001.0, height=0)
-        wait_for("no line", 10, lambda: self.log.lines("drone 1 refuses a goal"))
+        wait_for("no line", 10, lambda: self.log.lines("drone 1 refused a goal"))
         self.assertEqual(self.mesh.place(1), (0.0, 0.0, 0))
-        self.assertLessEqual(len(self.log.lines("drone 1 refuses a goal")), 2)
+        self.assertLessEqual(len(self.log.lines("drone 1 refused a goal")), 2)
         self.assertEqual(self.log.failures(), [])
 
 

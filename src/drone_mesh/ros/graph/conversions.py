@@ -1,14 +1,29 @@
-"""Between the package's own types and ROS messages."""
+"""Between the package's own types and ROS messages, in both directions."""
 
 from __future__ import annotations
+
+from typing import Protocol
 
 import rospy
 
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.interfaces import Location
-from drone_mesh.msg import DroneInfo
+from drone_mesh.msg import DroneInfo, MeshState, NodeState, RequestGatewayDroneFlight
 from drone_mesh.msg import Location as LocationMsg
+from drone_mesh.msg import MeshEvent as MeshEventMsg
+from drone_mesh.ros.graph import names
 from drone_mesh.srv import RequestGPSResponse
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+
+_NO_POSITION = (0.0, 0.0, 0.0)
+
+
+class PlaceMsg(Protocol):
+    """Any message or request with the fields of a place."""
+
+    latitude: float  # m, y
+    longitude: float  # m, x
+    height: int  # m, of the drone's underside
 
 
 def ros_time(seconds: float) -> rospy.Time:
@@ -16,9 +31,17 @@ def ros_time(seconds: float) -> rospy.Time:
     return rospy.Time(0, round(seconds * 1e9))
 
 
+# Places -----------------------------------------------------------------------------------------
+
+
 def whole_metres(height: float) -> int:
     """A height as the int16 fields carry it."""
     return round(height)
+
+
+def location_of(message: PlaceMsg) -> Location:
+    """The place in a message."""
+    return Location(message.latitude, message.longitude, float(message.height))
 
 
 def location_msg(latitude: float, longitude: float, height: float) -> LocationMsg:
@@ -27,10 +50,76 @@ def location_msg(latitude: float, longitude: float, height: float) -> LocationMs
 
 
 def gps_response(location: Location) -> RequestGPSResponse:
-    """Where a drone's underside is."""
+    """The position of a drone's underside, its height rounded to whole metres."""
     return RequestGPSResponse(location.latitude, location.longitude, whole_metres(location.height))
 
 
+def flight_order(node_id: int, goal: Location) -> RequestGatewayDroneFlight:
+    """The DroneManager's order to the gateways, its height rounded to whole metres."""
+    return RequestGatewayDroneFlight(
+        node_id, goal.latitude, goal.longitude, whole_metres(goal.height)
+    )
+
+
+# DroneInfo (docs/protocol.md, "Who speaks in DroneInfo") ----------------------------------------
+
+
 def engine_info(node_id: int, position: Vector) -> DroneInfo:
-    """The DroneInfo of an engine (docs/protocol.md, "Who speaks in DroneInfo")."""
+    """The DroneInfo of an engine: always a position, never a topic."""
     return DroneInfo(nodeID=node_id, position=position, sub="", on=True)
+
+
+def antenna_info(node_id: int, topic: str, on: bool) -> DroneInfo:
+    """The DroneInfo of an antenna: always a topic, never a position."""
+    return DroneInfo(nodeID=node_id, position=_NO_POSITION, sub=topic, on=on)
+
+
+# State and events -------------------------------------------------------------------------------
+
+
+def event_msg(event: EventRecord) -> MeshEventMsg:
+    """An event as a message."""
+    return MeshEventMsg(
+        stamp=ros_time(event.stamp_s),
+        node=event.node,
+        kind=event.kind,
+        peers=bytes(event.peers),
+        detail=event.detail,
+    )
+
+
+def event_record(message: MeshEventMsg) -> EventRecord:
+    """The event in a message."""
+    return EventRecord(
+        message.stamp.to_sec(), message.node, message.kind, tuple(message.peers), message.detail
+    )
+
+
+def state_msg(mesh: MeshStatus) -> MeshState:
+    """The message; nodes that are messages already are taken as they are."""
+    message = MeshState(
+        max_distance=mesh.max_distance,
+        real_time_factor=mesh.real_time_factor,
+        achieved_real_time_factor=mesh.achieved_real_time_factor,
+        paused=mesh.paused,
+        nodes=[node if isinstance(node, NodeState) else _node_msg(node) for node in mesh.nodes],
+    )
+    message.header.stamp = ros_time(mesh.stamp_s)
+    message.header.frame_id = names.MAP_FRAME
+    return message
+
+
+def mesh_status(message: MeshState) -> MeshStatus:
+    """The state in a message, whose nodes it shares."""
+    return MeshStatus(
+        message.header.stamp.to_sec(),
+        message.nodes,
+        message.max_distance,
+        message.real_time_factor,
+        message.achieved_real_time_factor,
+        message.paused,
+    )
+
+
+def _node_msg(node: NodeStatus) -> NodeState:
+    return NodeState(**{name: getattr(node, name) for name in NodeState.__slots__})

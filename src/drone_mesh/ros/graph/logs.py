@@ -1,4 +1,4 @@
-"""Logging: the bridge from `logging` to /rosout, and lines that may not flood it."""
+"""Logging: the bridge from `logging` to /rosout, and throttled lines."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COMPLAINT_PERIOD_S = 10.0  # our choice: one line per reason in this (wall) time
 
 
 def show_library_logs_on_rosout() -> None:
-    """Call once, after rospy.init_node(): what drone_mesh logs appears where rospy's logs do."""
+    """Call once, after rospy.init_node(): logs of drone_mesh then appear where rospy's do."""
     rosout = logging.getLogger("rosout")
     library = logging.getLogger("drone_mesh")
     library.handlers = list(rosout.handlers)
@@ -20,30 +20,30 @@ def show_library_logs_on_rosout() -> None:
 
 
 class ThrottledLog:
-    """Counts what goes wrong, by reason, and says it once per period. Any thread."""
+    """Counts complaints by reason, and logs each reason once per period. Any thread."""
 
     def __init__(self, log: logging.Logger, period_s: float = COMPLAINT_PERIOD_S) -> None:
         self._log = log
         self._period_s = period_s
-        self._said_s: dict[str, float] = {}
+        self._logged_s: dict[str, float] = {}
         self._lock = threading.Lock()  # guards the two dictionaries
         self.counts: Counter[str] = Counter()
 
     def warning(self, reason: str, text: str) -> None:
-        """Count `reason`, and log it with `text` unless that was done a short while ago."""
-        self._say(logging.WARNING, reason, text)
+        """Count `reason`, and log it with `text` unless it was logged a short while ago."""
+        self._complain(logging.WARNING, reason, text)
 
     def error(self, reason: str, text: str) -> None:
         """As warning, at level error."""
-        self._say(logging.ERROR, reason, text)
+        self._complain(logging.ERROR, reason, text)
 
-    def _say(self, level: int, reason: str, text: str) -> None:
+    def _complain(self, level: int, reason: str, text: str) -> None:
         now_s = time.monotonic()
         with self._lock:
             self.counts[reason] += 1
             count = self.counts[reason]
-            said_s = self._said_s.get(reason)
-            if said_s is not None and now_s - said_s < self._period_s:
+            logged_s = self._logged_s.get(reason)
+            if logged_s is not None and now_s - logged_s < self._period_s:
                 return
-            self._said_s[reason] = now_s
+            self._logged_s[reason] = now_s
         self._log.log(level, "%s: %s (%d so far)", reason, text, count)

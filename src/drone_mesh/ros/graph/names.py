@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 SIGNAL_TOPIC = "/WirelessSignalSimulator"  # DroneInfo: every engine and antenna -> simulator
-SIGNAL_QUEUE = 4096  # DroneInfo that may wait for a simulator that is slow; the oldest is dropped
+SIGNAL_QUEUE = 4096  # DroneInfo that may wait for a slow simulator; the oldest is dropped
 MESSAGE_SERVICE = "/SignalSimulator/message"
-MESSAGES_SERVICE = "/SignalSimulator/messages"  # ours: one call instead of one per packet
 OTHERS_IN_RANGE_SERVICE = "/SignalSimulator/othersinRange"
-BROADCAST_SERVICE = "/SignalSimulator/broadcast"  # ours: one call instead of one per neighbour
+# Additions: one call instead of one per packet or per neighbour.
+MESSAGES_SERVICE = "/SignalSimulator/messages"
+BROADCAST_SERVICE = "/SignalSimulator/broadcast"
 
 GATEWAY_TOPIC = "/gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
 REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"
 SET_TO_CASUS_SERVICE = "/DroneManager/SetToCasus"
 
 CLOCK_TOPIC = "/clock"
-FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the factor reached, once a second
+FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the factor achieved, once a second
 SPEED_SERVICE = "/DroneFactory/setSpeed"  # SetSpeed
-PROGRESS_TOPIC = "/mesh/progress"  # Header: how far a host in another process has worked
-FLEET_PARAM = "/drone_mesh/fleet"  # what hosts in other processes need to know; set by the factory
+PROGRESS_TOPIC = "/mesh/progress"  # Header: up to when a host in another process has done its work
+FLEET_PARAM = "/drone_mesh/fleet"  # the factory's configuration, for hosts in other processes
 
 REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
 STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> people

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+import logging
 import signal
+import sys
 import threading
 from types import FrameType
 
 import rospy
 
-FINISH_TIMEOUT_S = 3.0  # our choice: `rosnode kill` waits so long (wall) for our threads
+FINISH_TIMEOUT_S = 3.0  # our choice: `rosnode kill` waits this long (wall) for our threads
+
+
+_log = logging.getLogger(__name__)
 
 
 class OrderlyStop:
     """Around everything that a node does, after init_node(..., disable_signals=True).
 
-    rospy would close all topics as soon as Ctrl-C is pressed, under the hands of threads that still
-    publish. Here SIGINT, SIGTERM and `rosnode kill` only ask the main thread to leave the `with`
-    block, in which it ends what it started; then ROS is shut down. Make it in the main thread.
+    rospy would close all topics as soon as Ctrl-C is pressed, while threads still publish. Here
+    SIGINT, SIGTERM and `rosnode kill` only ask the main thread to leave the `with` block, in which
+    it ends what it started; then ROS is shut down. After `fail` the program exits with code 1.
+    Make it in the main thread.
     """
 
     def __init__(self) -> None:
         self._requested = threading.Event()
         self._finished = threading.Event()
+        self._failed = False
 
     def __enter__(self) -> OrderlyStop:
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -29,9 +36,17 @@ class OrderlyStop:
         rospy.on_shutdown(self._on_shutdown)
         return self
 
-    def __exit__(self, *_exc: object) -> None:
+    def __exit__(self, *exc: object) -> None:
         self._finished.set()
         rospy.signal_shutdown("finished")
+        if self._failed and exc[0] is None:
+            sys.exit(1)
+
+    def fail(self, why: str) -> None:
+        """Log this error, leave, and exit with code 1. Any thread."""
+        _log.error("%s", why)
+        self._failed = True
+        self._requested.set()
 
     def requested(self) -> bool:
         """Whether it is time to leave. Any thread."""
@@ -45,6 +60,6 @@ class OrderlyStop:
         self._requested.set()
 
     def _on_shutdown(self) -> None:
-        """In the thread of rospy that was told to end, before ROS is torn down."""
+        """In the thread of rospy that shuts the node down, before its topics are closed."""
         self._requested.set()
         self._finished.wait(FINISH_TIMEOUT_S)

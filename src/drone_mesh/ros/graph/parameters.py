@@ -1,4 +1,4 @@
-"""The private parameters of our nodes: the launch arguments, over the file that ~config names."""
+"""The private parameters of our nodes: launch arguments over the file in ~config."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Result = TypeVar("Result")
 
 
 def or_stop(read: Callable[[], Result]) -> Result:
-    """What `read` returns; a ConfigurationError ends the program with the one line it says."""
+    """The result of `read`; a ConfigurationError ends the program with its one line and code 1."""
     try:
         return read()
     except ConfigurationError as error:
@@ -27,7 +27,7 @@ def or_stop(read: Callable[[], Result]) -> Result:
 
 
 def factory_configuration(*keys: str) -> FactoryConfiguration:
-    """The configuration file, overruled by those of the private parameters `keys` that are set.
+    """The configuration file, overridden by those private parameters in `keys` that are set.
 
     Raises ConfigurationError.
     """
@@ -36,7 +36,7 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
 
 
 def manager_layouts() -> Layouts:
-    """The layouts of the DroneManager, from the file that its parameter names.
+    """The layouts of the DroneManager, from the file in its parameter.
 
     Raises ConfigurationError.
     """
@@ -45,7 +45,7 @@ def manager_layouts() -> Layouts:
 
 
 def file_parameter(name: str, default: str) -> Path:
-    """The file that parameter `name` tells; by default `default` in the package's config folder."""
+    """The file in parameter `name`; by default `default` in the package's config folder."""
     given = str(rospy.get_param(f"~{name}", ""))
     if given:
         return Path(given).expanduser()

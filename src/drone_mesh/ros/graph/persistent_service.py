@@ -18,21 +18,21 @@ from rospy.impl.validators import ParameterInvalid
 
 from drone_mesh.errors import MeshError
 
-CALL_TIMEOUT_S = 2  # our choice: who does not answer in this time (wall seconds) is gone
+CALL_TIMEOUT_S = 2  # our choice: a service that does not answer in this time (wall seconds) is gone
 _READ_BYTES = 4096  # more than any answer here
 # TCPROS (wiki.ros.org/ROS/TCPROS): a request is its length and its fields; an answer the same,
 # after a byte that is 0 when a text that says what went wrong follows instead.
 _REQUEST_HEAD = struct.Struct("<I")
 _ANSWER_HEAD = struct.Struct("<BI")
-_ROSPYS_WORDS = "service cannot process request: "  # before what a service of rospy says itself
+_PREFIX = "service cannot process request: "  # which rospy puts before a service's own text
 
 
 class ServiceGone(MeshError):
-    """Nobody answers. The connection is closed; connect() again when there is hope."""
+    """The service does not answer. The connection is closed; connect() tries again."""
 
 
 class ServiceRefused(MeshError):
-    """The service is there and answered with an error; the message is what it said."""
+    """The service answered with an error; the message is its text."""
 
 
 Request = TypeVar("Request", bound=Message)
@@ -49,10 +49,10 @@ class ServiceClass(Protocol[Request, Response]):
 class PersistentService(Generic[Request, Response]):
     """One connection to one service.
 
-    rospy's ServiceProxy makes the connection, but has no timeout for calls, says only in words
-    whether the other end is gone, and its calls cost three times as much: they are made here.
+    rospy makes the connection. Calls are made here: those of rospy's ServiceProxy have no timeout,
+    report a lost connection only in words, and cost three times as much.
 
-    `connect` and `close` may be called by another thread than `call`, but not during a call.
+    Another thread than that of `call` may call `connect` and `close`, but not during a call.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class PersistentService(Generic[Request, Response]):
         return self._response_class().deserialize(self.call_bytes(fields.getvalue()))
 
     def call_bytes(self, fields: bytes) -> bytes:
-        """The answer's fields to a request of these fields, both as ROS serialises them."""
+        """The fields of the answer to these fields of a request, both as ROS serialises them."""
         transport = self._transport
         if transport is None:
             raise ServiceGone(f"{self.name}: not connected")
@@ -111,8 +111,8 @@ class PersistentService(Generic[Request, Response]):
             self.close()
             raise ServiceGone(f"{self.name}: {error}") from error
         if not ok:
-            said = answer.decode("utf-8", "replace")
-            raise ServiceRefused(said.replace(_ROSPYS_WORDS, "", 1))
+            text = answer.decode("utf-8", "replace")
+            raise ServiceRefused(text.replace(_PREFIX, "", 1))
         return answer
 
     def close(self) -> None:

@@ -15,25 +15,25 @@ from drone_mesh.ros.graph import names
 from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
 
 DEBUG_PERIOD_S = 1.0  # docs/protocol.md, "Topics"
-SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers at the latest after this (wall) time
+SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers within this wall time
 _MAX_UINT16 = 0xFFFF
 
 _log = logging.getLogger(__name__)
 
 
 class AntennaPanel:
-    """What people can see and touch of one antenna, whatever kind of radio it is.
+    """The ROS controls of one antenna, whatever kind of radio it has.
 
     Publishes: /Nodes/<id>/debug (NodeDebugInfo), 1 Hz of simulated time with debugging on
     Services:  /Nodes/<id>/powerSwitch (PowerSwitch)
 
-    The switch is worked in a thread of rospy; everything else is for the executor's worker.
+    The switch is handled in a thread of rospy; everything else is for the executor's worker.
     """
 
     def __init__(
         self, node_id: int, seat: Seat, is_on: Callable[[], bool], switch: Callable[[bool], None]
     ) -> None:
-        """`switch` is called in a thread of rospy, and hands what the node has to do to `seat`."""
+        """`switch` is called in a thread of rospy, and submits the node's part to `seat`."""
         self._node_id = node_id
         self._seat = seat
         self._is_on = is_on
@@ -49,13 +49,13 @@ class AntennaPanel:
         )
 
     def stop(self) -> None:
-        """Leave the ROS graph. Called twice, nothing changes."""
+        """Withdraw the switch. A second call changes nothing."""
         if self._service is not None:
             self._service.shutdown()
             self._service = None
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Start or stop to publish NodeDebugInfo."""
+        """Start or stop publishing NodeDebugInfo."""
         if self._stop_debugging is not None and self._publisher is not None:
             self._stop_debugging()
             self._publisher.unregister()
@@ -87,5 +87,8 @@ class AntennaPanel:
             done = threading.Event()
             self._seat.submit(lambda _now_s: done.set())
             if not done.wait(SWITCH_TIMEOUT_S):
-                _log.warning("node %d: switched, but the node has not noticed yet", self._node_id)
+                _log.warning(
+                    "node %d: antenna switched, but the node is too busy to react yet",
+                    self._node_id,
+                )
         return PowerSwitchResponse()

@@ -1,4 +1,4 @@
-"""RosDroneEngineConnector: a mesh component's way to the engine of its drone."""
+"""RosDroneEngineConnector: connects a mesh component to the engine of its drone."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import LocationUnknown
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import location_msg
+from drone_mesh.ros.graph.conversions import location_msg, location_of
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
 from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
 
-CONNECT_AGAIN_AFTER_S = 1.0  # our choice: wall seconds; asking costs the worker's time
+CONNECT_AGAIN_AFTER_S = 1.0  # our choice: wall seconds; a request costs the worker's time
 
 _log = logging.getLogger(__name__)
 
@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 class RosDroneEngineConnector(IDroneEngine):
     """Publishes /Drones/<id>/goal (Location), calls /Drones/<id>/gps (RequestGPS).
 
-    Belongs to the executor's worker. The connection is kept, and made anew when it is needed.
+    Belongs to the executor's worker. The connection is kept, and reopened when needed.
     """
 
     def __init__(self, node_id: int) -> None:
@@ -33,35 +33,35 @@ class RosDroneEngineConnector(IDroneEngine):
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
         self._gone_until_s = -math.inf  # monotonic
         self._complaints = ThrottledLog(_log)
-        # Latched: an order may come before rospy has connected to the engine, and must not be lost.
+        # Latched: an order that comes before rospy has connected to the engine must not be lost.
         self._goal = rospy.Publisher(
             names.goal_topic(node_id), LocationMsg, queue_size=10, latch=True
         )
 
     def connect(self) -> None:
-        """Connect before it is needed, so that the number of connections stays what it is."""
+        """Connect before the first request, so that the number of connections stays constant."""
         try:
             self._gps.connect()
         except ServiceGone as error:
             _log.debug("drone %d: %s", self._node_id, error)
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there (metres); the height is rounded to whole metres, as its field is."""
+        """Fly there (metres); the height is rounded to whole metres, as its field requires."""
         self._goal.publish(location_msg(latitude, longitude, height))
 
     def get_location(self) -> Location:
-        """Where the engine says that it is. Raises LocationUnknown when nobody answers."""
+        """The position that the engine reports. Raises LocationUnknown when it does not answer."""
         try:
             answer = self._ask()
         except (ServiceGone, ServiceRefused) as error:
             self._complaints.warning(f"drone {self._node_id} has no position", str(error))
             raise LocationUnknown(str(error)) from error
-        return Location(answer.latitude, answer.longitude, float(answer.height))
+        return location_of(answer)
 
     def _ask(self) -> RequestGPSResponse:
         if not self._gps.is_connected():
             if time.monotonic() < self._gone_until_s:
-                raise ServiceGone(f"{self._gps.name}: nobody answered a moment ago")
+                raise ServiceGone(f"{self._gps.name}: no answer a moment ago")
             try:
                 self._gps.connect()
             except ServiceGone:

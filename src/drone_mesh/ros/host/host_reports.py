@@ -1,4 +1,4 @@
-"""HostReports: what a process that hosts nodes tells about them, to whoever puts it together."""
+"""HostReports: what a process reports about the nodes that it hosts."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.msg import HostReport, NodeState
-from drone_mesh.msg import MeshEvent as MeshEventMsg
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import ros_time
+from drone_mesh.ros.graph.conversions import event_msg, ros_time
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.observation import describe_component
 
 REPORT_PERIOD_S = 0.5  # wall time; our choice: an event is seen soon
 REPORT_PERIOD_PER_NODE_S = 0.004  # our choice: 254 nodes with 200 neighbours each, once a second
-NEVER_MIND_QUEUE = 4  # reports that may wait for a slow reader; each one is complete in itself
+REPORTS_QUEUE = 4  # reports that may wait for a slow subscriber; each one is complete in itself
 
 _log = logging.getLogger(__name__)
 
@@ -39,9 +38,7 @@ class HostReports:
         self._hosted: list[tuple[NodeState, MeshnetworkComponent, Callable[[], bool]]] = []
         self._batcher = EventBatcher()
         self._complaints = ThrottledLog(_log)
-        self._publisher = rospy.Publisher(
-            names.REPORTS_TOPIC, HostReport, queue_size=NEVER_MIND_QUEUE
-        )
+        self._publisher = rospy.Publisher(names.REPORTS_TOPIC, HostReport, queue_size=REPORTS_QUEUE)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="host reports", daemon=True)
 
@@ -53,22 +50,22 @@ class HostReports:
         self._hosted.append((state, component, antenna_on))
 
     def observe(self, event: MeshEvent) -> None:
-        """The observer that the components of this process are given."""
+        """The observer of all components of this process."""
         self._batcher.observe(event)
 
     def start(self) -> None:
-        """Begin to report."""
+        """Start reporting."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Report no more; returns when the thread has ended."""
+        """Stop reporting; returns when the thread has ended."""
         self._stopped.set()
         self._thread.join()
         self._publisher.unregister()
 
     def _run(self) -> None:
         while not (self._stopped.wait(self._period_s()) or rospy.is_shutdown()):
-            # Nobody would get the events now; they wait until somebody does.
+            # Without a subscriber the events would be lost; they wait for one.
             if self._publisher.get_num_connections():
                 self._report()
 
@@ -82,23 +79,14 @@ class HostReports:
         for state, component, antenna_on in list(self._hosted):
             try:
                 describe_component(state, component, antenna_on(), now_s)
-            except Exception as error:  # of a routing technique whose tables change meanwhile
+            except Exception as error:  # a routing technique whose tables change meanwhile
                 self._complaints.warning(
                     "a node could not be described", f"node {state.id}: {error!r}"
                 )
             report.nodes.append(state)
-        report.events = [
-            MeshEventMsg(
-                stamp=ros_time(event.stamp_s),
-                node=event.node,
-                kind=event.kind,
-                peers=bytes(event.peers),
-                detail=event.detail,
-            )
-            for event in self._batcher.take()
-        ]
+        report.events = [event_msg(event) for event in self._batcher.take()]
         try:
             self._publisher.publish(report)
-        except rospy.ROSException:  # what publishing raises while the node shuts down
+        except rospy.ROSException:  # the topic was closed: the node shuts down
             if not rospy.is_shutdown():
                 raise

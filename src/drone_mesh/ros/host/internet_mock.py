@@ -1,4 +1,4 @@
-"""RosInternetMock: what a gateway has instead of the internet."""
+"""RosInternetMock: a ROS topic in place of a gateway's internet."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from drone_mesh.errors import GoalRefused
 from drone_mesh.execution import Seat
 from drone_mesh.msg import RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import location_of
 
 _log = logging.getLogger(__name__)
 
@@ -18,7 +19,7 @@ _log = logging.getLogger(__name__)
 class RosInternetMock(IInternetConnection):
     """Subscribes /gateway (RequestGatewayDroneFlight), and hands each order to its gateway.
 
-    `connect` and `disconnect` are for the executor's worker, to which orders are handed over.
+    `connect` and `disconnect` are for the executor's worker, to which orders are submitted.
     """
 
     def __init__(self, node_id: int, seat: Seat) -> None:
@@ -28,7 +29,7 @@ class RosInternetMock(IInternetConnection):
         self._subscriber: rospy.Subscriber | None = None
 
     def connect(self, commands: IGatewayCommands) -> None:
-        """Subscribe; what arrives goes to `commands`."""
+        """Subscribe; orders go to `commands`."""
 
         def order(request: RequestGatewayDroneFlight) -> None:
             self._seat.submit(lambda now_s: self._order(commands, request, now_s))
@@ -47,11 +48,13 @@ class RosInternetMock(IInternetConnection):
     def _order(
         self, commands: IGatewayCommands, request: RequestGatewayDroneFlight, now_s: float
     ) -> None:
-        place = (request.latitude, request.longitude, request.height)
+        goal = location_of(request)
         try:
-            taken = commands.send_goal_request_to_drone(request.ID, *place, now_s)
+            taken = commands.send_goal_request_to_drone(
+                request.ID, request.latitude, request.longitude, request.height, now_s
+            )
         except GoalRefused as error:
             _log.warning("gateway %d: order for drone %d: %s", self._node_id, request.ID, error)
             return
         if taken:
-            _log.info("gateway %d: drone %d is sent to %s", self._node_id, request.ID, place)
+            _log.info("gateway %d sent drone %d to %s", self._node_id, request.ID, goal.in_words())

@@ -1,84 +1,47 @@
-"""SimulatorLink: the way of all antennas of one process to the WirelessSignalSimulator."""
+"""SimulatorLink: connects all antennas of a process to the WirelessSignalSimulator."""
 
 from __future__ import annotations
 
 import logging
-import struct
 import threading
-from typing import Callable, NamedTuple, Protocol, Sequence
+from typing import Sequence
 
 import rospy
 
-from drone_mesh.communication.messages import MessageType, packet, receiver, sender
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone, ServiceRefused
-from drone_mesh.srv import Broadcast, WirelessMessage, WirelessMessages
+from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused
+from drone_mesh.ros.host.announcements import Announcements, probe_of
+from drone_mesh.ros.host.simulator_connection import SimulatorConnection
 
 LOOK_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
-ANNOUNCE_AGAIN_AFTER = 20  # looks; our choice: an antenna not yet registered speaks up again
-_NO_PLACE = (0.0, 0.0, 0.0)  # an antenna sends no position (docs/protocol.md, "Virtual antenna")
-
-_LENGTH = struct.Struct("<I")  # of an array, as ROS serialises it
+ANNOUNCE_AGAIN_AFTER = 20  # looks; our choice: an unregistered antenna is announced again
 
 _log = logging.getLogger(__name__)
 
 
-class Antenna(Protocol):
-    """What the link has to know of an antenna."""
-
-    node_id: int
-
-    def on(self) -> bool:
-        """Whether it has power."""
-
-
-class _Services(NamedTuple):
-    """Connections to one simulator."""
-
-    message: PersistentService
-    messages: PersistentService
-    broadcast: PersistentService
-
-    def close(self) -> None:
-        for service in self:
-            service.close()
-
-
-def probe_of(node_id: int) -> bytes:
-    """The packet that an antenna sends to itself, to see whether a simulator knows it."""
-    return packet(MessageType.NOTDEFINED, node_id, node_id, node_id, node_id)
-
-
-def _hand_over(services: _Services, payload: bytes) -> bool:
-    """Call `message`: the fields of its request and response, which are bytes all of them."""
-    fields = bytes((sender(payload), receiver(payload))) + payload
-    return services.message.call_bytes(fields) != b"\0"
-
-
 class SimulatorLink(rospy.SubscribeListener):
-    """Shared by all antennas of a process. Publishes /WirelessSignalSimulator (DroneInfo).
+    """Finds a simulator, announces the antennas to it, and hands packets over.
 
-    Three threads meet here. The executor's worker sends. The link's own thread connects, for that
-    may take long: while nobody is there, a send fails at once. Threads of rospy tell of new
-    subscribers. `_services` is replaced as a whole; `_lock` guards that, the antennas, and which of
-    them the simulator does not have yet. It is not held while something is sent.
+    Publishes: /WirelessSignalSimulator (DroneInfo)
+    Calls:     /SignalSimulator/message, messages, broadcast, othersinRange
+
+    Three threads meet here. The executor's worker sends. The link's own thread connects, which may
+    take long: meanwhile a send fails at once. Threads of rospy report new subscribers.
+    `_connection` is replaced as a whole, under `_lock`.
     """
 
     def __init__(self, executor: MeshExecutor) -> None:
         self._executor = executor
-        self._services: _Services | None = None
+        self._connection: SimulatorConnection | None = None
         self._lock = threading.Lock()
-        self._antennas: dict[int, Antenna] = {}
-        self._on_registered: dict[int, Callable[[], None]] = {}
-        self._unregistered: set[int] = set()
         self._complaints = ThrottledLog(_log)
         self._look = threading.Event()
         self._stopping = False
         self._never_handed_over = 0  # written by the executor's worker
-        self._probing = False  # the worker has been asked to probe, and has not done it yet
+        self._probing = False  # the worker has been asked to probe, and has not done so yet
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC,
             DroneInfo,
@@ -86,6 +49,7 @@ class SimulatorLink(rospy.SubscribeListener):
             tcp_nodelay=True,
             queue_size=names.SIGNAL_QUEUE,
         )
+        self.antennas = Announcements(self._publisher.publish)
         self._thread = threading.Thread(target=self._keep_connected, name="simulator_link")
 
     def start(self) -> None:
@@ -101,125 +65,65 @@ class SimulatorLink(rospy.SubscribeListener):
 
     @property
     def never_handed_over(self) -> int:
-        """Packets, since the start, that no simulator took."""
+        """Packets, since the start, that no simulator accepted."""
         return self._never_handed_over
 
     @property
     def connected(self) -> bool:
         """Whether packets can be handed to a simulator."""
-        return self._services is not None
-
-    # Antennas, any thread --------------------------------------------------------------------
-
-    def add(self, antenna: Antenna, on_registered: Callable[[], None]) -> None:
-        """Announce this antenna to each simulator; `on_registered` each time one knows it.
-
-        That is: when the antenna's own packet came back from there. Called by any thread.
-        """
-        with self._lock:
-            self._antennas[antenna.node_id] = antenna
-            self._on_registered[antenna.node_id] = on_registered
-            self._unregistered.add(antenna.node_id)
-        self.announce(antenna)
-
-    def remove(self, antenna: Antenna) -> None:
-        """Forget this antenna. Not known: nothing changes."""
-        with self._lock:
-            self._antennas.pop(antenna.node_id, None)
-            self._on_registered.pop(antenna.node_id, None)
-            self._unregistered.discard(antenna.node_id)
-
-    def announce(self, antenna: Antenna) -> None:
-        """Tell the simulator where this antenna listens, and whether it has power."""
-        topic = names.node_topic(antenna.node_id)
-        self._publisher.publish(DroneInfo(antenna.node_id, _NO_PLACE, topic, antenna.on()))
-
-    def probe_returned(self, node_id: int) -> None:
-        """An antenna received its own probe: the simulator knows it. Again: nothing changes."""
-        with self._lock:
-            if node_id not in self._unregistered:
-                return
-            self._unregistered.discard(node_id)
-            on_registered = self._on_registered[node_id]
-        on_registered()
+        return self._connection is not None
 
     # Packets, the executor's worker ----------------------------------------------------------
 
     def send(self, payload: bytes) -> bool:
-        """Hand a packet to the node in its byte 3; True: it has it."""
-        services = self._services
-        if services is None:
-            self._complaints.error("packet not sent", "no simulator")
-            self._never_handed_over += 1
-            return False
+        """Hand over a packet for the node in its byte 3; True: that node has it."""
+        return self.send_all((payload,))[0]
+
+    def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
+        """Hand over packets of one sender; for each whether the node in its byte 3 has it."""
+        connection = self._connection
+        if connection is None:
+            if payloads:
+                self._complaints.error("packet not sent", "no simulator")
+                self._never_handed_over += len(payloads)
+            return [False] * len(payloads)
         try:
-            return _hand_over(services, payload)
+            if len(payloads) > 1:
+                return connection.send_all(payloads)
+            return [connection.send(payload) for payload in payloads]
         except ServiceRefused as error:
             self._complaints.warning("packet refused", str(error))
         except ServiceGone as error:
-            self._never_handed_over += 1
-            self._lost(services, error)
-        return False
-
-    def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
-        """Hand packets of one node to the nodes in their byte 3; for each whether that has it."""
-        services = self._services
-        if services is None or not payloads:
-            return [self.send(payload) for payload in payloads]
-        packets = b"".join(payloads)
-        # The fields of a WirelessMessagesRequest.
-        fields = bytes((sender(payloads[0]),)) + _LENGTH.pack(len(packets)) + packets
-        try:
-            answer = services.messages.call_bytes(fields)
-        except ServiceRefused as error:
-            self._complaints.warning("packets refused", str(error))
-        except ServiceGone as error:
             self._never_handed_over += len(payloads)
-            self._lost(services, error)
-        else:
-            return [bool(taken) for taken in answer[_LENGTH.size :]]
+            self._lost(connection, error)
         return [False] * len(payloads)
 
     def broadcast(self, payload: bytes) -> None:
-        """Hand a packet to everybody in range of the node in its byte 1."""
-        services = self._services
-        if services is None:
+        """Hand over a packet for every node in range of the sender in its byte 1."""
+        connection = self._connection
+        if connection is None:
             self._complaints.error("packet not sent", "no simulator")
             self._never_handed_over += 1
             return
         try:
-            # The fields of a BroadcastRequest.
-            services.broadcast.call_bytes(bytes((sender(payload),)) + payload)
+            connection.broadcast(payload)
         except ServiceRefused:
-            # The simulator is new, and will hear of this antenna in a moment: no line in the log.
+            # A new simulator, to which this antenna is announced in a moment: no line in the log.
             self._complaints.counts["broadcast refused"] += 1
         except ServiceGone as error:
             self._never_handed_over += 1
-            self._lost(services, error)
-
-    def _lost(self, services: _Services, error: ServiceGone) -> None:
-        if rospy.is_shutdown():
-            return
-        with self._lock:
-            if self._services is not services:
-                return
-            self._services = None
-        self._executor.submit(lambda _now_s: services.close())  # not while the worker is in a call
-        _log.error("the simulator is gone: %s", error)
-        self._look.set()
+            self._lost(connection, error)
 
     def _probe(self, _now_s: float) -> None:
-        """Let each antenna that the simulator may not have yet send a packet to itself."""
+        """Send the probe of each antenna that the simulator may not have registered yet."""
         self._probing = False
-        services = self._services
-        if services is None:
+        connection = self._connection
+        if connection is None:
             return
-        with self._lock:
-            antennas = [self._antennas[node_id] for node_id in self._unregistered]
-        for antenna in antennas:
+        for antenna in self.antennas.unregistered():
             if antenna.on():
                 try:
-                    _hand_over(services, probe_of(antenna.node_id))
+                    connection.send(probe_of(antenna.node_id))
                 except (ServiceGone, ServiceRefused) as error:
                     _log.debug("probe of node %d: %s", antenna.node_id, error)
                     return
@@ -231,15 +135,15 @@ class SimulatorLink(rospy.SubscribeListener):
         while not self._stopping and not rospy.is_shutdown():
             self._look.wait(LOOK_PERIOD_S)
             self._look.clear()
-            services = self._services
-            if services is not None and not all(service.is_connected() for service in services):
-                self._lost(services, ServiceGone("it closed its connections"))
-            if self._services is None:
+            connection = self._connection
+            if connection is not None and not connection.is_connected():
+                self._lost(connection, ServiceGone("it closed its connections"))
+            if self._connection is None:
                 self._try_to_connect()
-            if self._services is not None and self._unregistered:
+            if self._connection is not None and self.antennas.unregistered():
                 looks += 1
                 if looks % ANNOUNCE_AGAIN_AFTER == 0:
-                    self._announce(unregistered_only=True)
+                    self.antennas.announce_unregistered()
                 if not self._probing:
                     self._probing = True
                     self._executor.submit(self._probe)
@@ -247,30 +151,32 @@ class SimulatorLink(rospy.SubscribeListener):
     def _try_to_connect(self) -> None:
         if self._publisher.get_num_connections() == 0:
             return
-        services = _Services(
-            PersistentService(names.MESSAGE_SERVICE, WirelessMessage),
-            PersistentService(names.MESSAGES_SERVICE, WirelessMessages),
-            PersistentService(names.BROADCAST_SERVICE, Broadcast),
-        )
         try:
-            for service in services:
-                service.connect()
+            connection = SimulatorConnection()
         except ServiceGone as error:
             _log.debug("no simulator yet: %s", error)
             return
         with self._lock:
-            self._unregistered.update(self._on_registered)
-            self._services = services
-        self._announce(unregistered_only=False)
-        _log.info("connected to the simulator; %d antennas announced", len(self._antennas))
+            self._connection = connection
+        self.antennas.announce_all_to_new_simulator()
+        if len(self.antennas):
+            _log.info("connected to the simulator; announced %d antennas", len(self.antennas))
+        else:
+            _log.info("connected to the simulator")
 
-    def _announce(self, unregistered_only: bool) -> None:
+    def _lost(self, connection: SimulatorConnection, error: ServiceGone) -> None:
+        if rospy.is_shutdown():
+            return
         with self._lock:
-            node_ids = self._unregistered if unregistered_only else self._antennas
-            antennas = [self._antennas[node_id] for node_id in node_ids]
-        for antenna in antennas:
-            self.announce(antenna)
+            if self._connection is not connection:
+                return
+            self._connection = None
+        self._executor.submit(lambda _now_s: connection.close())  # not during a call of the worker
+        _log.error("lost the simulator: %s", error)
+        self._look.set()
+
+    # A thread of rospy -----------------------------------------------------------------------
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
-        """Somebody subscribed, perhaps a new simulator (rospy's thread: must not take long)."""
+        """A new subscriber, perhaps a new simulator. rospy waits for this: only wake the thread."""
         self._look.set()

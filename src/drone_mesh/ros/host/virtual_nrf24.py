@@ -15,8 +15,9 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.execution import Seat
 from drone_mesh.msg import NRF24
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.host.announcements import probe_of
 from drone_mesh.ros.host.antenna_panel import AntennaPanel
-from drone_mesh.ros.host.simulator_link import SimulatorLink, probe_of
+from drone_mesh.ros.host.simulator_link import SimulatorLink
 
 
 class VirtualNRF24(IWirelessCommunication):
@@ -28,12 +29,12 @@ class VirtualNRF24(IWirelessCommunication):
     Services:   /Nodes/<id>/powerSwitch (PowerSwitch)
 
     The functions of the interface are for the executor's worker. The handlers run in threads of
-    rospy, and hand everything over to the worker; of theirs is only `_on`, a single flag, which
-    `_switching` keeps in step with what the simulator and the worker are told of it.
+    rospy, and hand everything over to the worker. They own only `_on`, a single flag; `_switching`
+    keeps the announcements and the worker's orders in the order of its changes.
     """
 
     def __init__(self, node_id: int, link: SimulatorLink, seat: Seat) -> None:
-        """`seat` is where the mesh component of this node is driven."""
+        """`seat` drives the mesh component of this node."""
         self.node_id = node_id
         self._probe = probe_of(node_id)
         self._link = link
@@ -45,28 +46,28 @@ class VirtualNRF24(IWirelessCommunication):
         self._panel = AntennaPanel(node_id, seat, self.on, self._switch_power)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Power on, subscribe, announce; the simulator need not be there yet."""
+        """Power on, subscribe, announce; does not wait for a simulator."""
         self._mesh = mesh
         self._on = True
         self._subscriber = rospy.Subscriber(
             names.node_topic(self.node_id), NRF24, self._heard, tcp_nodelay=True
         )
         self._panel.start()
-        self._link.add(self, lambda: self._seat.submit(mesh.on_antenna_registered))
+        self._link.antennas.add(self, lambda: self._seat.submit(mesh.on_antenna_registered))
 
     def stop_antenna(self) -> None:
         """Power off, and leave the ROS graph."""
         if self._subscriber is None:
             return
         self._on = False
-        self._link.announce(self)
-        self._link.remove(self)
+        self._link.antennas.announce(self)
+        self._link.antennas.remove(self)
         self._subscriber.unregister()
         self._panel.stop()
         self._subscriber = self._mesh = None
 
     def send_message_to(self, payload: bytes) -> bool:
-        """To the node in byte 3. False: it did not get it, or there is no simulator."""
+        """To the node in byte 3. False: it did not receive it, or there is no simulator."""
         return self._on and self._link.send(payload)
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
@@ -74,12 +75,12 @@ class VirtualNRF24(IWirelessCommunication):
         return self._link.send_all(payloads) if self._on else [False] * len(payloads)
 
     def broadcast_message(self, payload: bytes) -> None:
-        """To everybody in range."""
+        """To every node in range."""
         if self._on:
             self._link.broadcast(payload)
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Start or stop to publish NodeDebugInfo."""
+        """Start or stop publishing NodeDebugInfo."""
         self._panel.debugging_mode(info, on)
 
     def on(self) -> bool:
@@ -91,7 +92,7 @@ class VirtualNRF24(IWirelessCommunication):
     def _heard(self, message: NRF24) -> None:
         payload = message.payload
         if payload == self._probe:
-            self._link.probe_returned(self.node_id)
+            self._link.antennas.probe_returned(self.node_id)
         elif self._on:
             self._seat.submit(lambda now_s: self._receive(payload, now_s))
 
@@ -104,5 +105,5 @@ class VirtualNRF24(IWirelessCommunication):
         if mesh is not None:
             with self._switching:  # announcing only puts into a queue
                 self._on = on
-                self._link.announce(self)
+                self._link.antennas.announce(self)
                 self._seat.submit(lambda now_s: mesh.on_antenna_power(on, now_s))

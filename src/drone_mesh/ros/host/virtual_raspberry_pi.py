@@ -4,31 +4,16 @@ from __future__ import annotations
 
 import abc
 import random
-from dataclasses import dataclass
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.observer import MeshObserver
-from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.execution import Seat
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.on_demand import http_internet
 from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.host.internet_mock import RosInternetMock
-
-
-@dataclass(frozen=True)
-class MeshSettings:
-    """What the mesh software of all nodes has in common."""
-
-    gateways: int  # ids below are gateways, the others routers
-    routing: str  # name of the routing technique
-    timing: MeshTiming
-    seed: int
-    debug: bool
-    observer: MeshObserver
-    internet: str  # "mock" or "http"
+from drone_mesh.ros.host.mesh_settings import MeshSettings
 
 
 class VirtualRaspberryPi(abc.ABC):

@@ -15,7 +15,7 @@ from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.msg import RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
-from drone_mesh.ros.graph.conversions import whole_metres
+from drone_mesh.ros.graph.conversions import flight_order, location_of
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import file_parameter, or_stop
 from drone_mesh.srv import (
@@ -58,7 +58,7 @@ class DroneManager:
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
         """Status 1: at least one gateway got the order; 0: there is none."""
-        goal = Location(request.latitude, request.longitude, request.height)
+        goal = location_of(request)
         try:
             check_goal(*goal)
         except GoalRefused as error:
@@ -84,10 +84,7 @@ class DroneManager:
         return CasusResponse()
 
     def _order(self, node_id: int, goal: Location) -> None:
-        height = whole_metres(goal.height)
-        self._gateways.publish(
-            RequestGatewayDroneFlight(node_id, goal.latitude, goal.longitude, height)
-        )
+        self._gateways.publish(flight_order(node_id, goal))
 
     def _gateway_is_there(self) -> bool:
         """Whether a gateway subscribes; waits a moment for one, since we may have just started."""

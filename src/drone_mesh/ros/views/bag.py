@@ -8,9 +8,8 @@ from typing import Iterator
 import rosbag
 
 from drone_mesh.errors import MeshError
-from drone_mesh.msg import MeshEvent
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.world.mesh_state import mesh_status
+from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.state.model import EventRecord, MeshStatus
 
 
@@ -30,13 +29,6 @@ def read_events(path: Path) -> Iterator[EventRecord]:
     with _open(path) as bag:
         for _topic, message, _time in bag.read_messages([names.EVENTS_TOPIC]):
             yield event_record(message)
-
-
-def event_record(message: MeshEvent) -> EventRecord:
-    """The message without ROS."""
-    return EventRecord(
-        message.stamp.to_sec(), message.node, message.kind, tuple(message.peers), message.detail
-    )
 
 
 def _open(path: Path) -> rosbag.Bag:

@@ -20,11 +20,10 @@ from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node, run_tool
+from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import manager_layouts
-from drone_mesh.ros.views.bag import event_record
 from drone_mesh.ros.views.console_controls import RosControls
-from drone_mesh.ros.world.mesh_state import mesh_status
 from drone_mesh.web.access import access_for, is_loopback
 
 LOOK_PERIOD_S = 1.0  # wall time between two looks at the master

@@ -10,8 +10,8 @@ import rospy
 from drone_mesh.errors import MeshError
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.views.bag import BagUnusable, read_states
-from drone_mesh.ros.world.mesh_state import mesh_status
 from drone_mesh.state.model import MeshStatus
 
 WAIT_S = 5.0  # wall time for a live state; it is latched, so it comes at once or not at all

@@ -13,8 +13,8 @@ import rospy
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, require_master, run_tool
+from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.views.look import WAIT_S, NoState, live_state, parse_with_bag, state_in_bag
-from drone_mesh.ros.world.mesh_state import mesh_status
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.table import mesh_table
 from drone_mesh.state.trouble import everybody_is_connected, find_trouble

@@ -18,13 +18,13 @@ from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
 
 INFO_PERIOD_S = 0.05  # at most 20 DroneInfo per simulated second
-_ROUNDING_S = 1e-6  # simulated time comes in hundredths, which floats do not hold exactly
+_ROUNDING_S = 1e-6  # simulated time moves in hundredths, which floats do not hold exactly
 
 _log = logging.getLogger(__name__)
 
 
 class PositionReporter(rospy.SubscribeListener):
-    """Tells every simulator where the drones are: one DroneInfo publisher for all of them.
+    """Reports the positions of all drones to every simulator, with one publisher.
 
     Publishes /WirelessSignalSimulator (DroneInfo). Any thread.
     """
@@ -34,18 +34,18 @@ class PositionReporter(rospy.SubscribeListener):
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
         )
-        # Listens only once there is a publisher to speak with; who came before is told here.
+        # Added once the publisher exists; the report below is for earlier subscribers.
         self._publisher.impl.add_subscriber_listener(self)
         self._report_all()
 
     def report(self, info: DroneInfo) -> None:
-        """To everybody who listens now."""
+        """To all present subscribers."""
         self._publisher.publish(info)
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
-        """Somebody new, perhaps a simulator that was restarted: tell where everybody is.
+        """A new subscriber, perhaps a simulator that was restarted: report all positions.
 
-        Tell everybody: what rospy offers for the new one alone is not safe beside other threads.
+        To all subscribers: rospy's way to reach the new one alone is not safe beside other threads.
         """
         self._report_all()
 
@@ -55,10 +55,10 @@ class PositionReporter(rospy.SubscribeListener):
 
 
 class EngineServer:
-    """Offers one drone's engine to others.
+    """Offers the engine of one drone.
 
     Subscribes: /Drones/<id>/goal (Location). Services: /Drones/<id>/gps (RequestGPS).
-    Goals and questions come in threads of rospy; `_moved` runs in the world's thread.
+    Goals and requests come in threads of rospy; `_moved` runs in the world's thread.
     """
 
     def __init__(self, drone: VirtualDrone, reporter: PositionReporter) -> None:
@@ -75,7 +75,7 @@ class EngineServer:
         try:
             self._engine.set_goal(goal.latitude, goal.longitude, goal.height)
         except GoalRefused as error:
-            self._complaints.warning(f"drone {self._node_id} refuses a goal", str(error))
+            self._complaints.warning(f"drone {self._node_id} refused a goal", str(error))
 
     def _gps(self, _request: RequestGPSRequest) -> RequestGPSResponse:
         return gps_response(self._engine.get_location())

@@ -1,0 +1,87 @@
+"""Announcements: the antennas of a process, and which of them the simulator has registered."""
+
+from __future__ import annotations
+
+import threading
+from typing import Callable, Protocol
+
+from drone_mesh.communication.messages import MessageType, packet
+from drone_mesh.msg import DroneInfo
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import antenna_info
+
+
+class Antenna(Protocol):
+    """An antenna as the simulator sees it."""
+
+    node_id: int
+
+    def on(self) -> bool:
+        """Whether it has power."""
+
+
+def probe_of(node_id: int) -> bytes:
+    """The packet that an antenna sends to itself: it returns if a simulator has registered it."""
+    return packet(MessageType.NOTDEFINED, node_id, node_id, node_id, node_id)
+
+
+class Announcements:
+    """Announces antennas to the simulator until their own probes return.
+
+    Any thread. `_lock` guards all fields, and is not held while something is published.
+    """
+
+    def __init__(self, publish: Callable[[DroneInfo], None]) -> None:
+        self._publish = publish
+        self._lock = threading.Lock()
+        self._antennas: dict[int, Antenna] = {}
+        self._on_registered: dict[int, Callable[[], None]] = {}
+        self._unregistered: set[int] = set()
+
+    def __len__(self) -> int:
+        return len(self._antennas)
+
+    def add(self, antenna: Antenna, on_registered: Callable[[], None]) -> None:
+        """Announce this antenna; `on_registered` is called each time a simulator registered it."""
+        with self._lock:
+            self._antennas[antenna.node_id] = antenna
+            self._on_registered[antenna.node_id] = on_registered
+            self._unregistered.add(antenna.node_id)
+        self.announce(antenna)
+
+    def remove(self, antenna: Antenna) -> None:
+        """Forget this antenna. Not known: nothing changes."""
+        with self._lock:
+            self._antennas.pop(antenna.node_id, None)
+            self._on_registered.pop(antenna.node_id, None)
+            self._unregistered.discard(antenna.node_id)
+
+    def announce(self, antenna: Antenna) -> None:
+        """Publish where this antenna listens, and whether it has power."""
+        topic = names.node_topic(antenna.node_id)
+        self._publish(antenna_info(antenna.node_id, topic, antenna.on()))
+
+    def announce_all_to_new_simulator(self) -> None:
+        """No antenna is registered any more: announce them all."""
+        with self._lock:
+            self._unregistered.update(self._antennas)
+        self.announce_unregistered()
+
+    def announce_unregistered(self) -> None:
+        """Repeat the announcement of each antenna whose probe has not returned."""
+        for antenna in self.unregistered():
+            self.announce(antenna)
+
+    def unregistered(self) -> list[Antenna]:
+        """Antennas whose probe has not returned from the present simulator."""
+        with self._lock:
+            return [self._antennas[node_id] for node_id in self._unregistered]
+
+    def probe_returned(self, node_id: int) -> None:
+        """An antenna received its own probe: it is registered. Again: nothing changes."""
+        with self._lock:
+            if node_id not in self._unregistered:
+                return
+            self._unregistered.discard(node_id)
+            on_registered = self._on_registered[node_id]
+        on_registered()

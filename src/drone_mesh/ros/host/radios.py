@@ -1,0 +1,85 @@
+"""Radios: the two ways in which the nodes of a host can be given antennas and workers."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from drone_mesh.communication.interfaces import IWirelessCommunication
+from drone_mesh.execution import MeshExecutor, Seat
+from drone_mesh.ros.host.simulator_link import SimulatorLink
+from drone_mesh.ros.host.virtual_nrf24 import VirtualNRF24
+
+
+class Radios(Protocol):
+    """Antennas of all nodes of a host. Any thread may call every function."""
+
+    own_threads: bool
+    """Whether antennas have threads of their own, which only stopping their node ends."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether packets can be sent."""
+
+    @property
+    def never_handed_over(self) -> int:
+        """Packets, since the start, that the simulated air never received."""
+
+    def start(self) -> None:
+        """Get ready; does not wait for it."""
+
+    def seat(self) -> Seat:
+        """A place for one more node to be driven in."""
+
+    def antenna(self, node_id: int, seat: Seat) -> IWirelessCommunication:
+        """The antenna of a node, which is driven in `seat`."""
+
+    def time_advanced(self) -> None:
+        """The clock was moved."""
+
+    def fall_silent(self) -> None:
+        """Make every send fail at once from now on."""
+
+    def close(self) -> None:
+        """Stop all workers and threads; returns when they have ended."""
+
+
+class VirtualRadios:
+    """An ideal disc, in the process of the WirelessSignalSimulator; all nodes share one worker."""
+
+    own_threads = False
+
+    def __init__(self, executor: MeshExecutor) -> None:
+        self._executor = executor
+        self._link = SimulatorLink(executor)
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is a simulator."""
+        return self._link.connected
+
+    @property
+    def never_handed_over(self) -> int:
+        """Packets, since the start, that no simulator accepted."""
+        return self._link.never_handed_over
+
+    def start(self) -> None:
+        """Look for a simulator from now on."""
+        self._link.start()
+
+    def seat(self) -> Seat:
+        """A place in the executor of the host."""
+        return self._executor.seat()
+
+    def antenna(self, node_id: int, seat: Seat) -> IWirelessCommunication:
+        """The antenna of a node."""
+        return VirtualNRF24(node_id, self._link, seat)
+
+    def time_advanced(self) -> None:
+        """Nothing to do: the host moves its executor itself."""
+
+    def fall_silent(self) -> None:
+        """Look for no simulator any more. A send does not take long."""
+        self._link.stop()
+
+    def close(self) -> None:
+        """Nothing is left to close."""

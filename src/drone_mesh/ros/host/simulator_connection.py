@@ -1,0 +1,110 @@
+"""SimulatorConnection: the services of one WirelessSignalSimulator, called with raw bytes."""
+
+from __future__ import annotations
+
+import logging
+import struct
+from typing import Sequence
+
+from drone_mesh.communication.messages import readdressed, receiver, sender
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.persistent_service import (
+    PersistentService,
+    Request,
+    Response,
+    ServiceClass,
+    ServiceGone,
+)
+from drone_mesh.srv import (
+    AreaScan,
+    AreaScanRequest,
+    AreaScanResponse,
+    Broadcast,
+    BroadcastRequest,
+    BroadcastResponse,
+    WirelessMessage,
+    WirelessMessages,
+    WirelessMessagesRequest,
+    WirelessMessagesResponse,
+)
+
+_LENGTH = struct.Struct("<I")  # of an array, as ROS serialises it
+
+_log = logging.getLogger(__name__)
+
+
+class SimulatorConnection:
+    """Hands packets to a simulator. Every call raises ServiceGone or ServiceRefused.
+
+    A simulator that offers only the services of the specification, `message` and `othersinRange`,
+    will do: `messages` and `broadcast` save calls where they are offered.
+
+    Belongs to the executor's worker, but for `is_connected`, which any thread may call.
+    """
+
+    def __init__(self) -> None:
+        """Connect. Raises ServiceGone."""
+        self._message = PersistentService(names.MESSAGE_SERVICE, WirelessMessage)
+        self._messages: (
+            PersistentService[WirelessMessagesRequest, WirelessMessagesResponse] | None
+        ) = None
+        self._broadcast: PersistentService[BroadcastRequest, BroadcastResponse] | None = None
+        self._others: PersistentService[AreaScanRequest, AreaScanResponse] | None = None
+        try:
+            self._message.connect()
+            self._messages = _if_offered(names.MESSAGES_SERVICE, WirelessMessages)
+            self._broadcast = _if_offered(names.BROADCAST_SERVICE, Broadcast)
+            if self._broadcast is None:
+                self._others = PersistentService(names.OTHERS_IN_RANGE_SERVICE, AreaScan)
+                self._others.connect()
+        except ServiceGone:
+            self.close()
+            raise
+
+    def is_connected(self) -> bool:
+        """Whether all connections are still open at the other end."""
+        services = (self._message, self._messages, self._broadcast, self._others)
+        return all(service is None or service.is_connected() for service in services)
+
+    def close(self) -> None:
+        """Close all connections."""
+        for service in (self._message, self._messages, self._broadcast, self._others):
+            if service is not None:
+                service.close()
+
+    def send(self, payload: bytes) -> bool:
+        """Hand over a packet for the node in its byte 3; True: that node has it."""
+        # The fields of a WirelessMessageRequest and of its response are single bytes.
+        fields = bytes((sender(payload), receiver(payload))) + payload
+        return self._message.call_bytes(fields) != b"\0"
+
+    def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
+        """Hand over packets of one sender, at least one; for each whether its receiver has it."""
+        if self._messages is None:
+            return [self.send(payload) for payload in payloads]
+        packets = b"".join(payloads)
+        # The fields of a WirelessMessagesRequest.
+        fields = bytes((sender(payloads[0]),)) + _LENGTH.pack(len(packets)) + packets
+        answer = self._messages.call_bytes(fields)
+        return [bool(taken) for taken in answer[_LENGTH.size :]]
+
+    def broadcast(self, payload: bytes) -> None:
+        """Hand over a packet for every node in range of its sender."""
+        asker = bytes((sender(payload),))
+        if self._broadcast is not None:
+            self._broadcast.call_bytes(asker + payload)  # the fields of a BroadcastRequest
+        elif self._others is not None:
+            for node_id in self._others.call_bytes(asker)[_LENGTH.size :]:
+                self.send(readdressed(payload, node_id))
+
+
+def _if_offered(
+    name: str, service_class: ServiceClass[Request, Response]
+) -> PersistentService[Request, Response] | None:
+    service = PersistentService(name, service_class)
+    try:
+        service.connect()
+    except ServiceGone as error:
+        _log.info("the simulator does not offer %s, using single messages: %s", name, error)
+        return None
+    return service

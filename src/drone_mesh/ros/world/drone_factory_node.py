@@ -1,0 +1,28 @@
+"""The node /DroneFactory: the world, the drones in it, and by default their Raspberry Pis."""
+
+from __future__ import annotations
+
+import rospy
+
+from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.orderly_stop import OrderlyStop
+from drone_mesh.ros.graph.parameters import or_stop
+from drone_mesh.ros.world.factory_parameters import FactoryParameters
+from drone_mesh.ros.world.simulation import Simulation
+from drone_mesh.world.bullet_world import BulletWorld
+
+
+def main() -> None:
+    """The world, the drones in it, and by default their Raspberry Pis.
+
+    Parameters (private): all keys of config/factory.yaml, each overriding the file; ~config, that
+    file; ~hosts (int, 1): 1 = the nodes run in this process, otherwise in others. It also checks
+    the file in /DroneManager/casus.
+    """
+    prepare_node(main.__doc__)
+    rospy.init_node("DroneFactory", disable_signals=True)
+    show_library_logs_on_rosout()
+    parameters = or_stop(FactoryParameters.read)
+    with OrderlyStop() as stop, BulletWorld() as world:
+        Simulation(parameters, world).run(stop)

@@ -1,0 +1,59 @@
+"""FactoryParameters: what the node /DroneFactory is started with, checked as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import rospy
+
+from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.drone.fleet import plan_fleet
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.ros.graph.parameters import factory_configuration, manager_layouts
+from drone_mesh.ros.host.mesh_settings import MeshSettings
+from drone_mesh.view.window_process import require_screen
+
+
+@dataclass(frozen=True)
+class FactoryParameters:
+    """A configuration that can be built."""
+
+    configuration: FactoryConfiguration
+    settings: MeshSettings
+    hosts: int  # 1: the nodes run in this process; otherwise in others
+
+    @classmethod
+    def read(cls) -> FactoryParameters:
+        """The private parameters over the configuration file. Raises ConfigurationError."""
+        configuration = factory_configuration(*(key.name for key in fields(FactoryConfiguration)))
+        plan_fleet(
+            configuration.gateways,
+            configuration.routers,
+            configuration.gridsize,
+            configuration.spacing,
+        )
+        if configuration.gui:
+            require_screen()
+        # With a bad file of layouts the manager would be restarted for ever; this ends the launch.
+        manager_layouts()
+        hosts = str(rospy.get_param("~hosts", "") or 1)
+        if not hosts.isdigit():
+            raise ConfigurationError(
+                f"argument: hosts is {hosts!r}, want a whole number, 0 or more"
+            )
+        if configuration.radio == "nrf24":
+            _require_wall_time_in_one_process(configuration, int(hosts))
+        return cls(configuration, MeshSettings.of(configuration), int(hosts))
+
+
+def _require_wall_time_in_one_process(configuration: FactoryConfiguration, hosts: int) -> None:
+    if hosts != 1:
+        raise ConfigurationError(
+            f"argument: hosts is {hosts}, want 1 with radio nrf24: all emulated chips share one "
+            "air, which lives in one process"
+        )
+    if configuration.real_time_factor != 1.0:
+        raise ConfigurationError(
+            f"real_time_factor is {configuration.real_time_factor:g}, want 1 with radio nrf24: "
+            "the emulated chips run in wall time"
+        )
