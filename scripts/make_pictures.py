@@ -107,7 +107,7 @@ def take_pictures(browser: Browser, folder: Path) -> None:
         time.sleep(SETTLE_S)
         ImageGrab.grab(xdisplay=SCREEN).save(PICTURES / "rviz.png")
         console = f"http://127.0.0.1:{CONSOLE_PORT}/"
-        take_page(browser, console, "console.png", False, "#nodes tr[data-state=flying]")
+        take_page(browser, console, "console.png", False, "#nodes tr[data-condition=flying]")
         subprocess.run(["rosrun", "drone_mesh", "snapshot", PICTURES / "world.png"], check=True)
         controls.speed(False, FAST)
         watch.wait_for("all connected again", everybody_stands_connected)

@@ -4,6 +4,7 @@
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$root/.venv"
+javascript="$venv/javascript"
 noetic=/opt/ros/noetic/setup.bash
 simulation_requirements=(requirements/{console,http,report,simulation}.txt)
 
@@ -78,6 +79,17 @@ pip_install() {
   done
 }
 
+# npm_install: the checks of the page's JavaScript, unless these very versions are installed.
+npm_install() {
+  cmp -s "$root/scripts/javascript/package-lock.json" "$javascript/.installed" && return
+  command -v npm >/dev/null || apt_install nodejs npm
+  say "installing npm packages into .venv: scripts/javascript"
+  rm -rf "$javascript"
+  cp -r "$root/scripts/javascript" "$javascript"
+  (cd "$javascript" && npm ci --no-audit --no-fund </dev/null) || fail "npm could not install them"
+  cp "$javascript/package-lock.json" "$javascript/.installed"
+}
+
 # build_step WHAT COMMAND...: with its output in a log, of which the end is shown if it fails.
 build_step() {
   local log="$root/build/build.log"
@@ -124,6 +136,7 @@ prepare_unit_tests() {
 prepare_checks() {
   prepare_unit_tests
   pip_install requirements/checks.txt
+  npm_install
 }
 
 prepare_everything() {

@@ -113,7 +113,7 @@ class NodeState(Message, NodeStatus):
     gateway: int
     hops: int
     next_hop: int
-    pref_loc: int
+    fallback: int
     known_nodes: int
     total_messages: int
     neighbours: bytes
@@ -131,7 +131,7 @@ class NodeState(Message, NodeStatus):
         gateway: int = ...,
         hops: int = ...,
         next_hop: int = ...,
-        pref_loc: int = ...,
+        fallback: int = ...,
         known_nodes: int = ...,
         total_messages: int = ...,
         neighbours: bytes | Sequence[int] = ...,

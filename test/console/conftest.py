@@ -115,7 +115,7 @@ class Visit:
             self.complaints.append(message.text)  # type: ignore[attr-defined]
 
     def drawn(self, what: str) -> int:
-        """A count of what the map has drawn: drones, links, ways or lost."""
+        """How many drones, links, links-drawn, route-links or lost-links the map has drawn."""
         return int(self.page.get_attribute("#map-note", f"data-{what}") or -1)
 
     def row(self, node: int, column: int) -> str:

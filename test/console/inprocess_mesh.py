@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 from drone_mesh.console.orders import OrderRefused
-from drone_mesh.drone.roles import Role
-from drone_mesh.inprocess.network import Network, Node
+from drone_mesh.inprocess.network import Network
 from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.state.events import EventBatcher
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
-from drone_mesh.state.observation import describe_component, way_ahead
-from drone_mesh.state.roster import DroneView, MeshRoster
+from drone_mesh.state.model import EventRecord, MeshStatus
 
 STEP_S = 0.05  # wall time between two steps of the clock
 
@@ -24,8 +22,6 @@ class InProcessMesh:
         self._lock = threading.Lock()
         self._network = Network(seed=1, max_distance_m=max_distance)
         self._network.add_fleet(1, routers, gridsize, spacing)
-        self._roster = MeshRoster()
-        self._max_distance = max_distance
         self._layouts = Layouts({})
         self._batcher = EventBatcher()
         self._told = 0
@@ -49,16 +45,16 @@ class InProcessMesh:
     def look(self) -> tuple[MeshStatus, list[EventRecord]]:
         """The mesh now, and what happened since the last look."""
         with self._lock:
-            now_s = self._network.clock.now_s
-            statuses = [self._describe(n, node) for n, node in self._network.nodes.items()]
-            views = [self._view(n, node) for n, node in self._network.nodes.items()]
-            self._roster.merge_report("in process", statuses, now_s)
-            nodes = self._roster.snapshot(views, now_s)
             for event in self._network.events[self._told :]:
                 self._batcher.observe(event)
             self._told = len(self._network.events)
             achieved = 0.0 if self.paused else self.factor
-            mesh = MeshStatus(now_s, nodes, self._max_distance, self.factor, achieved, self.paused)
+            mesh = replace(
+                self._network.status(),
+                real_time_factor=self.factor,
+                achieved_real_time_factor=achieved,
+                paused=self.paused,
+            )
             return mesh, self._batcher.take()
 
     def place_of(self, node: int) -> tuple[float, float]:
@@ -93,15 +89,3 @@ class InProcessMesh:
     def speed(self, paused: bool, factor: float) -> str:
         self.paused, self.factor = paused, factor or self.factor
         return "paused" if paused else f"speed {self.factor:g}"
-
-    def _describe(self, node_id: int, node: Node) -> NodeStatus:
-        status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
-        describe_component(status, node.component, node.antenna.powered, self._network.clock.now_s)
-        return status
-
-    def _view(self, node_id: int, node: Node) -> DroneView:
-        place = node.drone.get_location()
-        flight = node.drone._path  # noqa: SLF001
-        ahead = way_ahead(flight, self._network.clock.now_s) if flight else ()
-        role = Role.GATEWAY if node.is_gateway else Role.ROUTER
-        return DroneView(node_id, role, (place.longitude, place.latitude, place.height), ahead)

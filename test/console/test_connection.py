@@ -98,7 +98,7 @@ def test_a_name_that_points_here_from_elsewhere_is_refused(start_console):
     console = start_console()
     answer = httpx.get(console.url, headers={"Host": "evil.example"})
     assert answer.status_code == 403
-    assert "is not a name of this machine" in answer.text
+    assert "is not a loopback name" in answer.text
 
 
 def test_without_the_token_there_is_neither_page_nor_socket(start_console, visit):

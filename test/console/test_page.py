@@ -48,10 +48,10 @@ def test_the_page_loads_without_errors_and_from_one_server_only(start_console, v
     assert {url.split("/")[2] for url in page.requests} == {f"127.0.0.1:{console.port}"}
 
 
-def test_the_map_shows_the_true_number_of_drones_links_and_ways(page):
+def test_the_map_shows_the_true_number_of_drones_links_and_routes(page):
     page.wait_for("all links", lambda: page.drawn("links") == LINKS)
     assert page.drawn("links-drawn") == LINKS
-    page.wait_for("all ways", lambda: page.drawn("ways") == 17)
+    page.wait_for("all routes", lambda: page.drawn("route-links") == 17)
     page.wait_for(
         "all connected",
         lambda: page.page.inner_text("#summary") == "17 of 17 routers connected",
@@ -59,7 +59,7 @@ def test_the_map_shows_the_true_number_of_drones_links_and_ways(page):
 
 
 def test_switching_a_node_off_by_click_turns_it_grey_and_the_routes_change(page):
-    page.wait_for("all ways", lambda: page.drawn("ways") == 17)
+    page.wait_for("all routes", lambda: page.drawn("route-links") == 17)
     before = {node: page.row(node, NEXT) for node in range(1, 18)}
     behind = [node for node, next_hop in before.items() if next_hop == "2"]
     assert behind
@@ -68,15 +68,15 @@ def test_switching_a_node_off_by_click_turns_it_grey_and_the_routes_change(page)
     page.page.click("#power")
     page.wait_for("2 is off", lambda: page.row(2, STATE) == "off")
     page.wait_for("the other label", lambda: page.page.inner_text("#power") == "Switch on")
-    assert page.page.get_attribute("#nodes tr[data-id='2']", "data-state") == "off"
+    assert page.page.get_attribute("#nodes tr[data-id='2']", "data-condition") == "off"
     page.wait_for("links to 2 are gone", lambda: page.drawn("links") < LINKS)
     page.page.select_option("#speed", "10")
     page.wait_for(
-        "those behind 2 found other ways",
+        "those behind 2 found other routes",
         lambda: all(page.row(node, NEXT) not in ("2", "–") for node in behind),
         within_s=20.0,
     )
-    page.wait_for("16 ways again", lambda: page.drawn("ways") == 16)
+    page.wait_for("16 routes again", lambda: page.drawn("route-links") == 16)
     page.page.click("#power")
     page.wait_for("2 is back", lambda: page.row(2, STATE) == "connected", within_s=20.0)
 
@@ -110,16 +110,32 @@ def test_a_drag_that_ends_with_escape_sends_no_drone(page):
     assert page.page.locator(".toast").count() == 0
 
 
-def test_numbers_send_a_drone_and_a_gateway_without_a_route_is_quoted(page):
+def test_typed_numbers_send_a_drone(page):
     page.page.click("#nodes tr[data-id='13']")
     page.page.fill("#fly-x", "-3,5")
     page.page.fill("#fly-y", "14")
     page.page.click("#fly-form button")
     page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
-    page.page.fill("#fly-x", "far away")
+
+
+@pytest.mark.parametrize(
+    ("axis", "typed", "why"),
+    [
+        ("x", "far away", "x must be a number from -5000 to 5000"),
+        ("y", "", "y must be a number from -5000 to 5000"),
+        ("x", "5001", "x must be a number from -5000 to 5000"),
+        ("z", "-5", "z must be a whole number from 0 to 500"),
+        ("z", "1.5", "z must be a whole number from 0 to 500"),
+    ],
+)
+def test_a_goal_that_cannot_be_flown_to_is_refused_beside_the_field(page, axis, typed, why):
+    page.page.click("#nodes tr[data-id='13']")
+    page.page.fill(f"#fly-{axis}", typed)
     page.page.click("#fly-form button")
-    page.page.wait_for_selector(".toast.bad")
-    assert "x: a number from -5000 to 5000 is wanted" in page.page.inner_text(".toast.bad")
+    page.wait_for("a reason", lambda: page.page.inner_text("#fly-error") == why)
+    assert page.page.get_attribute(f"#fly-{axis}", "aria-invalid") == "true"
+    page.page.wait_for_timeout(500)
+    assert page.row(13, STATE) == "connected"
 
 
 def test_a_layout_starts(page):
@@ -127,7 +143,7 @@ def test_a_layout_starts(page):
     page.page.click("#layout-form button")
     page.page.wait_for_selector("#toasts :text('layout 0 is ordered')")  # it goes by itself
     page.wait_for(
-        "many fly", lambda: page.page.locator("#nodes tr[data-state=flying]").count() >= 10
+        "many fly", lambda: page.page.locator("#nodes tr[data-condition=flying]").count() >= 10
     )
 
 
@@ -253,4 +269,4 @@ def test_a_finger_that_moves_the_map_sends_no_drone_away(start_console, visit):
     touch("touchEnd", *start)
     page.wait_for("the map moved", lambda: on_screen(page, *PLACES[9])[0] > start[0] + 30)
     page.page.wait_for_timeout(500)
-    assert page.page.locator("#nodes tr[data-state=flying]").count() == 0
+    assert page.page.locator("#nodes tr[data-condition=flying]").count() == 0

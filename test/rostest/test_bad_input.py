@@ -8,9 +8,10 @@ import unittest
 
 import rospy
 import rostest
+from rostest_support import LogWatch, MeshWatch, Stranger
+
 from drone_mesh.msg import NRF24
 from drone_mesh.srv import WirelessMessage
-from rostest_support import LogWatch, MeshWatch, Stranger
 
 PACKETS = 10_000
 ME, GATEWAY, ROUTER = 100, 0, 1

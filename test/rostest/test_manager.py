@@ -9,9 +9,10 @@ import unittest
 
 import rospy
 import rostest
+from rostest_support import LogWatch, call, wait_for
+
 from drone_mesh.msg import RequestGatewayDroneFlight
 from drone_mesh.srv import Casus, RequestDroneFlight
-from rostest_support import LogWatch, call, wait_for
 
 
 def request(node_id: int, latitude: float, longitude: float, height: int) -> int:

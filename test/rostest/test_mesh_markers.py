@@ -71,18 +71,18 @@ class MeshMarkersTest(unittest.TestCase):
             lambda: (self.points("routers"), self.points("gateways")) == (2, 1),
         )
         wait_for("names", WALL_LIMIT_S, lambda: self.names() == ["0", "1", "2"])
-        # 0 and 1 are 1 m apart, 0 and 2 are 7 m, 1 and 2 are 6 m: three links, two of them ways.
-        wait_for("ways", WALL_LIMIT_S, lambda: self.points("links: way to a gateway") == 4)
+        # 0 and 1 are 1 m apart, 0 and 2 are 7 m, 1 and 2 are 6 m: three links, two of them routes.
+        wait_for("routes", WALL_LIMIT_S, lambda: self.points("links: route") == 4)
         wait_for("a known link", WALL_LIMIT_S, lambda: self.points("links: known") == 2)
 
     def test_2_a_node_that_is_off_is_grey_and_its_links_are_lost(self) -> None:
-        wait_for("ways", WALL_LIMIT_S, lambda: self.points("links: way to a gateway") == 4)
+        wait_for("routes", WALL_LIMIT_S, lambda: self.points("links: route") == 4)
         call("/Nodes/2/powerSwitch", PowerSwitch, False)
-        wait_for("lost links", WALL_LIMIT_S, lambda: self.points("links: just lost") == 4)
-        wait_for("one way left", WALL_LIMIT_S, lambda: self.points("links: way to a gateway") == 2)
+        wait_for("lost links", WALL_LIMIT_S, lambda: self.points("links: lost") == 4)
+        wait_for("one route link left", WALL_LIMIT_S, lambda: self.points("links: route") == 2)
         wait_for("2 is grey", WALL_LIMIT_S, self.router_2_is_grey)
         call("/Nodes/2/powerSwitch", PowerSwitch, True)
-        wait_for("no lost links", WALL_LIMIT_S, lambda: self.points("links: just lost") == 0)
+        wait_for("no lost links", WALL_LIMIT_S, lambda: self.points("links: lost") == 0)
 
     @unittest.skipUnless(shutil.which("rviz") and shutil.which("Xvfb"), "rviz or Xvfb is missing")
     def test_3_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:

@@ -8,8 +8,9 @@ import unittest
 
 import rospy
 import rostest
-from drone_mesh.srv import RequestDroneFlight
 from rostest_support import LogWatch, MeshWatch, call, wait_for
+
+from drone_mesh.srv import RequestDroneFlight
 
 LIMIT_S = 5.0
 

@@ -9,10 +9,11 @@ import unittest
 
 import rospy
 import rostest
-from drone_mesh.srv import SetSpeed
 from rosgraph_msgs.msg import Clock
 from rostest_support import WALL_LIMIT_S, MeshWatch, call, wait_for
 from std_msgs.msg import Header
+
+from drone_mesh.srv import SetSpeed
 
 NOTHING_DONE = rospy.Time()
 REPEAT_S = 0.2  # wall

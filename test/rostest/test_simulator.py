@@ -12,9 +12,10 @@ import unittest
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
+from rostest_support import WALL_LIMIT_S, LogWatch, Stranger, call, wait_for
+
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.srv import AreaScan, Broadcast, WirelessMessages
-from rostest_support import WALL_LIMIT_S, LogWatch, Stranger, call, wait_for
 
 # A receiver in a process of its own, to be killed.
 RECEIVER = """

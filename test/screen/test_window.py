@@ -16,16 +16,17 @@ from PIL import ImageGrab
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.view.picture import CONDITION_COLOURS, DroneCondition, DronePicture, Scene
+from drone_mesh.state.condition import Condition
+from drone_mesh.view.palette import LIGHT, rgb
+from drone_mesh.view.picture import DronePicture, Scene
 from drone_mesh.view.window_process import WindowProcess, require_screen
-from drone_mesh.world.drones import GatewayDrone, RouterDrone
 
 LONG_S = 60.0  # a deadline for software rendering on a busy machine
 SCENE = Scene(
     [
         DronePicture(0, Role.GATEWAY, (-1.0, 0.0, 0.0)),
         DronePicture(1, Role.ROUTER, (1.0, 0.0, 0.0)),
-        DronePicture(2, Role.ROUTER, (1.0, 2.0, 0.0), DroneCondition.LOST),
+        DronePicture(2, Role.ROUTER, (1.0, 2.0, 0.0), Condition.DISCONNECTED),
     ],
     title="a title",
 )
@@ -72,7 +73,7 @@ def pixels_like(screen, colour):
     pixels = np.asarray(ImageGrab.grab(xdisplay=screen).convert("RGB")).astype(float)
     hues, wanted = (
         values - values.min(axis=-1, keepdims=True)
-        for values in (pixels.reshape(-1, 3), np.array(colour[:3]))
+        for values in (pixels.reshape(-1, 3), np.array(rgb(colour)))
     )
     strength = np.linalg.norm(hues, axis=1)
     likeness = hues @ wanted / (np.maximum(strength, 1) * np.linalg.norm(wanted))
@@ -87,7 +88,7 @@ def wait_until(condition, what):
 
 
 def wait_until_shown(screen):
-    wait_until(lambda: pixels_like(screen, GatewayDrone.COLOUR) > 100, "a gateway on the screen")
+    wait_until(lambda: pixels_like(screen, LIGHT.gateway) > 100, "a gateway on the screen")
 
 
 def press(screen, key):
@@ -110,11 +111,11 @@ def press(screen, key):
 @needs_screen
 def test_the_drones_are_on_the_screen_in_their_colours_until_it_is_stopped(screen, window):
     wait_until_shown(screen)
-    for colour in (RouterDrone.COLOUR, CONDITION_COLOURS[DroneCondition.LOST]):
+    for colour in (LIGHT.connected, LIGHT.disconnected):
         wait_until(lambda colour=colour: pixels_like(screen, colour) > 100, f"{colour} on it")
     window.stop()
     # The screen's server hears of it a moment later.
-    wait_until(lambda: pixels_like(screen, GatewayDrone.COLOUR) == 0, "an empty screen")
+    wait_until(lambda: pixels_like(screen, LIGHT.gateway) == 0, "an empty screen")
 
 
 @needs_screen
@@ -122,7 +123,7 @@ def test_q_closes_the_window_and_the_simulation_hears_of_it(screen, window, capl
     caplog.set_level(logging.INFO)
     wait_until_shown(screen)
     press(screen, "q")
-    wait_until(lambda: "window is closed; the simulation goes on" in caplog.text, "closed")
+    wait_until(lambda: "window was closed; the simulation goes on" in caplog.text, "closed")
 
 
 @needs_screen

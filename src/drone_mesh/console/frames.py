@@ -1,8 +1,11 @@
-"""FrameStore: what the page knows, and the difference to what it knew.
+"""FrameStore: what a page should know, and the difference to what it knows already.
 
 A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), `gone` (ids),
 `events` and `samples` (new ones). A page that has version v gets what changed after v, however long
-ago that was: who falls behind simply gets a larger difference, and nothing is kept for him.
+ago that was: a page that falls behind gets a larger difference, and nothing is queued for it.
+
+The fields of a node are those of NodeState.msg, with what is decided here and only shown there:
+its condition, the name of its colour, its trouble, and the links it has with nodes of higher ids.
 """
 
 from __future__ import annotations
@@ -12,35 +15,39 @@ from collections import deque
 from dataclasses import asdict
 from typing import Any, Iterable, Mapping, Sequence
 
+from drone_mesh.state.condition import condition_of
+from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
-from drone_mesh.state.outages import Sample, take_sample
+from drone_mesh.state.outages import MeshSample, take_sample
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
+from drone_mesh.view.palette import node_colour_name
 
-EVENTS_KEPT = 1000  # our choice: more than anybody scrolls back
-EVENTS_PER_FRAME = 300  # a burst of thousands would only be scrolled past
+EVENTS_KEPT = 1000  # our choice: more than a person scrolls back
+EVENTS_PER_FRAME = 300  # of a burst of thousands only the newest are read
 SAMPLES_KEPT = 600  # ten minutes
 SAMPLE_PERIOD_S = 1.0  # wall time
 
 
 class FrameStore:
-    """Belongs to one thread (the server's event loop). Version 0 is a page that knows nothing."""
+    """Belongs to one thread, the server's event loop. Version 0 is a page that knows nothing."""
 
     def __init__(self) -> None:
         self.version = 0
         self._mesh: MeshStatus | None = None
-        self._link = "waiting for the first news of a mesh"
+        self._link = "waiting for the first state of a mesh"
         self._clock: dict[str, Any] = {}
         self._nodes: dict[int, dict[str, Any]] = {}
         self._changed_at: dict[int, dict[str, int]] = {}
         self._gone_at: dict[int, int] = {}
         self._events: deque[tuple[int, dict[str, Any]]] = deque(maxlen=EVENTS_KEPT)
-        self._samples: deque[tuple[int, Sample]] = deque(maxlen=SAMPLES_KEPT)
+        self._samples: deque[tuple[int, MeshSample]] = deque(maxlen=SAMPLES_KEPT)
         self._sampled_at_s = float("-inf")
+        self._lost_links = LostLinks()
         self._run_began_at = 0
         self._cache: dict[int, str] = {}
 
     def update_mesh(self, mesh: MeshStatus, wall_s: float) -> None:
-        """The mesh as it is now."""
+        """Take over the mesh as it is now. `wall_s`: seconds of wall time."""
         self._next_version()
         if self._mesh is not None and mesh.stamp_s < self._mesh.stamp_s:
             self._forget_run()
@@ -62,12 +69,14 @@ class FrameStore:
             self._gone_at[gone] = self.version
         for node in mesh.nodes:
             self._update_node(node.id, _fields(node, troubles.get(node.id)))
+        for node_id, fields in self._links(mesh.nodes, wall_s).items():
+            self._update_node(node_id, fields)
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:
             self._sampled_at_s = wall_s
             self._samples.append((self.version, take_sample(mesh)))
 
     def add_events(self, events: Iterable[EventRecord]) -> None:
-        """New events, oldest first."""
+        """Add new events, oldest first."""
         self._next_version()
         for event in events:
             self._events.append(
@@ -84,13 +93,13 @@ class FrameStore:
             )
 
     def set_link(self, text: str) -> None:
-        """Why there is no news, in words for the page; empty: there is."""
+        """Set why no states arrive, in words for the page; empty: they do."""
         if text != self._link:
             self._next_version()
             self._link = text
 
     def frame_since(self, version: int) -> str:
-        """JSON text of what changed after `version`; version 0 gives everything there is."""
+        """JSON text of what changed after `version`; after version 0 that is everything."""
         if version not in self._cache:
             self._cache[version] = json.dumps(self._build(version), separators=(",", ":"))
         return self._cache[version]
@@ -126,6 +135,20 @@ class FrameStore:
             frame["samples"] = samples
         return frame
 
+    def _links(self, nodes: Sequence[NodeStatus], wall_s: float) -> dict[int, dict[str, str]]:
+        """For each node and use, the nodes with higher ids that it has a link with."""
+        lost = self._lost_links.update(known_links(nodes), wall_s)
+        bits = {use: dict.fromkeys((node.id for node in nodes), 0) for use in LinkUse}
+        for use, links in links_by_use(nodes, lost).items():
+            of_node = bits[use]
+            for low, high in links:
+                if low in of_node:
+                    of_node[low] |= 1 << high
+        return {
+            node.id: {f"{use.name.lower()}_links": _hex(bits[use][node.id]) for use in LinkUse}
+            for node in nodes
+        }
+
     def _update_node(self, node_id: int, fields: Mapping[str, Any]) -> None:
         known = self._nodes.setdefault(node_id, {})
         changed_at = self._changed_at.setdefault(node_id, {})
@@ -140,26 +163,28 @@ class FrameStore:
         self._cache.clear()
 
     def _forget_run(self) -> None:
-        """Simulated time went back: a new world. Its charts and log start anew on every page."""
+        """Simulated time went back: a new world. Charts and log of every page start again."""
         self._run_began_at = self.version
         self._events.clear()
         self._samples.clear()
 
 
 def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
+    condition = condition_of(node)
     return {
         "role": node.role,
         "on": node.on,
-        "connected": node.connected,
+        "condition": condition.value,
+        "colour": node_colour_name(node.role, condition),
         "gateway": node.gateway,
         "hops": node.hops,
-        "next": node.next_hop,
-        "place": node.pref_loc,
-        "known": node.known_nodes,
-        "sent": node.total_messages,
-        "neighbours": _bits(node.neighbours),
+        "next_hop": node.next_hop,
+        "fallback": node.fallback,
+        "known_nodes": node.known_nodes,
+        "total_messages": node.total_messages,
+        "neighbours": len(node.neighbours),
         "route": list(node.route),
-        "at": _centimetres(node.position) if position_is_known(node) else None,
+        "position": _centimetres(node.position) if position_is_known(node) else None,
         "path": _centimetres(node.path),
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,
@@ -170,6 +195,6 @@ def _centimetres(metres: Sequence[float]) -> list[float]:
     return [round(float(value), 2) for value in metres]
 
 
-def _bits(ids: Iterable[int]) -> str:
-    """256 bits as hex, bit n for id n: a fifth of a list of 200 ids."""
-    return format(sum(1 << node for node in ids), "x")
+def _hex(bits: int) -> str:
+    """A set of ids, bit n for id n: a fifth of the length of a list of 200 ids."""
+    return format(bits, "x")

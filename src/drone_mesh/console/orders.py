@@ -1,4 +1,4 @@
-"""What a page may ask for, and who carries it out."""
+"""What a page may ask for, and the interface that carries it out."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.layouts import MAX_CASE
 
 MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
+LIMITS = {"coordinate": MAX_COORDINATE_M, "height": MAX_HEIGHT_M}  # metres; for the page's form
 
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]
@@ -22,7 +23,7 @@ Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, a
 
 
 class OrderRefused(MeshError):
-    """An order was not carried out; the text says why, in words for the page."""
+    """An order was not carried out; the text is the reason, in words for the page."""
 
 
 class MeshControls(Protocol):
@@ -41,8 +42,8 @@ class _Request(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)  # "3" is not a node, 1 not a switch
 
 
-class Order(_Request, abc.ABC):
-    """One order of one page; `number` comes back with the answer."""
+class PageOrder(_Request, abc.ABC):
+    """One order of one page; the answer carries the same `number`."""
 
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
 
@@ -51,7 +52,7 @@ class Order(_Request, abc.ABC):
         """A few words for the page. Raises OrderRefused."""
 
 
-class _Power(Order):
+class _Power(PageOrder):
     do: Literal["power"]
     node: NodeId
     on: bool
@@ -60,7 +61,7 @@ class _Power(Order):
         return controls.power(self.node, self.on)
 
 
-class _Fly(Order):
+class _Fly(PageOrder):
     do: Literal["fly"]
     node: NodeId
     x: Coordinate
@@ -71,7 +72,7 @@ class _Fly(Order):
         return controls.fly(self.node, self.x, self.y, self.z)
 
 
-class _Layout(Order):
+class _Layout(PageOrder):
     do: Literal["layout"]
     case: int = Field(ge=0, le=MAX_CASE)
 
@@ -79,7 +80,7 @@ class _Layout(Order):
         return controls.layout(self.case)
 
 
-class _Speed(Order):
+class _Speed(PageOrder):
     do: Literal["speed"]
     paused: bool
     factor: float = Field(ge=0, le=MAX_REAL_TIME_FACTOR, allow_inf_nan=False)
@@ -88,7 +89,7 @@ class _Speed(Order):
         return controls.speed(self.paused, self.factor)
 
 
-class Watch(_Request):
+class NeighbourWatch(_Request):
     """The page wants to see one node's neighbours in detail; None: no longer."""
 
     do: Literal["watch"]
@@ -99,13 +100,13 @@ class _Numbered(_Request):
     number: int
 
 
-_REQUESTS: TypeAdapter[Order | Watch] = TypeAdapter(
-    Annotated[Union[_Power, _Fly, _Layout, _Speed, Watch], Field(discriminator="do")]
+_REQUESTS: TypeAdapter[PageOrder | NeighbourWatch] = TypeAdapter(
+    Annotated[Union[_Power, _Fly, _Layout, _Speed, NeighbourWatch], Field(discriminator="do")]
 )
 
 
-def parse_request(text: str) -> Order | Watch:
-    """A page's message. Raises OrderRefused for anything that is not exactly a known request."""
+def parse_request(text: str) -> PageOrder | NeighbourWatch:
+    """Parse a page's message. Raises OrderRefused for anything but a valid request."""
     try:
         return _REQUESTS.validate_json(text)
     except ValidationError as error:

@@ -1,9 +1,9 @@
 """The console's page and WebSocket, as an ASGI application (Starlette).
 
-Everything in here runs in one event loop, which owns the FrameStore; only orders run in threads of
-their own, because they wait for others. Each page has one task that sends: it waits until its page
-took a frame before it makes the next one, so a slow page gets fewer and larger frames, and a page
-that takes nothing for SEND_TIMEOUT_S is cut off.
+Everything runs in one event loop, which owns the FrameStore, except orders: these block, so they
+run in threads of their own. Each page has one task that sends frames. It builds a frame only after
+the page has accepted the one before, so a slow page gets fewer and larger frames; a page that
+accepts nothing for SEND_TIMEOUT_S is disconnected.
 """
 
 from __future__ import annotations
@@ -28,13 +28,15 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import (
+    LIMITS,
     MeshControls,
-    Order,
+    NeighbourWatch,
     OrderRefused,
-    Watch,
+    PageOrder,
     number_of,
     parse_request,
 )
+from drone_mesh.view.palette import style_sheet
 from drone_mesh.web.access import Access, AccessDenied
 
 log = logging.getLogger(__name__)
@@ -64,13 +66,13 @@ class Page:
     """One open page."""
 
     socket: WebSocket
-    version: int = 0  # what it knows
-    watching: int | None = None
+    version: int = 0  # of what it knows
+    watching: int | None = None  # the node whose neighbours it shows
     orders: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Guard:
-    """ASGI middleware: turns away who may not see the console, and sets the pages' headers."""
+    """ASGI middleware: refuses clients without access, and sets the headers of every response."""
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
@@ -90,7 +92,7 @@ class Guard:
             if scope["type"] == "websocket":
                 self._access.check_origin(connection.headers.get("origin"), host)
         except AccessDenied as error:
-            who = connection.client.host if connection.client else "somebody"
+            who = connection.client.host if connection.client else "unknown client"
             log.warning("console: refused %s: %s", who, error)
             if scope["type"] == "websocket":
                 await WebSocket(scope, receive, send).close(POLICY_VIOLATION)
@@ -130,6 +132,7 @@ class ConsoleServer:
         self.app = Starlette(
             routes=[
                 Route("/", self._index),
+                Route("/palette.css", self._palette),
                 Mount("/static", StaticFiles(directory=STATIC)),
                 WebSocketRoute("/ws", self._websocket),
             ],
@@ -137,7 +140,7 @@ class ConsoleServer:
         )
 
     def close(self) -> None:
-        """Take no more orders. Those under way end by themselves."""
+        """Accept no more orders. Those under way end by themselves."""
         self._workers.shutdown(wait=False)
 
     async def _index(self, request: Request) -> Response:
@@ -146,6 +149,9 @@ class ConsoleServer:
             moved.set_cookie(COOKIE, request.query_params["token"], httponly=True, samesite="lax")
             return moved
         return FileResponse(STATIC / "index.html")
+
+    async def _palette(self, _request: Request) -> Response:
+        return Response(style_sheet(':root[data-theme="dark"]'), media_type="text/css")
 
     async def _websocket(self, socket: WebSocket) -> None:
         if len(self._pages) >= MOST_PAGES:
@@ -177,7 +183,8 @@ class ConsoleServer:
     async def _send_frames(self, page: Page) -> None:
         loop = asyncio.get_running_loop()
         try:
-            await self._send(page, json.dumps({"type": "hello", "layouts": list(self._layouts)}))
+            hello = {"type": "hello", "layouts": list(self._layouts), "limits": LIMITS}
+            await self._send(page, json.dumps(hello))
             # wait_for may swallow a cancellation that comes as a send ends (before Python 3.12).
             while page in self._pages:
                 started = loop.time()
@@ -188,7 +195,7 @@ class ConsoleServer:
                         await self._send(page, self._detail(page.watching))
                 await asyncio.sleep(max(0.0, started + FRAME_PERIOD_S - loop.time()))
         except asyncio.TimeoutError:
-            log.info("console: a page took nothing for %g s and is cut off", SEND_TIMEOUT_S)
+            log.info("console: disconnected a page that accepted nothing for %g s", SEND_TIMEOUT_S)
         except (WebSocketDisconnect, RuntimeError):
             log.debug("console: a page is gone")
 
@@ -206,8 +213,10 @@ class ConsoleServer:
         except OrderRefused as error:
             await self._answer(page, number_of(text), False, str(error))
             return
-        if isinstance(request, Watch):
+        if isinstance(request, NeighbourWatch):
             page.watching = request.node
+            if request.node is not None:
+                await self._send(page, self._detail(request.node))
         elif len(page.orders) >= MOST_ORDERS_WAITING:
             await self._answer(page, request.number, False, "too many orders at once")
         else:
@@ -215,7 +224,7 @@ class ConsoleServer:
             page.orders.add(task)
             task.add_done_callback(page.orders.discard)
 
-    async def _carry_out(self, page: Page, order: Order) -> None:
+    async def _carry_out(self, page: Page, order: PageOrder) -> None:
         loop = asyncio.get_running_loop()
         try:
             text = await loop.run_in_executor(self._workers, order.carry_out, self._controls)
@@ -226,6 +235,6 @@ class ConsoleServer:
 
     async def _answer(self, page: Page, number: int | None, done: bool, text: str) -> None:
         answer = {"type": "answer", "number": number, "done": done, "text": text}
-        # A page that went meanwhile wants no answer.
+        # A page that is gone by now needs no answer.
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
             await self._send(page, json.dumps(answer))

@@ -13,7 +13,7 @@ CLIMB_ENDS_AT = 0.1  # share of the flight's duration
 DESCENT_STARTS_AT = 0.9  # share of the flight's duration
 
 
-def _between(start: Vector, end: Vector, share: float) -> Vector:
+def between(start: Vector, end: Vector, share: float) -> Vector:
     """The point at `share` (0..1) of the straight line from `start` to `end`."""
     return (
         start[0] + (end[0] - start[0]) * share,
@@ -65,12 +65,12 @@ class FlightPath:
         if share >= 1.0:
             return self.goal
         if share < CLIMB_ENDS_AT:
-            return _between(self.start, self.above_start, share / CLIMB_ENDS_AT)
+            return between(self.start, self.above_start, share / CLIMB_ENDS_AT)
         if share < DESCENT_STARTS_AT:
             across = (share - CLIMB_ENDS_AT) / (DESCENT_STARTS_AT - CLIMB_ENDS_AT)
-            return _between(self.above_start, self.above_goal, across)
+            return between(self.above_start, self.above_goal, across)
         descent = (share - DESCENT_STARTS_AT) / (1.0 - DESCENT_STARTS_AT)
-        return _between(self.above_goal, self.goal, descent)
+        return between(self.above_goal, self.goal, descent)
 
     def is_descending(self, now_s: float) -> bool:
         """Whether the last, vertical part has begun."""

@@ -73,3 +73,6 @@ class IDroneEngine(abc.ABC):
         example hovering instead of landing.
         """
         self.set_goal(latitude, longitude, height)
+
+    def close(self) -> None:  # noqa: B027 - most engines hold nothing
+        """Release what the engine holds. Called once, after the last other call."""

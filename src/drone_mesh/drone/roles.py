@@ -1,4 +1,4 @@
-"""Role: what a drone does in the mesh."""
+"""Role: what a drone does in the mesh, and the body that it has."""
 
 from __future__ import annotations
 
@@ -15,3 +15,8 @@ class Role(enum.IntEnum):
     def word(self) -> str:
         """The word that people see."""
         return self.name.lower()
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Edges of its box along x, y, z, in metres (docs/protocol.md, "World and flights")."""
+        return (0.2, 0.1, 0.2) if self is Role.GATEWAY else (0.2, 0.2, 0.1)

@@ -1,22 +1,37 @@
-"""The state of an in-process network in the form that tables, reports and pictures read."""
+"""The state of an in-process network in the form that every view reads."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Iterable, Mapping
+from typing import Iterable, Mapping, Protocol
 
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.drone.roles import Role
+from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
-from drone_mesh.state.observation import describe_component, way_ahead
+from drone_mesh.state.observation import describe_component, path_ahead
 from drone_mesh.state.routes import route_to_gateway
 
-if TYPE_CHECKING:
-    from drone_mesh.inprocess.network import Node
+
+class ObservedNode(Protocol):
+    """What is read of a node of the network."""
+
+    component: MeshnetworkComponent
+    drone: InProcessDrone
+
+    @property
+    def antenna(self) -> IWirelessCommunication: ...
+
+    @property
+    def is_gateway(self) -> bool: ...
 
 
-def mesh_status(nodes: Mapping[int, Node], now_s: float, max_distance_m: float) -> MeshStatus:
-    """What /mesh/state would say of these nodes now. Nobody changes it afterwards."""
+def mesh_status(
+    nodes: Mapping[int, ObservedNode], now_s: float, max_distance_m: float
+) -> MeshStatus:
+    """What /mesh/state would contain for these nodes now; it does not change afterwards."""
     known = {node_id: _node_status(node_id, nodes[node_id], now_s) for node_id in sorted(nodes)}
     for status in known.values():
         status.route = route_to_gateway(status.id, known)
@@ -24,7 +39,7 @@ def mesh_status(nodes: Mapping[int, Node], now_s: float, max_distance_m: float) 
 
 
 def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
-    """What /mesh/events would say of these events, oldest first."""
+    """What /mesh/events would contain for these events, oldest first."""
     batcher = EventBatcher()
     records: list[EventRecord] = []
     for event in events:
@@ -33,10 +48,10 @@ def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
     return records
 
 
-def _node_status(node_id: int, node: Node, now_s: float) -> NodeStatus:
+def _node_status(node_id: int, node: ObservedNode, now_s: float) -> NodeStatus:
     status = NodeStatus(node_id, Role.GATEWAY if node.is_gateway else Role.ROUTER)
-    describe_component(status, node.component, node.antenna.powered, now_s)
+    describe_component(status, node.component, node.antenna.on(), now_s)
     status.position = node.drone.get_location().to_vector()
     path = node.drone.path
-    status.path = () if path is None else way_ahead(path, now_s)
+    status.path = () if path is None else path_ahead(path, now_s)
     return status

@@ -1,7 +1,7 @@
-"""What may be asked of a gateway over HTTP, and what it answers.
+"""The requests that a gateway answers over HTTP.
 
-No `from __future__ import annotations` here: FastAPI reads the annotations at run time, and has to
-be able to on Python 3.8.
+No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
+Python 3.8.
 """
 
 import hmac
@@ -41,20 +41,20 @@ Responses = Dict[Union[int, str], Dict[str, Any]]
 
 
 class Refusal(BaseModel):
-    """Why something was not done."""
+    """The reason for a refusal."""
 
     detail: str
 
 
 class Ready(BaseModel):
-    """The gateway works."""
+    """The gateway is running."""
 
     ready: bool
     gateway: int = Field(description="Its node id.")
 
 
 class OrderSent(BaseModel):
-    """The order is on its way through the mesh. Nothing is told back about the arrival."""
+    """The order was sent through the mesh. The arrival is not reported."""
 
     drone: int
     latitude: float = Field(description="y, metres")
@@ -63,7 +63,7 @@ class OrderSent(BaseModel):
 
 
 class NodeReport(BaseModel):
-    """What the gateway knows of one node."""
+    """One node, as the gateway knows it."""
 
     id: int
     next_hop: Optional[int] = Field(description="The neighbour that leads to it; null: no route.")
@@ -72,20 +72,20 @@ class NodeReport(BaseModel):
 
 
 class NodeReports(BaseModel):
-    """What the gateway knows of the mesh. It does not list itself among the nodes."""
+    """All nodes that the gateway knows, without itself."""
 
     gateway: int
     nodes: List[NodeReport]
 
 
 def make_api(desk: GatewayDesk, access: Access) -> FastAPI:
-    """The application. Its page /docs needs nothing from elsewhere."""
+    """The application. Its page /docs loads nothing from the internet."""
     app = FastAPIOffline(
         title="drone_mesh gateway",
-        description="Sends drones to places, and tells what this gateway knows of the mesh.",
+        description="Sends drones to places and lists the nodes that this gateway knows.",
         version="1",
         redoc_url=None,
-        # Only the operations of this page are answered, in one spelling each.
+        # Each operation has one spelling.
         redirect_slashes=False,
     )
     app.add_middleware(RequestGuard, access=access)
@@ -99,23 +99,23 @@ def make_api(desk: GatewayDesk, access: Access) -> FastAPI:
             return
         given = credentials.credentials if credentials is not None else ""
         if not hmac.compare_digest(given.encode(), access.token.encode()):
-            reason = "the token is wrong" if given else "a token is wanted: Authorization: Bearer"
+            reason = "invalid token" if given else "token missing: send Authorization: Bearer"
             raise HTTPException(401, reason, headers={"WWW-Authenticate": "Bearer"})
 
     refusals: Responses = {
-        401: {"model": Refusal, "description": "No token, or a wrong one"},
-        503: {"model": Refusal, "description": "Not done, and it will not be"},
-        504: {"model": Refusal, "description": "Begun, but the gateway has not finished"},
+        401: {"model": Refusal, "description": "Token missing or invalid"},
+        503: {"model": Refusal, "description": "Not done; nothing was sent"},
+        504: {"model": Refusal, "description": "Started, but not finished in time"},
     }
     order_refusals: Responses = {
         **refusals,
-        422: {"model": Refusal, "description": "Not a drone, or not a place"},
+        422: {"model": Refusal, "description": "Invalid drone id or place"},
     }
     guards = [Depends(check_token)]
 
     @app.get("/ready", dependencies=guards, responses=refusals)
     async def ready() -> Ready:
-        """Whether the gateway works: its own thread answers this."""
+        """Whether the gateway is running; its own thread answers."""
         return await desk.ask(
             lambda gateway, _now_s: Ready(ready=True, gateway=gateway.get_node_id())
         )
@@ -141,9 +141,11 @@ def make_api(desk: GatewayDesk, access: Access) -> FastAPI:
             )
         )
         if not taken:
-            raise HTTPException(503, f"the gateway has no route to drone {id}: it stays")
+            raise HTTPException(
+                503, f"the gateway has no route to drone {id}, which stays where it is"
+            )
         _log.info(
-            "drone %d is ordered to latitude %g m, longitude %g m, height %d m",
+            "drone %d: order sent, to latitude %g m, longitude %g m, height %d m",
             id,
             latitude,
             longitude,

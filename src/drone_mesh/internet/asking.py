@@ -1,4 +1,4 @@
-"""Asking the thread that owns a gateway, from the event loop of the HTTP server."""
+"""Passes requests from the HTTP server's event loop to the thread that owns a gateway."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ Answer = TypeVar("Answer")
 
 
 class NotCarriedOut(MeshError):
-    """The gateway did not come to it in time, and will not do it any more. Ask again later."""
+    """The gateway did not start the request in time and has dropped it. Try again later."""
 
 
 class AnswerLate(MeshError):
-    """The gateway has begun with it and is not done: nobody knows how it ends."""
+    """The gateway started the request but did not finish in time; the outcome is unknown."""
 
 
 class GatewayDesk:
-    """Where questions wait for the gateway, and their askers for its answers.
+    """Queues questions for the gateway and waits for its answers.
 
-    `open` and `close` may be called by any thread. All else belongs to the server's event loop,
-    except the questions themselves: those run where `submit` brings them.
+    Any thread may call `open` and `close`. Everything else belongs to the server's event loop,
+    except the questions themselves, which run on the thread behind `submit`.
     """
 
     def __init__(self, submit: Submit, answer_within_s: float) -> None:
@@ -43,14 +43,14 @@ class GatewayDesk:
         self._gateway = gateway
 
     def close(self) -> None:
-        """Take no more questions, and give up those that the gateway has not come to."""
+        """Refuse further questions and cancel those that the gateway has not started."""
         self._gateway = None
         if self._loop is not None:
-            with contextlib.suppress(RuntimeError):  # the loop has ended, and all waiting with it
+            with contextlib.suppress(RuntimeError):  # the loop has ended, and its requests with it
                 self._loop.call_soon_threadsafe(self._give_up)
 
     async def ask(self, question: Callable[[IGatewayCommands, float], Answer]) -> Answer:
-        """Have `question(gateway, now_s)` answered by the gateway's thread.
+        """Run `question(gateway, now_s)` on the gateway's thread and return its result.
 
         Raises NotCarriedOut, AnswerLate, and whatever the question raises.
         """
@@ -62,10 +62,10 @@ class GatewayDesk:
 
         def answer(now_s: float) -> None:
             if not future.set_running_or_notify_cancel():
-                return  # nobody waits for it any more
+                return  # the request was cancelled
             try:
                 future.set_result(question(gateway, now_s))
-            except Exception as error:  # it is the asker's to handle
+            except Exception as error:  # the caller of `ask` handles it
                 future.set_exception(error)
 
         self._waiting.add(future)
@@ -74,9 +74,9 @@ class GatewayDesk:
             self._submit(answer)
             await asyncio.wait({arrival}, timeout=self._answer_within_s)
             if future.cancel():
-                raise NotCarriedOut("the gateway is busy or stopping: nothing was done")
+                raise NotCarriedOut("the gateway is busy or stopping; nothing was sent")
             if not future.done():
-                raise AnswerLate("the gateway has begun with this and is not done yet")
+                raise AnswerLate("the gateway has started but not finished yet")
             return future.result()
         finally:
             self._waiting.discard(future)

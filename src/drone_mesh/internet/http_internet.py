@@ -11,14 +11,14 @@ from drone_mesh.internet.asking import GatewayDesk, Submit
 from drone_mesh.web.access import access_for
 from drone_mesh.web.server_thread import ServerThread
 
-ANSWER_WITHIN_S = 2.0  # our choice: over ten times what an order to a node that is gone takes
+ANSWER_WITHIN_S = 2.0  # our choice: over ten times the duration of an order to a lost node
 MOST_CONNECTIONS = 64  # our choice; more are answered 503
 
 _log = logging.getLogger(__name__)
 
 
 class HttpInternet(IInternetConnection):
-    """A gateway's HTTP side. The server has a thread of its own, from connect to disconnect.
+    """The HTTP connection of a gateway. Its server has its own thread.
 
     No request holds a lock or a thread while it waits for the gateway.
     """
@@ -61,6 +61,6 @@ class HttpInternet(IInternetConnection):
         _log.info("gateway %d: orders over HTTP at %s/docs", commands.get_node_id(), self.url)
 
     def disconnect(self) -> None:
-        """Refuse what is still waiting, end the server and give the port back."""
+        """Refuse waiting requests, stop the server and release the port."""
         self._desk.close()
         self._server.stop()

@@ -1,4 +1,4 @@
-"""What is refused before a request is looked at: too large, or sent by somebody else's web page."""
+"""Refuses requests that are too large or come from a page of another site."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp, Receive, Scope, Send
 
 MOST_BODY_BYTES = 1024  # our choice: no request needs a body; clients that send "{}" may
-MOST_TARGET_BYTES = 1024  # our choice: five times the longest address that means something
+MOST_TARGET_BYTES = 1024  # our choice: five times the longest valid address
 
 
 class RequestGuard:
-    """ASGI middleware. Who has the right token is not judged here but with each operation."""
+    """ASGI middleware. Each operation checks the token itself."""
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
@@ -33,7 +33,7 @@ class RequestGuard:
             return
         status, reason = refusal
         self.refused[status] += 1
-        # The rest of such a request is not worth reading.
+        # The body of such a request is not read.
         response = JSONResponse({"detail": reason}, status, headers={"Connection": "close"})
         await response(scope, receive, send)
 
@@ -45,16 +45,16 @@ class RequestGuard:
         if sum(len(name) + len(value) for name, value in headers.raw) > MAX_HEAD_BYTES:
             return 431, f"the headers are longer than {MAX_HEAD_BYTES} bytes"
         if "transfer-encoding" in headers:
-            return 411, "say with Content-Length how long the body is; no request needs one"
+            return 411, "Content-Length is missing; no request needs a body"
         length = headers.get("content-length", "0")
         if not (length.isascii() and length.isdigit()):
-            return 400, "Content-Length is no number"
+            return 400, "invalid Content-Length"
         if len(length) > 9 or int(length) > MOST_BODY_BYTES:
             return 413, f"the body is larger than {MOST_BODY_BYTES} bytes; no request needs one"
         try:
             host = headers.get("host", "")
             self._access.check_host(host)
-            if "origin" in headers:  # a browser: the page has to be ours
+            if "origin" in headers:  # a browser: the page must be ours
                 self._access.check_origin(headers["origin"], host)
         except AccessDenied as error:
             return 403, str(error)

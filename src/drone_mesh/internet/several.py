@@ -1,4 +1,4 @@
-"""SeveralInternets: a gateway that can be reached in more than one way."""
+"""SeveralInternets: several connections of one gateway."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConne
 
 
 class SeveralInternets(IInternetConnection):
-    """Connects and disconnects all of them."""
+    """Connects and disconnects all its connections."""
 
     def __init__(self, *connections: IInternetConnection) -> None:
         self._connections = connections

@@ -1,4 +1,4 @@
-"""Some nodes on one emulated air, in the time of the wall: to try the programs without hardware."""
+"""An emulated air on the wall clock, to try the programs without hardware."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
 # From one column to the next: 0.7 of the distance at which one frame in four is lost (0 dBm, path
-# loss exponent 2.7). So the next column is in reach, the one after it is not.
+# loss exponent 2.7). The next column is in range, the one after it is not.
 COLUMN_M = {DataRate.KBPS_250: 70.0, DataRate.MBPS_1: 32.0, DataRate.MBPS_2: 25.0}
-MOST_COLUMNS = 4  # of routers; over more hops, collisions make the answers of a gateway too late
+MOST_COLUMNS = 4  # of routers; over more hops, collisions delay the gateway's answers too long
 FEWEST_IN_COLUMN = 2  # so that each router has a detour
 _COLUMN_WIDTH = 0.5  # from its first to its last router, in distances between columns
 
@@ -29,10 +29,10 @@ _log = logging.getLogger(__name__)
 
 
 class EmulatedAir:
-    """Makes emulated radios: node 0, then columns of nodes, each further away than the last."""
+    """Creates emulated radios: node 0, then columns of nodes at growing distance."""
 
     def __init__(self, settings: RadioSettings, nodes: int, trace_file: Path | None = None) -> None:
-        """Starts a thread that `close` ends. ConfigurationError if the file cannot be written."""
+        """Starts a thread that `close` ends. ConfigurationError if the file is not writable."""
         self._trace_file = trace_file
         self._trace = FrameTrace()
         if trace_file is not None:
@@ -45,7 +45,7 @@ class EmulatedAir:
             self._air.observe(self._trace.see)
 
     def place(self, node_id: int) -> Location:
-        """Where a node stands."""
+        """The position of a node."""
         if node_id == 0:
             return Location(0.0, 0.0, 0.0)
         column, row = divmod(node_id - 1, self._in_column)
@@ -69,11 +69,11 @@ class EmulatedAir:
         )
 
     def close(self) -> None:
-        """End the air, when its radios are closed, and write what was on it."""
+        """End the air and write the trace. The radios must be closed before."""
         self._clock.close()
         if self._trace_file is not None:
             frames = self._write_trace(self._trace_file)
-            _log.info("%d frames that were on the air are in %s", frames, self._trace_file)
+            _log.info("wrote %d frames to %s", frames, self._trace_file)
 
     def _write_trace(self, file: Path) -> int:
         try:

@@ -1,4 +1,4 @@
-"""One node of the mesh with everything that belongs to it: radio, drone, software, thread."""
+"""One node of the mesh: radio, drone, software and thread."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from drone_mesh.raspberry.options import Options
 _log = logging.getLogger(__name__)
 
 MakeInternet = Callable[[Callable[[Work], None]], IInternetConnection]
-"""Makes a gateway's internet side from `submit`."""
+"""Creates the internet connection of a gateway from `submit`."""
 
 
 class RadioNode:
-    """A router, or a gateway if it is given an internet side. One thread at a time may use it.
+    """A router, or a gateway if it gets an internet connection. For one thread at a time.
 
     The node's own thread works in the component, from start to stop.
     """
@@ -37,7 +37,7 @@ class RadioNode:
         options: Options,
         make_internet: MakeInternet | None = None,
     ) -> None:
-        """Takes the radio over. Raises what `make_internet` raises."""
+        """Takes ownership of the radio. Raises what `make_internet` raises."""
         self.radio = radio
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
         self._seat = self._executor.seat()
@@ -57,16 +57,16 @@ class RadioNode:
 
     def start(self) -> None:
         """Start the radio and the mesh software; RadioError if the chip does not answer."""
-        self.component.start(time.monotonic())  # before the thread, to see what is wrong with it
+        self.component.start(time.monotonic())  # before the thread, so that errors reach the caller
         self._started = True
         self._seat.submit(lambda _now_s: self._seat.take(self.component))
         self._executor.start()
 
     def stop(self) -> None:
-        """End the software and its thread, and give the radio back, powered down."""
+        """Stop the software and its thread; power the radio down and release it."""
         if self._started:
             self._started = False
-            self._antenna.switch_power(False)  # what is still to be sent fails at once
+            self._antenna.switch_power(False)  # remaining sends fail at once
             self._seat.submit(lambda _now_s: self.component.stop())
             self._executor.stop()
             counters = dataclasses.asdict(self._antenna.statistics())
@@ -85,7 +85,7 @@ _WITHOUT_LINE = frozenset((MeshEventKind.NO_ROUTE, MeshEventKind.FLIGHT_ORDERED)
 
 
 def _log_event(event: MeshEvent) -> None:
-    """One line for what happened; orders have lines of their own already."""
+    """One line per event; orders have their own lines already."""
     if event.kind in _WITHOUT_LINE:
         return
     words = [event.kind.value]

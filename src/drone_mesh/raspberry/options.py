@@ -20,7 +20,7 @@ from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
 
-MOST_EMULATED = 17  # our choice: as many as in the field case, and what one machine carries
+MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
 TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
 LOG_LEVELS = ("debug", "info", "warning", "error")
 HIGHEST_GPIO = 27  # of the 40-pin header
@@ -39,7 +39,7 @@ class Hardware:
 
 @dataclass(frozen=True)
 class HttpOptions:
-    """Where a gateway takes orders."""
+    """The address at which a gateway takes orders."""
 
     address: str
     port: int
@@ -48,7 +48,7 @@ class HttpOptions:
 
 @dataclass(frozen=True)
 class Options:
-    """What was asked for."""
+    """The options of one program."""
 
     node_id: int
     hardware: Hardware
@@ -56,8 +56,8 @@ class Options:
     timing: MeshTiming
     routing: str
     location: Location
-    emulated: int  # that many emulated nodes instead of the real one; 0: the real one
-    trace: Path | None  # where to write what was on the emulated air
+    emulated: int  # number of emulated nodes that replace the real one; 0: none
+    trace: Path | None  # file for the frames on the emulated air
     log_level: str
     http: HttpOptions | None  # None: not a gateway
 
@@ -65,40 +65,40 @@ class Options:
 def parse_router(
     arguments: Sequence[str] | None = None, environment: Mapping[str, str] = os.environ
 ) -> Options:
-    """The options of raspberry_router; ends the program, with a reason, if they are wrong."""
+    """The options of raspberry_router; invalid ones end the program with a message."""
     parser = _parser(
-        "raspberry_router", "A router of the drone mesh: forwards for others over its radio."
+        "raspberry_router", "A router of the drone mesh: forwards packets over its radio."
     )
-    who = parser.add_mutually_exclusive_group(required=True)
-    who.add_argument(
-        "--id", type=_whole(0, MAX_NODE_ID), help="node id, 0..253, another one for each node"
+    node = parser.add_mutually_exclusive_group(required=True)
+    node.add_argument(
+        "--id", type=_whole(0, MAX_NODE_ID), help="node id, 0..253, unique in the mesh"
     )
-    _add_emulated(who)
+    _add_emulated(node)
     return _options(parser, parser.parse_args(arguments), environment)
 
 
 def parse_gateway(
     arguments: Sequence[str] | None = None, environment: Mapping[str, str] = os.environ
 ) -> Options:
-    """The options of raspberry_gateway; ends the program, with a reason, if they are wrong."""
+    """The options of raspberry_gateway; invalid ones end the program with a message."""
     parser = _parser(
         "raspberry_gateway",
-        "A gateway of the drone mesh: what comes in over HTTP goes out over its radio.",
+        "A gateway of the drone mesh: takes orders over HTTP and sends them over its radio.",
     )
-    who = parser.add_mutually_exclusive_group()
-    who.add_argument(
+    node = parser.add_mutually_exclusive_group()
+    node.add_argument(
         "--id",
         type=_whole(0, MAX_NODE_ID),
         default=0,
-        help="node id, 0..253, another one for each node (default: %(default)s)",
+        help="node id, 0..253, unique in the mesh (default: %(default)s)",
     )
-    _add_emulated(who)
+    _add_emulated(node)
     http = parser.add_argument_group("HTTP")
     http.add_argument(
         "--bind",
         metavar="ADDRESS",
         default=DEFAULT_ADDRESS,
-        help="address to listen on; any but one of this machine alone needs a token "
+        help="address to listen on; an address that other machines can reach needs a token "
         "(default: %(default)s)",
     )
     http.add_argument(
@@ -111,7 +111,7 @@ def parse_gateway(
         "--token-file",
         metavar="FILE",
         type=Path,
-        help="file with the token that requests must bring, at least 16 characters; without this "
+        help="file with the token that requests must carry, at least 16 characters; without this "
         f"option the environment variable {TOKEN_VARIABLE} is used",
     )
     return _options(parser, parser.parse_args(arguments), environment)
@@ -121,7 +121,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         program,
         description=description,
-        epilog="All nodes of a mesh need the same channel, rate, CRC and kind of broadcast.",
+        epilog="All nodes of a mesh need the same channel, rate, CRC and broadcast mode.",
     )
     wiring = parser.add_argument_group("wiring")
     wiring.add_argument(
@@ -166,8 +166,8 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "--broadcast",
         choices=_BROADCASTS,
         default=BroadcastMode.NO_ACK.value,
-        help="how broadcasts are sent; shockburst if one of the nodes has a clone of the chip or "
-        "one without the plus (default: %(default)s)",
+        help="broadcast mode; shockburst if a node has a clone of the chip or a chip without '+' "
+        "(default: %(default)s)",
     )
     mesh = parser.add_argument_group("mesh")
     mesh.add_argument(
@@ -175,14 +175,14 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         type=float,
         default=MeshTiming.check_period_s,
         metavar="SECONDS",
-        help="how often routes and connection are looked after (default: %(default)g)",
+        help="time between two checks of routes and connection (default: %(default)g)",
     )
     mesh.add_argument(
         "--connection-lost-after",
         type=float,
         default=MeshTiming.connection_lost_after_s,
         metavar="SECONDS",
-        help="how long without a gateway is an emergency (default: %(default)g)",
+        help="time without a gateway until the node repairs the mesh (default: %(default)g)",
     )
     mesh.add_argument(
         "--routing",
@@ -191,7 +191,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(default: %(default)s)",
     )
     place = parser.add_argument_group(
-        "place", "Where the node stands, in metres, for drones that reckon with it."
+        "place", "Position of the node, in metres, in the common frame of the drones."
     )
     place.add_argument("--latitude", type=float, default=0.0, help="y (default: %(default)g)")
     place.add_argument("--longitude", type=float, default=0.0, help="x (default: %(default)g)")
@@ -209,15 +209,14 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _add_emulated(who: argparse._MutuallyExclusiveGroup) -> None:
-    who.add_argument(
+def _add_emulated(node: argparse._MutuallyExclusiveGroup) -> None:
+    node.add_argument(
         "--emulated",
         type=_whole(2, MOST_EMULATED),
         default=0,
         metavar="N",
-        help=f"no hardware: N nodes (2..{MOST_EMULATED}) in this program on emulated radios, a "
-        "gateway (0) and routers in columns; those that are not in the first one can only be "
-        "reached through others",
+        help=f"without hardware: run N nodes (2..{MOST_EMULATED}) on emulated radios, a gateway "
+        "(0) and routers in columns; columns after the first are reachable only through others",
     )
 
 
@@ -225,7 +224,7 @@ def _options(
     parser: argparse.ArgumentParser, parsed: argparse.Namespace, environment: Mapping[str, str]
 ) -> Options:
     if parsed.trace is not None and not parsed.emulated:
-        parser.error("--trace needs --emulated: a real radio does not hear what others send")
+        parser.error("--trace needs --emulated: a real radio cannot record the frames of others")
     location = Location(parsed.latitude, parsed.longitude, parsed.height)
     try:
         check_goal(*location)
@@ -259,7 +258,9 @@ def _http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) ->
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigurationError(f"--token-file {parsed.token_file}: {error}") from error
         if not token:
-            raise ConfigurationError(f"--token-file {parsed.token_file}: there is no token in it")
+            raise ConfigurationError(
+                f"--token-file {parsed.token_file}: the file contains no token"
+            )
     try:
         access_for(parsed.bind, token)
     except ConfigurationError as error:
@@ -275,7 +276,7 @@ def _whole(lowest: int, highest: int) -> Callable[[str], int]:
             number = lowest - 1
         if not lowest <= number <= highest:
             raise argparse.ArgumentTypeError(
-                f"{text!r} is not a whole number of {lowest}..{highest}"
+                f"invalid value {text!r}: must be a whole number {lowest}..{highest}"
             )
         return number
 
@@ -285,5 +286,7 @@ def _whole(lowest: int, highest: int) -> Callable[[str], int]:
 def _spi_device(text: str) -> tuple[int, int]:
     bus, dot, device = text.partition(".")
     if not (dot and bus.isdecimal() and device.isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is not BUS.DEVICE, as in 0.0")
+        raise argparse.ArgumentTypeError(
+            f"invalid SPI device {text!r}: must be BUS.DEVICE, as in 0.0"
+        )
     return int(bus), int(device)

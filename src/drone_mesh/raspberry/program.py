@@ -1,4 +1,4 @@
-"""What raspberry_router and raspberry_gateway do from start to end."""
+"""The run of raspberry_router and raspberry_gateway, from start to end."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from drone_mesh.raspberry.options import Hardware, Options
 
 LOOK_PERIOD_S = 0.5  # our choice: how often the main thread looks at the nodes
 LONELY_AFTER_S = 15.0  # our choice: one check period and half of the next
-LONELY_AGAIN_S = 300.0  # our choice: how often that is said
+LONELY_AGAIN_S = 300.0  # our choice: how often the warning is repeated
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _log = logging.getLogger(__name__)
 
 
 def run(program: str, parse: Callable[[], Options]) -> int:
-    """Run until a signal ends it; the exit status."""
+    """Run until a signal ends it; returns the exit status."""
     with _signals() as ended:
         try:
             options = parse()
@@ -49,7 +49,7 @@ def run(program: str, parse: Callable[[], Options]) -> int:
 
 @contextlib.contextmanager
 def _signals() -> Iterator[threading.Event]:
-    """An event that is set by Ctrl-C and the like; a second one ends the program at once."""
+    """An event that Ctrl-C, TERM or HUP sets; a second signal ends the program at once."""
     ended = threading.Event()
 
     def end(number: int, _frame: FrameType | None) -> None:
@@ -73,11 +73,11 @@ def _run(options: Options, ended: threading.Event) -> None:
         watch = _Watch(nodes, options)
         while not ended.wait(LOOK_PERIOD_S):
             watch.look(time.monotonic())
-        _log.info("ending")
+        _log.info("stopping")
 
 
 def _stop(nodes: Sequence[RadioNode]) -> None:
-    """All at once: one after the other they would spend the end on calling those that are gone."""
+    """Stop all at once; one by one, each would still call those that have stopped."""
     with ThreadPoolExecutor(len(nodes)) as pool:
         for stopped in [pool.submit(node.stop) for node in nodes]:
             stopped.result()
@@ -140,7 +140,7 @@ def _internet(options: Options) -> MakeInternet | None:
 
 
 class _NoInternet(IInternetConnection):
-    """The gateway that emulated routers are given takes no orders."""
+    """No connection: the gateway beside emulated routers takes no orders."""
 
     def connect(self, commands: IGatewayCommands) -> None:
         pass
@@ -154,7 +154,7 @@ def _without_internet(_submit: Callable[[Work], None]) -> IInternetConnection:
 
 
 class _Watch:
-    """Says how far the nodes have come."""
+    """Logs the progress of the nodes."""
 
     def __init__(self, nodes: Sequence[RadioNode], options: Options) -> None:
         self._nodes = nodes
@@ -164,7 +164,7 @@ class _Watch:
         self._lonely_at_s = self._started_s + LONELY_AFTER_S
 
     def look(self, now_s: float) -> None:
-        """To be called again and again."""
+        """Log what has changed; to be called periodically."""
         if len(self._nodes) > 1:
             self._count_connected(now_s)
         elif self._nodes[0].component.get_neighbours():
@@ -172,7 +172,7 @@ class _Watch:
         elif now_s >= self._lonely_at_s:
             self._lonely_at_s = now_s + LONELY_AGAIN_S
             _log.warning(
-                "node %d hears nobody: are others switched on and in reach, with the same channel, "
+                "node %d hears no other node: are others on and in range, with the same channel, "
                 "rate and CRC?",
                 self._options.node_id,
             )

@@ -8,7 +8,7 @@ from typing import Iterable, Mapping, Sequence
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.errors import MeshError
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
-from drone_mesh.state.outages import Outage, Sample, find_outages, take_sample
+from drone_mesh.state.outages import MeshSample, Outage, find_outages, take_sample
 
 BLIP_S = 1.0  # our choice: a node that is back sooner was only waiting for an answer
 
@@ -21,7 +21,7 @@ class NothingRecorded(MeshError):
 class RunStory:
     """A run, ready to be drawn and written down. Seconds are simulated ones."""
 
-    samples: Sequence[Sample]
+    samples: Sequence[MeshSample]
     events: Sequence[EventRecord]
     outages: Sequence[Outage]  # without blips, and without nodes that were switched off themselves
     blips: int  # how many outages were shorter than BLIP_S
@@ -37,7 +37,7 @@ def tell_story(states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> R
     outages = find_outages(records)
     real = [outage for outage in outages if not outage.switched_off and not _is_blip(outage)]
     first_loss_s = _first_loss_s(records, real)
-    samples: list[Sample] = []
+    samples: list[MeshSample] = []
     tracks: dict[int, list[tuple[float, float]]] = {}
     first = before = after = None
     for mesh in states:

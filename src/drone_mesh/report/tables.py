@@ -10,7 +10,7 @@ from typing import Sequence, Union
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.report.story import RunStory
 from drone_mesh.state.model import EventRecord
-from drone_mesh.state.outages import Outage, Sample
+from drone_mesh.state.outages import MeshSample, Outage
 
 EVENT_KINDS_LEFT_OUT = frozenset(
     kind.value
@@ -52,7 +52,7 @@ def repair_rows(story: RunStory) -> list[dict[str, str]]:
             "noticed": _seconds(outage.cause_s, outage.lost_s),
             "decided": _seconds(outage.lost_s, outage.decided_s),
             "flown": _seconds(outage.decided_s, outage.landed_s),
-            "place": "–" if outage.place_of is None else str(outage.place_of),
+            "fallback": "–" if outage.fallback is None else f"node {outage.fallback}'s",
             "connected": _seconds(_stood_s(outage), outage.connected_s),
             "total": _seconds(_began_s(outage), outage.connected_s),
             "on_ground": _on_ground(outage),
@@ -65,13 +65,13 @@ def write_csv(story: RunStory, folder: Path) -> list[Path]:
     """samples.csv, events.csv and outages.csv; returns their paths. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     return [
-        _write_rows(folder / "samples.csv", Sample, story.samples),
+        _write_rows(folder / "samples.csv", MeshSample, story.samples),
         _write_rows(folder / "outages.csv", Outage, story.outages),
         _write_rows(folder / "events.csv", EventRecord, story.events),
     ]
 
 
-Row = Union[Sample, Outage, EventRecord]
+Row = Union[MeshSample, Outage, EventRecord]
 
 
 def _write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> Path:

@@ -1,1 +1,1 @@
-"""The state of the whole mesh, for people: merged, judged, as a table or a story. No ROS."""
+"""The state of the whole mesh: merged, judged, and counted over time. No ROS."""

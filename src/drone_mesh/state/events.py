@@ -1,4 +1,4 @@
-"""Events on their way from the mesh software to people: gathered, and bounded."""
+"""Events on their way from the mesh software to people: batched, in bounded memory."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ EVENTS_KEPT = 100_000  # our choice: 254 nodes that find 200 neighbours each, an
 
 
 class EventBatcher:
-    """Takes events from any thread; one other thread takes them out in batches.
+    """Accepts events from any thread; one thread takes them out in batches.
 
-    A crowd that meets makes tens of thousands of events in a second. Of one node, neighbours
-    found (or lost, or missing) one after the other become one event with many peers.
+    When a crowd of nodes meets, it produces tens of thousands of events within a second. So
+    consecutive neighbours that one node found (or lost, or misses) become one event with many
+    peers.
     """
 
     def __init__(self) -> None:
         self._waiting: deque[MeshEvent] = deque(maxlen=EVENTS_KEPT)  # append and popleft are atomic
 
     def observe(self, event: MeshEvent) -> None:
-        """A MeshObserver. With nobody to take them out the oldest events are forgotten."""
+        """A MeshObserver. Beyond EVENTS_KEPT the oldest events are dropped."""
         self._waiting.append(event)
 
     def take(self) -> list[EventRecord]:
-        """Everything since the last call, oldest first."""
+        """All events since the last call, oldest first."""
         batch: list[EventRecord] = []
         peers_of: list[list[int]] = []
         latest_of: dict[int, int] = {}

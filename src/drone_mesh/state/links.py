@@ -1,9 +1,12 @@
-"""Links between nodes, by what they are used for."""
+"""Links between nodes, and what each of them is used for."""
 
 from __future__ import annotations
 
+import enum
 import math
-from typing import Sequence, Tuple
+from typing import Iterable, Sequence, Tuple
+
+import numpy as np
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import NodeStatus, position_is_known
@@ -13,19 +16,39 @@ JUST_LOST_S = 6.0  # our choice: long enough to be seen
 Link = Tuple[int, int]  # the lower id first
 
 
-def known_links(nodes: Sequence[NodeStatus]) -> set[Link]:
-    """Pairs of which one lists the other as a neighbour, and both are on."""
-    on = {node.id for node in nodes if node.on}
+class LinkUse(enum.Enum):
+    """What a link is used for. The value is the word that people see."""
+
+    ROUTE = "route to a gateway"
+    KNOWN = "known link"  # the two are neighbours, and no route leads over it
+    LOST = "lost link"  # it was there a moment ago
+
+
+def links_by_use(
+    nodes: Sequence[NodeStatus], lost: Iterable[Link] = ()
+) -> dict[LinkUse, set[Link]]:
+    """Every link between these nodes, each under one use. `lost` comes from LostLinks."""
+    routes = route_links(nodes)
     return {
-        (min(node.id, other), max(node.id, other))
-        for node in nodes
-        if node.on
-        for other in node.neighbours
-        if other in on
+        LinkUse.ROUTE: routes,
+        LinkUse.KNOWN: known_links(nodes) - routes,
+        LinkUse.LOST: set(lost) - routes,
     }
 
 
-def way_links(nodes: Sequence[NodeStatus]) -> set[Link]:
+def known_links(nodes: Sequence[NodeStatus]) -> set[Link]:
+    """Pairs of nodes of which one lists the other as a neighbour while both are on."""
+    # numpy, because a crowd of 254 lists 36,000 neighbours.
+    on: np.ndarray = np.zeros(256, dtype=bool)  # an id is one byte
+    on[[node.id for node in nodes if node.on]] = True
+    listed: np.ndarray = np.zeros((on.size, on.size), dtype=bool)
+    for node in nodes:
+        listed[node.id, list(node.neighbours)] = True
+    linked = np.triu((listed | listed.T) & on & on[:, None], k=1)
+    return {(low, high) for low, high in np.argwhere(linked).tolist()}
+
+
+def route_links(nodes: Sequence[NodeStatus]) -> set[Link]:
     """The links that packets to a gateway take now."""
     on = {node.id for node in nodes if node.on}
     return {
@@ -36,12 +59,12 @@ def way_links(nodes: Sequence[NodeStatus]) -> set[Link]:
 
 
 def shortest(links: set[Link], nodes: Sequence[NodeStatus], most: int) -> list[Link]:
-    """At most so many of these links, the shortest ones: a crowd has too many to be seen."""
-    places = {node.id: node.position for node in nodes if position_is_known(node)}
-    drawable = [link for link in links if link[0] in places and link[1] in places]
+    """At most `most` of these links, the shortest: a picture of a crowd has no room for more."""
+    positions = {node.id: node.position for node in nodes if position_is_known(node)}
+    drawable = [link for link in links if link[0] in positions and link[1] in positions]
     if len(drawable) <= most:
         return sorted(drawable)
-    drawable.sort(key=lambda link: (math.dist(places[link[0]], places[link[1]]), link))
+    drawable.sort(key=lambda link: (math.dist(positions[link[0]], positions[link[1]]), link))
     return drawable[:most]
 
 
@@ -53,7 +76,7 @@ class LostLinks:
         self._lost_at_s: dict[Link, float] = {}
 
     def update(self, links: set[Link], wall_s: float) -> list[Link]:
-        """The links now; returns those that were lost in the last JUST_LOST_S."""
+        """Take the links that exist now; return those that were lost in the last JUST_LOST_S."""
         for link in self._links - links:
             self._lost_at_s[link] = wall_s
         self._lost_at_s = {

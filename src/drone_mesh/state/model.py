@@ -1,7 +1,7 @@
 """What is known about a mesh at one moment.
 
-NodeStatus has, field for field, the names of NodeState.msg, so that a message may stand wherever
-one of these is read: nothing has to be copied on the way from the wire to the reader.
+NodeStatus and MeshStatus are NodeState.msg and MeshState.msg without ROS. NodeStatus has the
+message's field names, so code that reads one accepts the other and nothing has to be copied.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ UNKNOWN_POSITION = (math.nan, math.nan, math.nan)
 
 @dataclass
 class NodeStatus:
-    """One node, as NodeState.msg describes it (units and special values are given there)."""
+    """One node, as NodeState.msg describes it, with the units and special values given there."""
 
     id: int
     role: int = Role.ROUTER
@@ -28,7 +28,7 @@ class NodeStatus:
     gateway: int = NO_ROUTE
     hops: int = NO_ROUTE
     next_hop: int = NO_ROUTE
-    pref_loc: int = NO_ROUTE
+    fallback: int = NO_ROUTE
     known_nodes: int = 0
     total_messages: int = 0
     neighbours: bytes = b""
@@ -63,5 +63,5 @@ class MeshStatus:
 
 
 def position_is_known(node: NodeStatus) -> bool:
-    """Whether the world, or the node itself, has told where the node is."""
+    """Whether the world or the node itself has reported where the node is."""
     return math.isfinite(node.position[0])

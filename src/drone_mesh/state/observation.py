@@ -1,16 +1,16 @@
-"""Looks at a node and at a drone, and writes down what is there."""
+"""Describes a mesh component and a drone in the terms of a NodeStatus."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
+from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath, Vector
+from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.roster import DroneView
-from drone_mesh.world.drones import VirtualDrone
 
-OLDEST_AGE_S = 255  # what one byte holds
+OLDEST_AGE_S = 255  # the largest value of one byte
 
 
 def describe_component(
@@ -18,18 +18,18 @@ def describe_component(
 ) -> None:
     """Fill in what the mesh software knows of itself. May be called in any thread.
 
-    `on` is whether its antenna has power; place, flight, route and report_age stay untouched.
+    `on` is whether its antenna has power. Position, path, route and report_age are left alone.
     """
     status.on = on
     status.connected = component.get_connected_to_gateway()
     status.gateway = component.get_preferred_gateway()
     status.hops = component.get_hops_from_gateway_away()
     status.next_hop = component.get_route_to_gateway()
-    status.pref_loc = component.get_last_good_known_location_id()
+    status.fallback = component.get_last_good_known_location_id()
     status.known_nodes = component.get_router_tech_table_size()
     status.total_messages = component.get_total_message_sent()
     heard_s = component.get_neighbours()
-    # numpy, because a crowd of 254 has 36,000 neighbours to write down twice a second.
+    # numpy, because a crowd of 254 has 36,000 neighbours to list twice a second.
     ids = np.fromiter(heard_s, np.uint8, len(heard_s))
     ages_s = now_s - np.fromiter(heard_s.values(), float, len(heard_s))
     by_id = ids.argsort()
@@ -37,19 +37,20 @@ def describe_component(
     status.neighbour_ages = ages_s.clip(0, OLDEST_AGE_S).astype(np.uint8)[by_id].tobytes()
 
 
-def view_drone(drone: VirtualDrone, now_s: float) -> DroneView:
-    """Where a drone of the world is and where it goes. May be called in any thread."""
-    x, y, z = drone.engine.state.position
-    path = drone.engine.state.path
-    half_height_m = drone.SIZE_M[2] / 2
-    ahead = way_ahead(path, now_s, half_height_m) if path else ()
-    return DroneView(drone.node_id, drone.ROLE, (x, y, z - half_height_m), ahead)
+def describe_drone(
+    node_id: int, role: Role, centre: Vector, path: FlightPath | None, now_s: float
+) -> DroneView:
+    """Where a simulated drone is and where it flies, given the centre of its box and its path."""
+    half_height_m = role.size_m[2] / 2
+    x, y, z = centre
+    ahead = path_ahead(path, now_s, half_height_m) if path else ()
+    return DroneView(node_id, role, (x, y, z - half_height_m), ahead)
 
 
-def way_ahead(path: FlightPath, now_s: float, lower_by_m: float = 0.0) -> tuple[float, ...]:
-    """x y z of each corner of a flight that is still to come, the goal last, in metres."""
+def path_ahead(path: FlightPath, now_s: float, lower_by_m: float = 0.0) -> tuple[float, ...]:
+    """x y z of each waypoint that is still ahead, the goal last, in metres."""
     share = path.share_flown(now_s)
     _start, above_start, above_goal, goal = path.waypoints
-    corners = [(CLIMB_ENDS_AT, above_start), (DESCENT_STARTS_AT, above_goal), (1.0, goal)]
-    ahead = [corner for reached_at, corner in corners if share < reached_at] or [goal]
+    waypoints = [(CLIMB_ENDS_AT, above_start), (DESCENT_STARTS_AT, above_goal), (1.0, goal)]
+    ahead = [waypoint for reached_at, waypoint in waypoints if share < reached_at] or [goal]
     return tuple(value for x, y, z in ahead for value in (x, y, z - lower_by_m))

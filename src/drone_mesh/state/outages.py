@@ -1,4 +1,4 @@
-"""The story of a run, told from its events: who was lost when, and how each loss was repaired."""
+"""Outages: when each node lost its gateway, and how each loss was repaired, from the events."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ CAUSE_WITHIN_S = 60.0  # our choice; noticed within 30 s (docs/protocol.md, "Req
 
 @dataclass(frozen=True)
 class Outage:
-    """One node's time without a gateway. Seconds of simulated time; None: did not happen (yet)."""
+    """One node's time without a gateway, in simulated seconds. None: it has not happened."""
 
     node: int
-    lost_s: float  # it noticed that no gateway answers
+    lost_s: float  # it noticed that its gateway does not answer
     cause_s: float | None = None  # the last power-off of another node before that
     cause_node: int | None = None
-    emergency_s: float | None = None  # its patience ran out
+    emergency_s: float | None = None  # its time without a gateway ran out
     decided_s: float | None = None  # it decided to fly
-    place_of: int | None = None  # the node whose place it took
-    landed_s: float | None = None  # it noticed that it stands: may be after it is connected
+    fallback: int | None = None  # the node whose position it flew to
+    landed_s: float | None = None  # it noticed the landing; may be after connected_s
     connected_s: float | None = None
-    switched_off: bool = False  # it was switched off itself: nothing to repair
+    switched_off: bool = False  # the node itself was switched off: nothing to repair
 
     @property
     def seconds(self) -> float | None:
@@ -41,9 +41,9 @@ class Outage:
 
 
 def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
-    """Each time that a node lost its gateway and was without one, in order of loss.
+    """Each time that a node was without a gateway, in order of loss.
 
-    A node that flies because it was ordered to is lost, too, until it is connected again.
+    An ordered flight counts as well: the node is without a gateway until it has landed.
     """
     done: list[Outage] = []
     open_of: dict[int, Outage] = {}
@@ -79,7 +79,7 @@ def _new_outage(event: EventRecord, power_offs: Sequence[tuple[float, int]]) -> 
 
 
 def _land_afterwards(done: list[Outage], event: EventRecord) -> None:
-    """A drone looks once a second whether it stands, and may be connected before that."""
+    """A drone checks once a second whether it has landed, and may be connected before that."""
     for index in range(len(done) - 1, -1, -1):
         outage = done[index]
         if outage.node == event.node:
@@ -92,15 +92,15 @@ def _with_phase(outage: Outage, event: EventRecord) -> Outage:
     if event.kind == _EMERGENCY and outage.emergency_s is None:
         return replace(outage, emergency_s=event.stamp_s)
     if event.kind == _FLIGHT_DECIDED:
-        place_of = event.peers[0] if event.peers else None
-        return replace(outage, decided_s=event.stamp_s, place_of=place_of, landed_s=None)
+        fallback = event.peers[0] if event.peers else None
+        return replace(outage, decided_s=event.stamp_s, fallback=fallback, landed_s=None)
     if event.kind == _LANDED and outage.decided_s is not None:
         return replace(outage, landed_s=event.stamp_s)
     return outage
 
 
 @dataclass(frozen=True)
-class Sample:
+class MeshSample:
     """The mesh at one moment, in numbers."""
 
     stamp_s: float
@@ -116,11 +116,11 @@ class Sample:
         return self.routers_connected / self.routers_on if self.routers_on else 1.0
 
 
-def take_sample(mesh: MeshStatus) -> Sample:
+def take_sample(mesh: MeshStatus) -> MeshSample:
     """The numbers that charts show over time."""
     routers = [node for node in mesh.nodes if node.role == Role.ROUTER and node.on]
     hops = [node.hops for node in routers if node.connected]
-    return Sample(
+    return MeshSample(
         stamp_s=mesh.stamp_s,
         routers_on=len(routers),
         routers_connected=len(hops),

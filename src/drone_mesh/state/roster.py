@@ -1,4 +1,4 @@
-"""MeshRoster: puts together what the hosts report and what the world sees."""
+"""MeshRoster: merges what the hosts report with what the world knows about the drones."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from drone_mesh.state.routes import route_to_gateway
 
 @dataclass(frozen=True)
 class DroneView:
-    """What the world knows about a drone."""
+    """What the world knows about one drone."""
 
     id: int
     role: int
     position: Sequence[float]  # (3,) m, map frame, of the underside
-    path: Sequence[float] = ()  # (3 * waypoints,) m, the rest of its flight; empty: it stands
+    path: Sequence[float] = ()  # (3 * waypoints,) m, the rest of its flight; empty: none
 
 
 class MeshRoster:
-    """Belongs to one thread. Wall seconds come in as `wall_s`.
+    """All nodes of the mesh, by host. Belongs to one thread; `wall_s` are seconds of wall time.
 
-    A node that its host no longer reports while the host still speaks is gone, and leaves the
-    roster. A host that falls silent keeps its nodes: their report_age grows.
+    A node leaves the roster when its host sends a report without it. When a host falls silent, its
+    nodes stay and their report_age grows.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class MeshRoster:
         self._ids_of_host: dict[str, set[int]] = {}
 
     def merge_report(self, host: str, nodes: Iterable[NodeStatus], wall_s: float) -> None:
-        """Take over what `host` tells. A node that moved to another host belongs to that one."""
+        """Take over a report of `host`. A node that moved to another host belongs to that one."""
         reported = {node.id: node for node in nodes}
         for gone in self._ids_of_host.get(host, set()) - reported.keys():
             del self._nodes[gone]
@@ -46,10 +46,10 @@ class MeshRoster:
             self._heard_at_s[node] = wall_s
 
     def snapshot(self, drones: Iterable[DroneView], wall_s: float) -> list[NodeStatus]:
-        """All nodes by id, with routes, positions and ages filled in.
+        """All nodes by id, with positions, paths, routes and report ages filled in.
 
-        A drone that no host has reported yet is listed as switched off. The objects are those that
-        were merged; they change at the next call.
+        A drone that no host has reported yet is listed as switched off. The objects are the merged
+        ones: the next call changes them.
         """
         views = {drone.id: drone for drone in drones}
         for node in self._nodes.values():

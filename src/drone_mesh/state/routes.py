@@ -1,4 +1,4 @@
-"""Whole routes, put together from what each node knows: its next hop."""
+"""Whole routes, assembled from the next hop that each node knows."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from drone_mesh.state.model import NodeStatus
 
 
 def route_to_gateway(start: int, nodes: Mapping[int, NodeStatus]) -> bytes:
-    """Ids from `start` to a gateway, both included; empty when `start` is off or knows no way.
+    """Ids from `start` to a gateway, both included; empty when `start` is off or has no next hop.
 
-    A route that goes round, or leads to a node that is off or that nobody reports, ends with the
-    last id that could be followed: it shows where the packets get stuck.
+    A route that loops, or leads to a node that is off or unknown, ends with the last id that could
+    be followed: it shows where packets get stuck.
     """
     route = bytearray()
     here = start

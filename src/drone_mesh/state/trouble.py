@@ -1,4 +1,4 @@
-"""What is wrong with a mesh, in words: the source of diagnostics, exit codes and red rows."""
+"""What is wrong with a mesh, in words: for diagnostics, exit codes and highlighted rows."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Sequence
 
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.routes import reaches_gateway
-
-SILENT_AFTER_S = 5.0  # our choice: a host reports twice a second, ten reports are missing then
 
 
 class Severity(enum.IntEnum):
@@ -24,7 +23,7 @@ class Severity(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Trouble:
-    """One node and the worst that can be said about it."""
+    """The most severe problem of one node."""
 
     node: int
     severity: Severity
@@ -44,19 +43,20 @@ def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
     by_id = {node.id: node for node in nodes}
     troubles = []
     for node in nodes:
-        if node.report_age >= SILENT_AFTER_S:
+        condition = condition_of(node)
+        if condition is Condition.SILENT:
             troubles.append(
                 Trouble(node.id, Severity.STALE, f"no report for {node.report_age:.0f} s")
             )
-        elif not node.on:
+        elif condition is Condition.OFF:
             troubles.append(Trouble(node.id, Severity.WARN, "switched off"))
         elif not node.connected:
-            what = "flying" if len(node.path) else "not connected to a gateway"
-            troubles.append(Trouble(node.id, Severity.ERROR, what))
+            text = "flying" if condition is Condition.FLYING else "not connected to a gateway"
+            troubles.append(Trouble(node.id, Severity.ERROR, text))
         elif node.role == Role.ROUTER and not reaches_gateway(node.route, by_id):
-            way = " > ".join(map(str, node.route))
-            what = f"its route ends nowhere: {way}" if way else "no route to a gateway"
-            troubles.append(Trouble(node.id, Severity.WARN, what))
+            route = " > ".join(map(str, node.route))
+            text = f"its route breaks off: {route}" if route else "no route to a gateway"
+            troubles.append(Trouble(node.id, Severity.WARN, text))
     return troubles
 
 
@@ -64,21 +64,25 @@ def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summa
     """How many routers that are on have a gateway, and the worst severity among the troubles."""
     if not nodes:
         return Summary(Severity.STALE, "no nodes")
-    silent = {trouble.node for trouble in troubles if trouble.severity == Severity.STALE}
+    conditions = {node.id: condition_of(node) for node in nodes}
     routers = [
-        node for node in nodes if node.role == Role.ROUTER and node.on and node.id not in silent
+        node
+        for node in nodes
+        if node.role == Role.ROUTER
+        and conditions[node.id] not in (Condition.OFF, Condition.SILENT)
     ]
     connected = sum(node.connected for node in routers)
     parts = [f"{connected} of {len(routers)} routers connected"]
-    off = sum(not node.on and node.id not in silent for node in nodes)
+    off = sum(condition is Condition.OFF for condition in conditions.values())
     if off:
         parts.append(f"{off} switched off")
+    silent = sum(condition is Condition.SILENT for condition in conditions.values())
     if silent:
-        parts.append(f"{len(silent)} silent")
+        parts.append(f"{silent} silent")
     worst = max((trouble.severity for trouble in troubles), default=Severity.OK)
     return Summary(worst, ", ".join(parts))
 
 
-def everybody_is_connected(troubles: Sequence[Trouble]) -> bool:
-    """Whether each node that should be connected is: one that is switched off need not be."""
+def all_connected(troubles: Sequence[Trouble]) -> bool:
+    """Whether each node that is on is connected. A node that is switched off need not be."""
     return all(trouble.severity <= Severity.WARN for trouble in troubles)

@@ -1,1 +1,1 @@
-"""Pictures of the mesh in its world: window, snapshots, palette. No ROS."""
+"""Views of the mesh: palette, table, window and snapshots of the world. No ROS."""

@@ -1,4 +1,4 @@
-"""A pinhole camera that looks down at the world, and the place from which all can be seen."""
+"""A pinhole camera that looks down at the world, and how to frame points with it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drone_mesh.drone.flight_path import Vector
 
 NEAR_M = 0.1
 FAR_M = 50_000.0  # the goals that are allowed lie within +-5000 m
-CLOSEST_M = 6.0  # a single drone is shown with a few metres around it
+CLOSEST_M = 6.0  # how close it gets: a single drone is shown with a few metres around it
 UP_AXIS_Z = 2  # pybullet's number for "z is up"
 
 
@@ -54,7 +54,7 @@ class Camera:
         return pixels
 
     def pixels_per_metre(self) -> float:
-        """How large a metre at the target is."""
+        """How large one metre at the target is."""
         return self.size[1] / 2 / (self.distance_m * self.half_height_slope())
 
     def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -63,11 +63,11 @@ class Camera:
         return view[0, :3], view[1, :3], -view[2, :3]
 
     def half_height_slope(self) -> float:
-        """How far up is seen per metre of depth."""
+        """How far up the view reaches per metre of depth."""
         return math.tan(math.radians(self.field_of_view_deg / 2))
 
     def on_ground(self, pixel: tuple[float, float]) -> Vector | None:
-        """The point of the ground (z = 0) that is seen in this pixel; None: that is sky."""
+        """The point of the ground (z = 0) at this pixel; None: the pixel shows sky."""
         (x, y, z), (far_x, far_y, far_z) = self.before(pixel, 0.0), self.before(pixel, 1.0)
         if far_z >= z:
             return None
@@ -75,7 +75,7 @@ class Camera:
         return (x + (far_x - x) * times, y + (far_y - y) * times, 0.0)
 
     def before(self, pixel: tuple[float, float], depth_m: float) -> Vector:
-        """The point that is seen in this pixel, `depth_m` in front of the camera."""
+        """The point at this pixel, `depth_m` in front of the camera."""
         right, up, forward = self.axes()
         half_height_m = depth_m * self.half_height_slope()
         x, y = (pixel[axis] - self.size[axis] / 2 for axis in (0, 1))
@@ -101,7 +101,7 @@ class Camera:
 
 
 class Margins(NamedTuple):
-    """What is to stay free at each side of a picture, in pixels."""
+    """How much stays free at each side of a picture, in pixels."""
 
     left: float
     top: float
@@ -110,25 +110,25 @@ class Margins(NamedTuple):
 
 
 def frame(camera: Camera, points: Sequence[Vector], margins: Margins) -> Camera:
-    """`camera`, moved (not turned) as near as possible to see all points between the margins.
+    """`camera`, moved (not turned) as close as possible with all points between the margins.
 
     Margins that would take more than half of the picture shrink. Without points nothing moves.
     """
     if not points:
         return camera
-    places = np.array(points, dtype=float)
-    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    positions = np.array(points, dtype=float)
+    middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
     right, up, forward = camera.axes()
-    depths_m = (places - middle) @ forward
+    depths_m = (positions - middle) @ forward
     closest_m = CLOSEST_M - depths_m.min()
 
-    # A point that lies r to the right of the middle and f behind it is seen, from an eye that is
-    # e to the right of the middle and d before it, where -low <= (r - e) / (f + d) <= high.
+    # Take a point r to the right of the middle and f behind it, and an eye e to the right of the
+    # middle and d in front of it: the point is visible if -low <= (r - e) / (f + d) <= high.
     size = np.array(camera.size, dtype=float)
     edges = np.array([[margins.left, margins.right], [margins.bottom, margins.top]], float)
     edges *= np.minimum(1.0, size / 2 / np.maximum(edges.sum(axis=1), 1.0))[:, None]
     slopes = (size[:, None] / 2 - edges) / (size[1] / 2) * camera.half_height_slope()
-    aside_m = [(places - middle) @ axis for axis in (right, up)]
+    aside_m = [(positions - middle) @ axis for axis in (right, up)]
     bounds = [
         ((aside - high * depths_m).max(), (aside + low * depths_m).min())
         for aside, (low, high) in zip(aside_m, slopes)

@@ -1,4 +1,4 @@
-"""The ground of the world's window: tiles with an edge that can be counted."""
+"""The ground of the world's window: tiles whose edges can be counted."""
 
 from __future__ import annotations
 
@@ -9,11 +9,8 @@ from pathlib import Path
 import pybullet
 from PIL import Image, ImageDraw
 
-from drone_mesh.view.sketch import rgb
-from drone_mesh.world.interfaces import Colour
+from drone_mesh.view.palette import GROUND, SHADOW
 
-TILE: Colour = (0.955, 0.960, 0.945, 1.0)
-TILE_EDGE: Colour = (0.80, 0.82, 0.80, 1.0)
 TILE_PIXELS = 256
 
 
@@ -21,9 +18,9 @@ def lay_ground(client: int) -> None:
     """A plane of tiles; pybullet makes them 2 m wide."""
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
     ground = pybullet.createMultiBody(0.0, plane, physicsClientId=client)
-    tile = Image.new("RGB", (TILE_PIXELS, TILE_PIXELS), rgb(TILE))
+    tile = Image.new("RGB", (TILE_PIXELS, TILE_PIXELS), GROUND)
     last = TILE_PIXELS - 1
-    ImageDraw.Draw(tile).rectangle((0, 0, last, last), None, rgb(TILE_EDGE), 3)
+    ImageDraw.Draw(tile).rectangle((0, 0, last, last), None, SHADOW, 3)
     with tempfile.TemporaryDirectory() as folder:  # pybullet takes textures from files only
         path = Path(folder) / "tile.png"
         tile.save(path)

@@ -7,11 +7,11 @@ from multiprocessing.connection import Connection
 
 from drone_mesh.view.window import WorldWindow
 
-REACT_PERIOD_S = 0.03  # wall; between two looks at keys and mouse
+REACT_PERIOD_S = 0.03  # wall; between two checks of keys and mouse
 
 
 def show_scenes(scenes: Connection) -> None:
-    """Show what comes through the pipe, until that ends or somebody closes the window."""
+    """Show what comes through the pipe, until the pipe ends or the window is closed."""
     window = WorldWindow()
     try:
         while window.is_open():

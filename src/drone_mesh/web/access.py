@@ -1,8 +1,8 @@
-"""Who may use the console.
+"""Access rules of the web servers.
 
-Without a token it listens on this machine alone, and answers only to this machine's own names: a
-page elsewhere that lets its own name point to 127.0.0.1 is turned away. With a token, whoever knows
-it may come from anywhere. Either way a WebSocket is opened only for the page this server sent.
+Without a token a server listens on the loopback interface only and answers only requests to
+loopback names, which defeats DNS rebinding. With a token, any client that has it may connect. In
+both cases a WebSocket is opened only for the page that this server sent.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ SHORTEST_TOKEN = 16  # characters; our choice: out of reach of guessing over a n
 
 
 class AccessDenied(MeshError):
-    """This request may not have what it asks for; the text says why."""
+    """A refused request; the text gives the reason."""
 
 
 @dataclass(frozen=True)
@@ -30,34 +30,38 @@ class Access:
     def check_host(self, host: str) -> None:
         """`host` is the Host header."""
         if self.token is None and not is_loopback(_host_name(f"//{host}")):
-            raise AccessDenied(f"{host!r} is not a name of this machine's own interface")
+            raise AccessDenied(f"{host!r} is not a loopback name of this machine")
 
     def check_origin(self, origin: str | None, host: str) -> None:
-        """`origin` is the Origin header: the page that asks has to be ours."""
+        """`origin` is the Origin header; the requesting page must be ours."""
         if origin is None or _authority(origin) != host.lower():
-            raise AccessDenied(f"the page {origin or 'without an origin'} is not of this console")
+            raise AccessDenied(
+                f"the page {origin or 'without an origin'} was not sent by this server"
+            )
 
     def check_token(self, token: str | None) -> None:
-        """`token` is what the request brought, in its address or its cookie."""
+        """`token` is that of the request, from its address or its cookie."""
         if self.token is None:
             return
         if token is None or not hmac.compare_digest(token.encode(), self.token.encode()):
-            raise AccessDenied("open the console with the address it printed: the token is missing")
+            raise AccessDenied(
+                "token missing or invalid: open the console with the address that it printed"
+            )
 
 
 def access_for(bind_address: str, token: str) -> Access:
-    """The rules for a server that listens at this address; an empty token means none was given."""
+    """The rules for a server that listens at this address; an empty token means none."""
     if token and len(token) < SHORTEST_TOKEN:
-        raise ConfigurationError(f"token: at least {SHORTEST_TOKEN} characters are wanted")
+        raise ConfigurationError(f"token: must have at least {SHORTEST_TOKEN} characters")
     if not token and not is_loopback(bind_address):
         raise ConfigurationError(
-            f"address {bind_address} can be reached by others: give a token, or use 127.0.0.1"
+            f"address {bind_address}: other machines can reach it; set a token, or use 127.0.0.1"
         )
     return Access(token or None)
 
 
 def is_loopback(name: str) -> bool:
-    """Whether this host name or address means the machine itself and nobody else."""
+    """Whether this host name or address is loopback."""
     if name.lower() == "localhost":
         return True
     try:

@@ -1,4 +1,4 @@
-"""Takes a TCP port for an HTTP server, or says why it cannot be had."""
+"""Opens the TCP port of an HTTP server."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import socket
 from drone_mesh.errors import ConfigurationError
 
 MAX_PORT = 65535
-BACKLOG = 64  # connections that may wait to be accepted; our choice
+BACKLOG = 64  # our choice
 
 _HINTS = {
     errno.EADDRINUSE: "another program uses it; choose another port",
@@ -21,11 +21,11 @@ def listen(bind_address: str, port: int) -> socket.socket:
     """A listening socket; port 0 takes any that is free. Raises ConfigurationError."""
     wanted = f"HTTP address {bind_address} port {port}"
     if not 0 <= port <= MAX_PORT:
-        raise ConfigurationError(f"{wanted} cannot be had: ports are 0..{MAX_PORT}")
+        raise ConfigurationError(f"{wanted} not available: ports are 0..{MAX_PORT}")
     sock = None
     try:
-        # asyncio answers without delay (TCP_NODELAY) only where the protocol was named: on such a
-        # socket a request takes 1 ms, on that of socket.create_server 45.
+        # asyncio sets TCP_NODELAY only if the socket names its protocol: a request then takes 1 ms;
+        # with socket.create_server it takes 45 ms.
         family, kind, protocol, _, where = socket.getaddrinfo(
             bind_address, port, type=socket.SOCK_STREAM, proto=socket.IPPROTO_TCP
         )[0]
@@ -37,5 +37,5 @@ def listen(bind_address: str, port: int) -> socket.socket:
         if sock is not None:
             sock.close()
         hint = _HINTS.get(error.errno or 0, str(error))
-        raise ConfigurationError(f"{wanted} cannot be had: {hint}") from error
+        raise ConfigurationError(f"{wanted} not available: {hint}") from error
     return sock

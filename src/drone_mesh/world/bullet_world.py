@@ -6,7 +6,7 @@ import pybullet
 
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.world.interfaces import Colour, World
+from drone_mesh.world.interfaces import World
 
 GRAVITY_M_S2 = -9.81  # along z
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
@@ -24,23 +24,19 @@ class BulletWorld(World):
         self.client = pybullet.connect(pybullet.DIRECT)
         if self.client < 0:
             raise ConfigurationError("pybullet has no room for another world: close one first")
-        self._shapes: dict[
-            tuple[Vector, Colour], tuple[int, int]
-        ] = {}  # collision shape, visual shape
+        self._shapes: dict[Vector, int] = {}  # by size
         pybullet.setTimeStep(self.tick_s, physicsClientId=self.client)
         pybullet.setGravity(0.0, 0.0, GRAVITY_M_S2, physicsClientId=self.client)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self.client)
         self.ground = pybullet.createMultiBody(KINEMATIC, plane, physicsClientId=self.client)
 
-    def add_box(self, size: Vector, colour: Colour, centre: Vector) -> int:
-        collision_shape, visual_shape = self._shape(size, colour)
+    def add_box(self, size: Vector, centre: Vector) -> int:
         return int(
             pybullet.createMultiBody(
                 KINEMATIC,
-                collision_shape,
-                visual_shape,
-                centre,
-                UPRIGHT,
+                self._shape(size),
+                basePosition=centre,
+                baseOrientation=UPRIGHT,
                 physicsClientId=self.client,
             )
         )
@@ -56,19 +52,12 @@ class BulletWorld(World):
     def _advance(self) -> None:
         pybullet.stepSimulation(physicsClientId=self.client)
 
-    def _shape(self, size: Vector, colour: Colour) -> tuple[int, int]:
-        """The shapes of such a box; boxes alike share theirs."""
-        if (size, colour) not in self._shapes:
-            half_extents = [edge_m / 2 for edge_m in size]
-            self._shapes[size, colour] = (
-                pybullet.createCollisionShape(
-                    pybullet.GEOM_BOX, halfExtents=half_extents, physicsClientId=self.client
-                ),
-                pybullet.createVisualShape(
-                    pybullet.GEOM_BOX,
-                    halfExtents=half_extents,
-                    rgbaColor=colour,
-                    physicsClientId=self.client,
-                ),
+    def _shape(self, size: Vector) -> int:
+        """The collision shape of such a box; boxes of one size share theirs."""
+        if size not in self._shapes:
+            self._shapes[size] = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[edge_m / 2 for edge_m in size],
+                physicsClientId=self.client,
             )
-        return self._shapes[size, colour]
+        return self._shapes[size]

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import abc
 from collections import deque
-from typing import Protocol, Tuple, TypeVar
+from typing import Protocol, TypeVar
 
 from drone_mesh.drone.flight_path import Vector
-
-Colour = Tuple[float, float, float, float]  # red, green, blue, opacity: 0..1
 
 _AnyWorld = TypeVar("_AnyWorld", bound="World")
 
@@ -59,7 +57,7 @@ class World(abc.ABC):
         self._woken.append(mover)
 
     @abc.abstractmethod
-    def add_box(self, size: Vector, colour: Colour, centre: Vector) -> int:
+    def add_box(self, size: Vector, centre: Vector) -> int:
         """A box (full edge lengths in metres) that stays where it is put; returns its handle."""
 
     @abc.abstractmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.drone.flight_path import Vector
-from drone_mesh.world.interfaces import Colour, World
+from drone_mesh.world.interfaces import World
 
 
 class StillWorld(World):
@@ -13,7 +13,7 @@ class StillWorld(World):
         super().__init__()
         self.centres: list[Vector] = []  # by handle
 
-    def add_box(self, size: Vector, colour: Colour, centre: Vector) -> int:
+    def add_box(self, size: Vector, centre: Vector) -> int:
         self.centres.append(centre)
         return len(self.centres) - 1
 

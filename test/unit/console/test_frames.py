@@ -1,4 +1,4 @@
-"""Frames: what is sent to a page, and what is left out."""
+"""Frames: what a page is sent, and what it is not."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from drone_mesh.console.frames import EVENTS_PER_FRAME, FrameStore
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.links import JUST_LOST_S
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 
@@ -33,8 +34,8 @@ def test_a_new_page_gets_everything():
     assert first["link"] == ""
     assert first["clock"]["summary"] == "1 of 1 routers connected"
     assert first["nodes"]["1"]["hops"] == 1
-    assert first["nodes"]["1"]["neighbours"] == "201"  # bits 0 and 9
-    assert first["nodes"]["1"]["at"] == [2.0, 3.0, 0.0]
+    assert first["nodes"]["1"]["neighbours"] == 2
+    assert first["nodes"]["1"]["position"] == [2.0, 3.0, 0.0]
 
 
 def test_a_page_that_is_up_to_date_gets_only_what_changed():
@@ -54,7 +55,7 @@ def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():
     known = store.version
     store.update_mesh(mesh(1.2, hops=2), wall_s=0.2)
     store.update_mesh(mesh(1.4, hops=3, total_messages=7), wall_s=0.4)
-    assert frame(store, known)["nodes"] == {"1": {"hops": 3, "sent": 7}}
+    assert frame(store, known)["nodes"] == {"1": {"hops": 3, "total_messages": 7}}
 
 
 def test_movements_below_a_centimetre_are_not_sent():
@@ -68,7 +69,7 @@ def test_movements_below_a_centimetre_are_not_sent():
     assert "nodes" not in frame(store, known)
 
 
-def test_a_node_that_is_gone_is_taken_away_and_may_come_back():
+def test_a_node_that_is_gone_is_removed_and_may_come_back():
     store = FrameStore()
     store.update_mesh(mesh(), wall_s=0.0)
     known = store.version
@@ -80,10 +81,10 @@ def test_a_node_that_is_gone_is_taken_away_and_may_come_back():
     assert back["nodes"]["1"]["hops"] == 1
 
 
-def test_an_unknown_place_is_null():
+def test_an_unknown_position_is_null():
     store = FrameStore()
     store.update_mesh(MeshStatus(1.0, [NodeStatus(3)]), wall_s=0.0)
-    assert frame(store, 0)["nodes"]["3"]["at"] is None
+    assert frame(store, 0)["nodes"]["3"]["position"] is None
 
 
 def test_each_event_is_sent_once():
@@ -105,7 +106,7 @@ def test_of_a_burst_of_events_the_newest_are_sent():
     assert events[-1]["t"] == EVENTS_PER_FRAME + 49
 
 
-def test_samples_are_taken_once_a_second_and_not_while_time_stands_still():
+def test_samples_are_taken_once_a_second_and_not_while_paused():
     store = FrameStore()
     for tenth in range(31):
         store.update_mesh(mesh(1.0 + tenth / 10), wall_s=tenth / 10)
@@ -115,7 +116,7 @@ def test_samples_are_taken_once_a_second_and_not_while_time_stands_still():
     assert len(frame(store, 0)["samples"]) == 4
 
 
-def test_a_restarted_world_is_sent_in_full_and_without_the_past():
+def test_a_new_world_is_sent_in_full_and_without_the_past():
     store = FrameStore()
     store.update_mesh(mesh(100.0), wall_s=0.0)
     store.add_events([EventRecord(99.0, 1, "connected")])
@@ -146,3 +147,31 @@ def test_neighbours_of_a_watched_node_come_with_their_ages():
     assert store.neighbours_of(1) == []
     store.update_mesh(mesh(neighbours=b"\x00\x09", neighbour_ages=b"\x03\xff"), wall_s=0.0)
     assert store.neighbours_of(1) == [(0, 3), (9, 255)]
+
+
+def test_a_frame_carries_the_condition_and_the_colour_of_each_node():
+    store = FrameStore()
+    store.update_mesh(mesh(path=(2.0, 3.0, 1.0), connected=False), wall_s=0.0)
+    nodes = frame(store, 0)["nodes"]
+    assert (nodes["0"]["condition"], nodes["0"]["colour"]) == ("connected", "gateway")
+    assert (nodes["1"]["condition"], nodes["1"]["colour"]) == ("flying", "flying")
+
+
+def test_a_frame_carries_each_link_once_under_its_use_at_the_lower_id():
+    store = FrameStore()
+    nodes = [
+        NodeStatus(0, Role.GATEWAY, connected=True),
+        NodeStatus(1, connected=True, next_hop=0, neighbours=b"\x00\x09"),
+        NodeStatus(9, neighbours=b"\x01"),
+    ]
+    store.update_mesh(MeshStatus(1.0, nodes), wall_s=0.0)
+    links = {
+        node: (fields["route_links"], fields["known_links"], fields["lost_links"])
+        for node, fields in frame(store, 0)["nodes"].items()
+    }
+    assert links == {"0": ("2", "0", "0"), "1": ("0", "200", "0"), "9": ("0", "0", "0")}
+    nodes[2].on = False
+    store.update_mesh(MeshStatus(1.2, nodes), wall_s=0.2)
+    assert frame(store, 0)["nodes"]["1"]["lost_links"] == "200"
+    store.update_mesh(MeshStatus(9.0, nodes), wall_s=0.3 + JUST_LOST_S)
+    assert frame(store, 0)["nodes"]["1"]["lost_links"] == "0"

@@ -6,11 +6,17 @@ import json
 
 import pytest
 
-from drone_mesh.console.orders import Order, OrderRefused, Watch, number_of, parse_request
+from drone_mesh.console.orders import (
+    NeighbourWatch,
+    OrderRefused,
+    PageOrder,
+    number_of,
+    parse_request,
+)
 
 
 class Notebook:
-    """Controls that record their orders."""
+    """Controls that write down their orders."""
 
     def __init__(self) -> None:
         self.done: list[tuple[object, ...]] = []
@@ -43,7 +49,7 @@ class Notebook:
 )
 def test_an_order_is_carried_out_as_it_was_given(request_, done):
     order = parse_request(json.dumps({**request_, "number": 7}))
-    assert isinstance(order, Order)
+    assert isinstance(order, PageOrder)
     assert order.number == 7
     notebook = Notebook()
     assert order.carry_out(notebook) == "done"
@@ -53,7 +59,7 @@ def test_an_order_is_carried_out_as_it_was_given(request_, done):
 def test_a_page_may_watch_a_node_or_none():
     for text, node in (("3", 3), ("null", None)):
         request = parse_request(f'{{"do":"watch","node":{text}}}')
-        assert isinstance(request, Watch)
+        assert isinstance(request, NeighbourWatch)
         assert request.node == node
 
 

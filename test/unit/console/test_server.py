@@ -104,11 +104,15 @@ def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> Non
     asyncio.run(main())
 
 
-def test_a_page_gets_a_greeting_and_then_everything():
+def test_a_page_is_greeted_and_then_gets_everything():
     async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
         page = FakePage(server).open()
         await until("a frame", lambda: page.of_type("frame"))
-        assert page.received[0] == {"type": "hello", "layouts": [[0, "0: field case"]]}
+        assert page.received[0] == {
+            "type": "hello",
+            "layouts": [[0, "0: field case"]],
+            "limits": {"coordinate": 5000.0, "height": 500.0},
+        }
         assert page.received[1]["full"]
 
     run(scenario)

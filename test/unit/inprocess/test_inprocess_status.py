@@ -5,7 +5,7 @@ import pytest
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess import Network
 from drone_mesh.state.outages import find_outages, take_sample
-from drone_mesh.state.table import mesh_table
+from drone_mesh.view.table import mesh_table
 
 
 @pytest.fixture

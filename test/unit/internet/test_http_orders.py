@@ -25,7 +25,8 @@ def test_an_order_for_a_drone_without_a_route_is_answered_503_with_the_reason(me
     sent = mesh.sent()
     answer = mesh.client.post("/DroneMovement/99/2.5/17.5/4")
     assert answer.status_code == 503
-    assert answer.json() == {"detail": "the gateway has no route to drone 99: it stays"}
+    reason = "the gateway has no route to drone 99, which stays where it is"
+    assert answer.json() == {"detail": reason}
     assert mesh.sent() == sent
 
 
@@ -75,7 +76,7 @@ def test_nodes_shows_that_a_route_is_gone_and_which_nodes_were_heard(make_mesh):
         ("/DroneMovement/1/0/0/%ff%fe", "height: "),
     ],
 )
-def test_what_is_no_drone_or_no_place_is_answered_422_and_changes_nothing(mesh, target, reason):
+def test_an_invalid_drone_or_place_is_answered_422_and_changes_nothing(mesh, target, reason):
     sent = mesh.sent()
     answer = mesh.client.post(target)
     assert answer.status_code == 422

@@ -124,10 +124,10 @@ def test_a_gateway_that_cannot_serve_gives_the_radio_back(wired, capfd):
 
 def test_a_node_that_hears_no_other_node_reports_it(wired, monkeypatch, caplog):
     monkeypatch.setattr(program, "LONELY_AFTER_S", 0.1)
-    said = lambda: "node 7 hears nobody" in caplog.text  # noqa: E731
+    said = lambda: "node 7 hears no other node" in caplog.text  # noqa: E731
     assert run_until(said, parse_router, "--id 7 --spi 0.1 --ce 5") == 0
     assert said()
-    assert caplog.text.count("hears nobody") == 1
+    assert caplog.text.count("hears no other node") == 1
 
 
 def test_the_start_says_which_radio_is_used_and_how(wired, caplog):

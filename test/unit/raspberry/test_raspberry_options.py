@@ -84,13 +84,13 @@ def test_emulated_nodes_need_no_id():
     [
         ("", "one of the arguments --id --emulated is required"),
         ("--id 3 --emulated 5", "not allowed with argument"),
-        ("--id 254", "'254' is not a whole number of 0..253"),
-        ("--id three", "'three' is not a whole number"),
-        ("--id 3 --spi 0", "'0' is not BUS.DEVICE"),
-        ("--id 3 --spi 0.x", "'0.x' is not BUS.DEVICE"),
-        ("--id 3 --ce 28", "'28' is not a whole number of 0..27"),
-        ("--id 3 --irq -1", "expected one argument|'-1' is not a whole number"),
-        ("--id 3 --channel 126", "'126' is not a whole number of 0..125"),
+        ("--id 254", "invalid value '254': must be a whole number 0..253"),
+        ("--id three", "invalid value 'three': must be a whole number"),
+        ("--id 3 --spi 0", "invalid SPI device '0'"),
+        ("--id 3 --spi 0.x", "invalid SPI device '0.x'"),
+        ("--id 3 --ce 28", "invalid value '28': must be a whole number 0..27"),
+        ("--id 3 --irq -1", "expected one argument|invalid value '-1'"),
+        ("--id 3 --channel 126", "invalid value '126': must be a whole number 0..125"),
         ("--id 3 --rate 3M", "invalid choice: '3M'"),
         ("--id 3 --crc 32", "invalid choice: 32"),
         ("--id 3 --check-period 0", "check_period 0.0: must be above 0 seconds"),
@@ -100,7 +100,7 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --latitude 5001", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --longitude inf", "longitude inf is not a finite number"),
         ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
-        ("--emulated 1", "'1' is not a whole number of 2..17"),
+        ("--emulated 1", "invalid value '1': must be a whole number 2..17"),
         ("--id 3 --log-level loud", "invalid choice: 'loud'"),
         ("--id 3 --port 9080", "unrecognized arguments: --port"),
     ],
@@ -116,10 +116,10 @@ def test_a_wrong_option_ends_the_program_with_status_2_and_the_reason(capsys, li
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("--bind 0.0.0.0", "0.0.0.0 can be reached by others: give a token.*--token-file"),
-        ("--port 0", "'0' is not a whole number of 1..65535"),
+        ("--bind 0.0.0.0", "0.0.0.0: other machines can reach it; set a token.*--token-file"),
+        ("--port 0", "invalid value '0': must be a whole number 1..65535"),
         ("--token-file /no/such/file", "--token-file /no/such/file: .*No such file"),
-        ("--token-file /dev/null", "--token-file /dev/null: there is no token in it"),
+        ("--token-file /dev/null", "--token-file /dev/null: the file contains no token"),
     ],
 )
 def test_a_wrong_option_of_the_gateway_is_named(capsys, line, reason):

@@ -127,7 +127,7 @@ def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c(tmp_path):
         assert seconds < END_WITHIN_S
         assert "Traceback" not in program.said
         assert program.said.count("packets: sent") == 5
-        assert re.search(r"\d+ frames that were on the air are in ", program.said)
+        assert re.search(r"wrote \d+ frames to ", program.said)
         assert trace.read_bytes().startswith(bytes.fromhex("0a0d0d0a"))  # pcapng
 
 

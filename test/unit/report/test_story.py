@@ -58,7 +58,7 @@ def test_a_repair_is_described_with_the_duration_of_each_phase():
     assert repair_rows(story) == [
         {
             "node": "2", "cause": "1 off", "lost": "101.0 s", "noticed": "1.0 s",
-            "decided": "37.0 s", "flown": "3.0 s", "place": "1", "connected": "1.5 s",
+            "decided": "37.0 s", "flown": "3.0 s", "fallback": "node 1's", "connected": "1.5 s",
             "total": "42.5 s", "on_ground": "39.5 s",
         }
     ]  # fmt: skip
@@ -141,7 +141,7 @@ def test_tables_are_written_as_csv(tmp_path):
     assert sorted(path.name for path in paths) == ["events.csv", "outages.csv", "samples.csv"]
     with (tmp_path / "numbers" / "outages.csv").open(encoding="utf-8", newline="") as file:
         (row,) = csv.DictReader(file)
-    assert (row["node"], row["lost_s"], row["place_of"]) == ("2", "101.0", "1")
+    assert (row["node"], row["lost_s"], row["fallback"]) == ("2", "101.0", "1")
     with (tmp_path / "numbers" / "events.csv").open(encoding="utf-8", newline="") as file:
         events = list(csv.DictReader(file))
     assert events[8]["kind"] == "flight decided"

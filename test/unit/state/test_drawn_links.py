@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.links import JUST_LOST_S, LostLinks, known_links, shortest, way_links
+from drone_mesh.state.links import JUST_LOST_S, LostLinks, known_links, route_links, shortest
 from drone_mesh.state.model import NodeStatus
 
 
@@ -36,14 +36,14 @@ def test_there_is_no_link_to_a_node_that_is_off():
     nodes = line(0.0, 5.0, 10.0)
     nodes[1].on = False
     assert known_links(nodes) == set()
-    assert way_links(nodes) == set()
+    assert route_links(nodes) == set()
 
 
-def test_ways_are_the_next_hops_of_connected_routers():
+def test_route_links_are_the_next_hops_of_connected_routers():
     nodes = line(0.0, 5.0, 10.0)
-    assert way_links(nodes) == {(0, 1), (1, 2)}
+    assert route_links(nodes) == {(0, 1), (1, 2)}
     nodes[2].connected = False
-    assert way_links(nodes) == {(0, 1)}
+    assert route_links(nodes) == {(0, 1)}
 
 
 def test_of_too_many_links_the_shortest_stay():
@@ -51,7 +51,7 @@ def test_of_too_many_links_the_shortest_stay():
     assert shortest(known_links(nodes), nodes, most=2) == [(1, 2), (0, 1)]
 
 
-def test_a_link_to_an_unknown_place_is_not_drawn():
+def test_a_link_to_an_unknown_position_is_not_drawn():
     nodes = line(0.0, 5.0)
     nodes[1].position = (float("nan"),) * 3
     assert shortest(known_links(nodes), nodes, most=9) == []

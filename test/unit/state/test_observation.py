@@ -8,9 +8,7 @@ from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess import Network
 from drone_mesh.state.model import NodeStatus
-from drone_mesh.state.observation import describe_component, view_drone, way_ahead
-from drone_mesh.world.factory import DroneFactory
-from drone_mesh.world.still_world import StillWorld
+from drone_mesh.state.observation import describe_component, describe_drone, path_ahead
 
 
 def test_a_router_two_hops_away_is_described_as_it_is():
@@ -23,7 +21,7 @@ def test_a_router_two_hops_away_is_described_as_it_is():
     status = NodeStatus(2)
     describe_component(status, network.nodes[2].component, True, network.clock.now_s)
     assert (status.on, status.connected, status.gateway, status.hops) == (True, True, 0, 2)
-    assert (status.next_hop, status.pref_loc) == (1, 1)
+    assert (status.next_hop, status.fallback) == (1, 1)
     assert status.neighbours == bytes([1])
     assert status.neighbour_ages[0] <= 10
     assert status.total_messages > 0
@@ -39,21 +37,23 @@ def test_an_age_beyond_a_byte_stays_at_its_end():
     assert status.neighbour_ages == bytes([255])
 
 
-def test_a_drone_is_seen_at_its_underside_and_with_the_rest_of_its_way():
-    with StillWorld() as world:
-        factory = DroneFactory(world, 1, 1, 6, 1.0, debug=False)
-        gateway, router = factory.drones
-        assert view_drone(gateway, world.now_s).position == pytest.approx((-1.0, 0.0, 0.0))
-        router.engine.set_goal(latitude=8.0, longitude=0.0, height=1.0)
-        world.step()
-        view = view_drone(router, world.now_s)
-        assert view.role == Role.ROUTER
-        assert view.path[-3:] == pytest.approx((0.0, 8.0, 1.0))
-        assert len(view.path) == 9
+def test_a_drone_is_described_by_its_underside_and_the_rest_of_its_path():
+    path = FlightPath((0.0, 0.0, 0.05), (0.0, 8.0, 1.05), start_s=0.0)
+    view = describe_drone(1, Role.ROUTER, (0.0, 0.0, 0.05), path, now_s=0.0)
+    assert (view.id, view.role) == (1, Role.ROUTER)
+    assert view.position == pytest.approx((0.0, 0.0, 0.0))
+    assert view.path[-3:] == pytest.approx((0.0, 8.0, 1.0))
+    assert len(view.path) == 9
 
 
-@pytest.mark.parametrize(("now_s", "corners"), [(0.0, 3), (0.6, 2), (4.6, 1), (9.9, 1)])
-def test_corners_that_were_passed_are_not_ahead(now_s, corners):
+def test_a_drone_without_a_flight_has_no_path():
+    view = describe_drone(0, Role.GATEWAY, (-1.0, 0.0, 0.1), None, now_s=3.0)
+    assert view.position == pytest.approx((-1.0, 0.0, 0.0))
+    assert view.path == ()
+
+
+@pytest.mark.parametrize(("now_s", "waypoints"), [(0.0, 3), (0.6, 2), (4.6, 1), (9.9, 1)])
+def test_waypoints_that_were_passed_are_not_ahead(now_s, waypoints):
     path = FlightPath((0.0, 0.0, 0.0), (10.0, 0.0, 0.0), start_s=0.0)
-    assert len(way_ahead(path, now_s)) == 3 * corners
-    assert way_ahead(path, now_s)[-3:] == (10.0, 0.0, 0.0)
+    assert len(path_ahead(path, now_s)) == 3 * waypoints
+    assert path_ahead(path, now_s)[-3:] == (10.0, 0.0, 0.0)

@@ -32,18 +32,18 @@ def test_a_repair_has_its_phases():
     assert repair.node == 3
     assert (repair.cause_s, repair.cause_node) == (100.0, 2)
     assert (repair.lost_s, repair.emergency_s) == (103.0, 140.0)
-    assert (repair.decided_s, repair.place_of, repair.landed_s) == (150.0, 2, 153.0)
+    assert (repair.decided_s, repair.fallback, repair.landed_s) == (150.0, 2, 153.0)
     assert repair.connected_s == 153.5
     assert repair.seconds == 50.5
 
 
-def test_a_drone_may_be_connected_before_it_notices_that_it_stands():
+def test_a_drone_may_be_connected_before_it_notices_that_it_has_landed():
     late = [*REPAIR[:-2], *story((153.5, 3, "connected", 0), (154.0, 3, "landed"))]
     *_, repair = find_outages(late)
     assert (repair.landed_s, repair.connected_s) == (154.0, 153.5)
 
 
-def test_a_landing_long_after_is_none_of_the_repair():
+def test_a_landing_long_after_the_repair_does_not_belong_to_it():
     *_, repair = find_outages([*REPAIR, *story((300.0, 3, "landed"))])
     assert repair.landed_s == 153.0
 
@@ -54,7 +54,7 @@ def test_a_loss_that_lasts_stays_open():
     assert repair.seconds is None
 
 
-def test_a_recording_may_begin_when_all_are_connected_already():
+def test_a_recording_may_begin_when_all_nodes_are_connected_already():
     *_, repair = find_outages(REPAIR[2:])
     assert (repair.node, repair.lost_s, repair.connected_s) == (3, 103.0, 153.5)
 

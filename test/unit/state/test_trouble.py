@@ -6,7 +6,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.trouble import (
     Severity,
-    everybody_is_connected,
+    all_connected,
     find_trouble,
     summarise,
 )
@@ -25,7 +25,7 @@ def test_a_healthy_mesh_has_no_trouble():
     assert troubles == []
     summary = summarise(nodes, troubles)
     assert (summary.severity, summary.text) == (Severity.OK, "2 of 2 routers connected")
-    assert everybody_is_connected(troubles)
+    assert all_connected(troubles)
 
 
 def test_a_router_without_a_gateway_is_an_error():
@@ -35,10 +35,10 @@ def test_a_router_without_a_gateway_is_an_error():
         (2, Severity.ERROR, "not connected to a gateway")
     ]
     assert summarise(nodes, troubles).text == "1 of 2 routers connected"
-    assert not everybody_is_connected(troubles)
+    assert not all_connected(troubles)
 
 
-def test_a_router_in_flight_is_said_to_fly():
+def test_a_router_in_flight_is_reported_as_flying():
     (trouble,) = find_trouble([GATEWAY, router(1, connected=False, path=(1.0, 2.0, 0.0))])
     assert (trouble.severity, trouble.text) == (Severity.ERROR, "flying")
 
@@ -48,25 +48,25 @@ def test_a_node_that_is_off_need_not_be_connected():
     troubles = find_trouble(nodes)
     assert [(t.node, t.severity) for t in troubles] == [(2, Severity.WARN)]
     assert summarise(nodes, troubles).text == "1 of 1 routers connected, 1 switched off"
-    assert everybody_is_connected(troubles)
+    assert all_connected(troubles)
 
 
-def test_a_node_of_a_silent_host_is_stale_whatever_it_said_last():
+def test_a_node_of_a_silent_host_is_stale_whatever_it_reported_last():
     nodes = [GATEWAY, router(1, report_age=12.3)]
     troubles = find_trouble(nodes)
     assert [(t.node, t.severity, t.text) for t in troubles] == [
         (1, Severity.STALE, "no report for 12 s")
     ]
     assert summarise(nodes, troubles).text == "0 of 0 routers connected, 1 silent"
-    assert not everybody_is_connected(troubles)
+    assert not all_connected(troubles)
 
 
-def test_a_route_that_ends_nowhere_is_worth_a_look():
+def test_a_route_that_breaks_off_is_a_warning():
     nodes = [GATEWAY, router(1, next_hop=2, route=bytes([1, 2])), router(2, next_hop=1)]
     nodes[2].route = bytes([2, 1])
     assert [t.text for t in find_trouble(nodes)] == [
-        "its route ends nowhere: 1 > 2",
-        "its route ends nowhere: 2 > 1",
+        "its route breaks off: 1 > 2",
+        "its route breaks off: 2 > 1",
     ]
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition
+from drone_mesh.state.links import LinkUse
 from drone_mesh.state.model import MeshStatus, NodeStatus
-from drone_mesh.view.picture import DroneCondition, LinkUse
 from drone_mesh.view.scene import scene_of
 
 
-def test_a_scene_shows_whose_place_is_known_with_conditions_links_and_flights():
+def test_a_scene_shows_drones_of_known_position_with_conditions_links_and_paths():
     mesh = MeshStatus(
         3.0,
         [
@@ -23,11 +24,11 @@ def test_a_scene_shows_whose_place_is_known_with_conditions_links_and_flights():
     )  # fmt: skip
     scene = scene_of(mesh)
     assert {drone.node_id: drone.condition for drone in scene.drones} == {
-        0: DroneCondition.CONNECTED,
-        1: DroneCondition.CONNECTED,
-        2: DroneCondition.LOST,
-        3: DroneCondition.OFF,
-        4: DroneCondition.UNKNOWN,
+        0: Condition.CONNECTED,
+        1: Condition.CONNECTED,
+        2: Condition.FLYING,
+        3: Condition.OFF,
+        4: Condition.SILENT,
     }
     assert list(scene.drones[2].path) == [(2.0, 0.0, 2.0), (5.0, 0.0, 0.0)]
     assert {(link.start, link.end): link.use for link in scene.links} == {

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition
+from drone_mesh.state.links import LinkUse
 from drone_mesh.view.camera import Camera, Margins, frame
+from drone_mesh.view.palette import LIGHT, rgb
 from drone_mesh.view.picture import (
-    LINK_COLOURS,
-    PATH_COLOUR,
-    DroneCondition,
     DronePicture,
     LinkPicture,
-    LinkUse,
     Scene,
     drawing_scale,
 )
@@ -62,7 +61,7 @@ def share_of_colour(pixels, colour, place, radius):
     near = pixels[max(0, y - radius) : y + radius + 1, max(0, x - radius) : x + radius + 1]
     hues, wanted = (
         values - values.min(axis=-1, keepdims=True)
-        for values in (near.reshape(-1, 3).astype(float), np.array(colour[:3]))
+        for values in (near.reshape(-1, 3).astype(float), np.array(rgb(colour)))
     )
     strength = np.linalg.norm(hues, axis=1)
     likeness = hues @ wanted / (np.maximum(strength, 1) * np.linalg.norm(wanted))
@@ -76,7 +75,7 @@ def test_a_picture_has_the_size_that_was_asked_for(shoot):
 def test_each_drone_is_where_it_stands_in_the_colour_of_its_condition(shoot):
     drones = [GATEWAY] + [
         DronePicture(1 + i, Role.ROUTER, (3.0 * i, 4.0, 0.0), condition)
-        for i, condition in enumerate(DroneCondition)
+        for i, condition in enumerate(Condition)
     ]
     assert len({drone.colour for drone in drones}) == len(drones)
     pixels = shoot(drones)
@@ -118,7 +117,7 @@ def test_links_have_the_colour_of_their_use(shoot):
         start, end = (drones[node].position for node in (link.start, link.end))
         middle = tuple((a + b) / 2 for a, b in zip(start, end))
         (place,) = camera.project([middle])
-        assert share_of_colour(pixels, LINK_COLOURS[link.use], place, radius=8) > 0.02, link
+        assert share_of_colour(pixels, LIGHT.of_link(link.use), place, radius=8) > 0.02, link
 
 
 def test_a_link_to_a_drone_that_is_not_shown_is_left_out(shoot):
@@ -131,7 +130,7 @@ def test_a_flight_is_drawn_to_its_goal_and_the_goal_is_in_the_picture(shoot):
     drones = [GATEWAY, flying]
     pixels = shoot(drones)
     (goal,) = camera_of(drones).project([flying.path[-1]])
-    assert share_of_colour(pixels, PATH_COLOUR, goal, radius=10) > 0.05
+    assert share_of_colour(pixels, LIGHT.path, goal, radius=10) > 0.05
 
 
 def test_an_empty_world_is_a_picture_of_the_ground(shoot):
@@ -140,7 +139,7 @@ def test_an_empty_world_is_a_picture_of_the_ground(shoot):
 
 
 def test_a_legend_explains_the_colours_that_occur_where_there_is_room_for_it(shoot):
-    off = replace(OTHER, condition=DroneCondition.OFF)
+    off = replace(OTHER, condition=Condition.OFF)
     corner = (600 - 160, 68)  # the third row
     for others, there in (([], False), ([off], True)):
         pixels = shoot([GATEWAY, ROUTER, *others], size=(600, 300))

@@ -21,7 +21,7 @@ def test_without_a_token_the_machine_s_own_names_are_answered(host):
     "host", ["evil.example:8080", "192.168.1.5:8080", "", "127.0.0.1.evil.example", "[::1", "a@b"]
 )
 def test_without_a_token_any_other_name_is_turned_away(host):
-    with pytest.raises(AccessDenied, match="is not a name of this machine"):
+    with pytest.raises(AccessDenied, match="is not a loopback name"):
         Access().check_host(host)
 
 
@@ -49,13 +49,13 @@ def test_the_own_page_may_connect():
     [None, "null", "", "http://evil.example", "http://127.0.0.1:9999", "http://127.0.0.1"],
 )
 def test_another_page_may_not_connect(origin):
-    with pytest.raises(AccessDenied, match="is not of this console"):
+    with pytest.raises(AccessDenied, match="was not sent by this server"):
         Access().check_origin(origin, "127.0.0.1:8080")
 
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "192.168.1.5", "::", "drones.example"])
 def test_an_address_that_others_can_reach_needs_a_token(address):
-    with pytest.raises(ConfigurationError, match="give a token"):
+    with pytest.raises(ConfigurationError, match="set a token"):
         access_for(address, "")
     assert access_for(address, TOKEN).token == TOKEN
 

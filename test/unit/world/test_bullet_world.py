@@ -80,7 +80,7 @@ def test_movers_take_their_turns_in_the_order_of_waking(world):
 
 
 def test_a_box_stays_where_it_is_put_however_long_gravity_pulls(bullet):
-    box = bullet.add_box((0.2, 0.2, 0.1), (0.0, 1.0, 0.0, 1.0), (1.0, 2.0, 3.0))
+    box = bullet.add_box((0.2, 0.2, 0.1), (1.0, 2.0, 3.0))
     for _ in range(200):
         bullet.step()
     assert place_of(bullet, box) == (1.0, 2.0, 3.0)
@@ -116,8 +116,8 @@ def test_a_flying_drone_moves_its_body(bullet):
 
 def test_two_worlds_know_nothing_of_each_other(bullet):
     with BulletWorld() as other:
-        here = bullet.add_box((1.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
-        there = other.add_box((1.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0), (2.0, 2.0, 2.0))
+        here = bullet.add_box((1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+        there = other.add_box((1.0, 1.0, 1.0), (2.0, 2.0, 2.0))
         bullet.step()
         assert (bullet.now_s, other.now_s) == (0.01, 0.0)
         assert place_of(bullet, here) == (1.0, 1.0, 1.0)

@@ -24,7 +24,7 @@ function toast(text, bad) {
   setTimeout(() => box.remove(), bad ? FAILURE_MS : TOAST_MS);
 }
 
-/** Sends an order and tells how it went. `button` rests meanwhile. */
+/** Sends an order and shows its outcome. `button` is disabled meanwhile. */
 async function order(request, button) {
   if (button) button.disabled = true;
   try {
@@ -38,8 +38,8 @@ async function order(request, button) {
 
 function fly(id, x, y, z) {
   const node = mesh.nodes.get(id);
-  const height = z ?? Math.round(node?.path.length ? node.path[node.path.length - 1] : (node?.at?.[2] ?? 0));
-  order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: Math.max(0, height) });
+  const height = z ?? Math.round(node?.path.length ? node.path[node.path.length - 1] : (node?.position?.[2] ?? 0));
+  order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: height });
 }
 
 const map = new MapView(mesh, byId("map"), byId("map-note"), (id, x, y) => fly(id, x, y));
@@ -48,7 +48,7 @@ const panel = new NodePanel(mesh, (id, on) => order({ do: "power", node: id, on 
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
 
-// The line at the top
+// The header
 
 function showHead() {
   const { t, achieved, factor, paused, summary, severity } = mesh.clock;
@@ -82,7 +82,7 @@ mesh.addEventListener("layouts", () => {
   byId("layout-form").hidden = !mesh.layouts.length;
 });
 
-// Orders to the world
+// Orders
 
 function setSpeed(paused, factor) {
   order({ do: "speed", paused, factor });
@@ -134,7 +134,7 @@ const KEYS = {
   n: () => mesh.selectNext(1),
   b: () => mesh.selectNext(-1),
   p: () => panel.switchPower(),
-  g: () => panel.focusPlace(),
+  g: () => panel.focusGoal(),
   f: () => map.fit(),
   "?": () => byId("help").showModal(),
   Escape: () => map.cancelDrag() || mesh.select(null),

@@ -16,7 +16,7 @@ export class Charts {
     this.charts = [
       { id: "share", top: () => 100, lines: [{ colour: "connected", fill: true, value: (s) => 100 * share(s) }], text: (v) => `${v[0].toFixed(0)} %` },
       { id: "rate", lines: [{ colour: "accent", fill: true, value: (s) => s.rate }], text: (v) => v[0].toFixed(0) },
-      { id: "hops", lines: [{ colour: "flight", value: (s) => s.most_hops }, { colour: "gateway", value: (s) => s.mean_hops }], text: (v) => `${v[1].toFixed(1)} / ${v[0]}` },
+      { id: "hops", lines: [{ colour: "flying", value: (s) => s.most_hops }, { colour: "gateway", value: (s) => s.mean_hops }], text: (v) => `${v[1].toFixed(1)} / ${v[0]}` },
     ];
     for (const chart of this.charts) {
       chart.canvas = document.getElementById(`chart-${chart.id}`);

@@ -56,7 +56,7 @@ export class Connection extends EventTarget {
   #receive(message) {
     if (message.type === "frame") this.mesh.apply(message);
     else if (message.type === "detail") this.mesh.applyDetail(message);
-    else if (message.type === "hello") this.mesh.setLayouts(message.layouts);
+    else if (message.type === "hello") this.mesh.applyHello(message);
     else if (message.type === "answer") {
       const order = this.#orders.get(message.number);
       if (!order) return;

@@ -1,27 +1,25 @@
 // Draws one picture of the mesh on a canvas.
 
-import { Mesh } from "./mesh.js";
+const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and only the selected node's are drawn
 
-const MOST_KNOWN_LINKS = 4000; // beyond that a crowd is a grey blot: the selected node's remain
-
-/** The colours of the style sheet, read again when the theme changes. */
+/** The palette's colours in the present theme, by name. */
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
-  const names = ["card", "ink", "muted", "accent", "connected", "lost", "off", "stale", "gateway", "way", "known", "grid", "flight"];
+  const names = ["card", "ink", "muted", "accent", "grid", "gateway", "connected", "flying", "disconnected", "off", "silent", "known-link", "lost-link", "route-link", "path"];
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
-/** Radius of a drone, px: as large as the room between them allows, never too small to see nor to hit. */
+/** Radius of a drone, px: as large as the room between drones allows, never too small to see or to hit. */
 export function droneRadius(camera, mesh) {
-  const places = [...mesh.nodes.values()].filter((node) => node.at).map((node) => node.at);
-  if (!places.length) return 4.5;
-  const span = (axis) => Math.max(...places.map((at) => at[axis])) - Math.min(...places.map((at) => at[axis])) + 1;
-  const apart = Math.sqrt((span(0) * span(1)) / places.length) * camera.scale;
+  const positions = [...mesh.nodes.values()].filter((node) => node.position).map((node) => node.position);
+  if (!positions.length) return 4.5;
+  const span = (axis) => Math.max(...positions.map((at) => at[axis])) - Math.min(...positions.map((at) => at[axis])) + 1;
+  const apart = Math.sqrt((span(0) * span(1)) / positions.length) * camera.scale;
   return Math.min(13, Math.max(4.5, apart * 0.3));
 }
 
 /**
- * Returns what was drawn: {drones, links, linksDrawn, ways, lost}.
+ * Returns the counts {drones, links, linksDrawn, routeLinks, lostLinks}; links are the known and the route links.
  * `drag` is {id, x, y} of a drone that is being dragged, in metres, or null.
  */
 export function drawMesh(context, camera, mesh, colours, options, drag) {
@@ -32,24 +30,23 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
   if (options.ranges) for (const node of mesh.nodes.values()) drawRange(context, camera, mesh, node, colours, 0.35);
   else if (selected) drawRange(context, camera, mesh, selected, colours, 1);
   const radius = droneRadius(camera, mesh);
-  const drawn = { drones: 0, links: mesh.links.size, linksDrawn: 0, ways: 0, lost: 0 };
+  const drawn = { drones: 0, links: mesh.links.known.length + mesh.links.route.length, linksDrawn: 0, routeLinks: 0, lostLinks: 0 };
+  const ends = (links) => links.map(([a, b]) => [mesh.nodes.get(a), mesh.nodes.get(b)]);
 
   if (options.known) {
-    const crowd = mesh.links.size > MOST_KNOWN_LINKS;
-    const pairs = [];
-    for (const [a, b] of mesh.links.values()) {
-      if (!crowd || a === mesh.selected || b === mesh.selected) pairs.push([mesh.nodes.get(a), mesh.nodes.get(b)]);
-    }
-    drawn.linksDrawn = drawLines(context, camera, pairs, colours.known, 1, []);
+    const crowd = mesh.links.known.length > MOST_LINKS;
+    const links = crowd ? mesh.links.known.filter((link) => link.includes(mesh.selected)) : mesh.links.known;
+    drawn.linksDrawn = drawLines(context, camera, ends(links), colours["known-link"], 1, []);
   }
-  const lost = mesh.justLost().map(([a, b]) => [mesh.nodes.get(a), mesh.nodes.get(b)]);
-  drawn.lost = drawLines(context, camera, lost, colours.lost, 1.5, [5, 5]);
-  drawn.ways = drawLines(context, camera, mesh.ways(), colours.way, Math.min(3, Math.max(1, radius * 0.25)), []);
+  drawn.lostLinks = drawLines(context, camera, ends(mesh.links.lost), colours["lost-link"], 1.5, [5, 5]);
+  const width = Math.min(3, Math.max(1, radius * 0.25));
+  drawn.routeLinks = drawLines(context, camera, ends(mesh.links.route), colours["route-link"], width, []);
+  drawn.linksDrawn += drawn.routeLinks;
   if (selected?.route.length > 1) {
     const stops = selected.route.map((id) => mesh.nodes.get(id));
     drawLines(context, camera, stops.slice(1).map((stop, i) => [stops[i], stop]), colours.accent, 4, []);
   }
-  for (const node of mesh.nodes.values()) drawFlight(context, camera, node, colours);
+  for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours);
   for (const node of mesh.nodes.values()) drawn.drones += drawDrone(context, camera, node, mesh.selected, colours, radius);
   if (drag) drawDrag(context, camera, mesh.nodes.get(drag.id), drag, colours, radius);
   return drawn;
@@ -93,8 +90,8 @@ export function niceStep(least) {
 }
 
 function drawRange(context, camera, mesh, node, colours, alpha) {
-  if (!node.at || !node.on) return;
-  const [px, py] = camera.toScreen(node.at[0], node.at[1]);
+  if (!node.position || !node.on) return;
+  const [px, py] = camera.toScreen(node.position[0], node.position[1]);
   context.globalAlpha = 0.07 * alpha;
   context.fillStyle = colours.accent;
   context.beginPath();
@@ -114,9 +111,9 @@ function drawLines(context, camera, pairs, colour, width, dash) {
   context.setLineDash(dash);
   context.beginPath();
   for (const [a, b] of pairs) {
-    if (!a?.at || !b?.at) continue;
-    context.moveTo(...camera.toScreen(a.at[0], a.at[1]));
-    context.lineTo(...camera.toScreen(b.at[0], b.at[1]));
+    if (!a?.position || !b?.position) continue;
+    context.moveTo(...camera.toScreen(a.position[0], a.position[1]));
+    context.lineTo(...camera.toScreen(b.position[0], b.position[1]));
     count++;
   }
   context.stroke();
@@ -124,13 +121,13 @@ function drawLines(context, camera, pairs, colour, width, dash) {
   return count;
 }
 
-function drawFlight(context, camera, node, colours) {
-  if (!node.path.length || !node.at) return;
-  context.strokeStyle = colours.flight;
+function drawPath(context, camera, node, colours) {
+  if (!node.path.length || !node.position) return;
+  context.strokeStyle = colours.path;
   context.lineWidth = 2;
   context.setLineDash([2, 5]);
   context.beginPath();
-  context.moveTo(...camera.toScreen(node.at[0], node.at[1]));
+  context.moveTo(...camera.toScreen(node.position[0], node.position[1]));
   for (let i = 0; i < node.path.length; i += 3) context.lineTo(...camera.toScreen(node.path[i], node.path[i + 1]));
   context.stroke();
   context.setLineDash([]);
@@ -144,10 +141,10 @@ function drawFlight(context, camera, node, colours) {
 }
 
 function drawDrone(context, camera, node, selected, colours, r) {
-  if (!node.at) return 0;
-  const [px, py] = camera.toScreen(node.at[0], node.at[1]);
-  const state = Mesh.stateOf(node);
-  const colour = colours[state === "flying" ? "flight" : state];
+  if (!node.position) return 0;
+  const [px, py] = camera.toScreen(node.position[0], node.position[1]);
+  const colour = colours[node.colour];
+  const hollow = !node.on;
   if (node.id === selected) {
     context.strokeStyle = colours.accent;
     context.lineWidth = 2.5;
@@ -158,13 +155,13 @@ function drawDrone(context, camera, node, selected, colours, r) {
   context.beginPath();
   if (node.role === 1) context.roundRect(px - r, py - r, 2 * r, 2 * r, r * 0.35);
   else context.arc(px, py, r, 0, 2 * Math.PI);
-  context.fillStyle = state === "off" ? colours.card : colour;
+  context.fillStyle = hollow ? colours.card : colour;
   context.fill();
-  context.strokeStyle = state === "off" ? colour : colours.card;
-  context.lineWidth = state === "off" ? 2 : 1.5;
+  context.strokeStyle = hollow ? colour : colours.card;
+  context.lineWidth = hollow ? 2 : 1.5;
   context.stroke();
   if (r >= 7) {
-    context.fillStyle = state === "off" ? colour : colours.card;
+    context.fillStyle = hollow ? colour : colours.card;
     context.font = `600 ${Math.max(9, r * (node.id > 99 ? 0.8 : 0.95))}px system-ui, sans-serif`;
     context.textAlign = "center";
     context.textBaseline = "middle";
@@ -175,13 +172,13 @@ function drawDrone(context, camera, node, selected, colours, r) {
 }
 
 function drawDrag(context, camera, node, drag, colours, r) {
-  if (!node?.at) return;
+  if (!node?.position) return;
   const [px, py] = camera.toScreen(drag.x, drag.y);
   context.strokeStyle = colours.accent;
   context.lineWidth = 2;
   context.setLineDash([6, 4]);
   context.beginPath();
-  context.moveTo(...camera.toScreen(node.at[0], node.at[1]));
+  context.moveTo(...camera.toScreen(node.position[0], node.position[1]));
   context.lineTo(px, py);
   context.stroke();
   context.setLineDash([]);

@@ -9,7 +9,7 @@ const KEY_STEP_PX = 60;
 const ZOOM_STEP = 1.3;
 
 export class MapView {
-  /** `fly(id, x, y)` is called when a drone was dragged to a place. */
+  /** `fly(id, x, y)` is called when a drone was dragged to (x, y). */
   constructor(mesh, canvas, note, fly) {
     this.mesh = mesh;
     this.canvas = canvas;
@@ -56,7 +56,7 @@ export class MapView {
   fit() {
     const points = [];
     for (const node of this.mesh.nodes.values()) {
-      if (node.at) points.push(node.at);
+      if (node.position) points.push(node.position);
       if (node.path.length) points.push(node.path.slice(-3));
     }
     this.camera.fit(points);
@@ -83,12 +83,11 @@ export class MapView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, this.options, this.drag);
     this.#describe(drawn);
-    if (drawn.lost) setTimeout(() => this.redraw(), 1000);
   }
 
   #describe(drawn) {
     const left = this.options.known && drawn.linksDrawn < drawn.links ? " (those of the selected node are shown)" : "";
-    const text = `${drawn.drones} drones, ${drawn.links} links${left}, ${drawn.ways} on the way to a gateway`;
+    const text = `${drawn.drones} drones, ${drawn.links} links${left}, ${drawn.routeLinks} on routes to a gateway`;
     if (this.note.textContent !== text) this.note.textContent = text;
     const { x, y, scale } = this.camera;
     Object.assign(this.note.dataset, drawn, { x, y, scale });
@@ -109,8 +108,8 @@ export class MapView {
     let nearest = null;
     let best = droneRadius(this.camera, this.mesh) + NEAR_PX;
     for (const node of this.mesh.nodes.values()) {
-      if (!node.at) continue;
-      const [x, y] = this.camera.toScreen(node.at[0], node.at[1]);
+      if (!node.position) continue;
+      const [x, y] = this.camera.toScreen(node.position[0], node.position[1]);
       const distance = Math.hypot(x - px, y - py);
       if (distance < best) [nearest, best] = [node, distance];
     }

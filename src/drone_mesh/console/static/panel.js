@@ -1,9 +1,6 @@
-// The selected node: its facts, its power switch, and where to send it.
+// The selected node: its facts, its power switch, and where to send its drone.
 
-import { Mesh, orDash } from "./mesh.js";
-import { words } from "./table.js";
-
-const SEVERITY = { gateway: 0, connected: 0, flying: 1, off: 1, lost: 2, stale: 3 };
+import { orDash } from "./mesh.js";
 
 export class NodePanel {
   /** `power(id, on)` and `fly(id, x, y, z)` carry out what the buttons say. */
@@ -12,7 +9,7 @@ export class NodePanel {
     this.power = power;
     this.fly = fly;
     for (const what of ["frame", "select", "detail"]) mesh.addEventListener(what, () => this.#show());
-    mesh.addEventListener("select", () => this.#fillPlace());
+    mesh.addEventListener("select", () => this.#fillGoal());
     byId("power").addEventListener("click", () => this.switchPower());
     byId("node-close").addEventListener("click", () => mesh.select(null));
     byId("fly-form").addEventListener("submit", (event) => this.#send(event));
@@ -23,7 +20,7 @@ export class NodePanel {
     if (node) this.power(node.id, !node.on);
   }
 
-  focusPlace() {
+  focusGoal() {
     if (this.mesh.selected !== null) byId("fly-x").select();
   }
 
@@ -32,40 +29,38 @@ export class NodePanel {
     byId("node-none").hidden = Boolean(node);
     byId("node-details").hidden = !node;
     if (!node) return;
-    const state = Mesh.stateOf(node);
     setText(byId("node-name"), `${node.role === 1 ? "Gateway" : "Router"} ${node.id}`);
-    setText(byId("node-state"), node.trouble || words(node));
-    byId("node-state").dataset.severity = SEVERITY[state];
+    setText(byId("node-condition"), node.trouble || node.condition);
+    byId("node-condition").dataset.colour = node.colour;
     setText(byId("power"), node.on ? "Switch off" : "Switch on");
     this.#facts(node);
   }
 
   #facts(node) {
     const facts = [
-      ["Gateway", orDash(node.gateway)],
+      [node.condition === "connected" ? "Gateway" : "Last gateway", orDash(node.gateway)],
       ["Hops", orDash(node.hops)],
-      ["Would fly to the place of", node.place === 255 ? "–" : [node.place]],
-      ["Known nodes", String(node.known)],
-      ["Messages sent", String(node.sent)],
-      ["Position", node.at ? node.at.map((m) => m.toFixed(2)).join(", ") : "–"],
-      ["Route", node.route.length ? node.route : "–", " › ", true],
-      ["Neighbours, seconds since last heard", this.#neighbours(node), ", ", true],
+      ["Fallback position", node.fallback === 255 ? "–" : [node.fallback], { before: "node ", after: "’s" }],
+      ["Known nodes", String(node.known_nodes)],
+      ["Messages sent", String(node.total_messages)],
+      ["Position", node.position ? node.position.map((m) => m.toFixed(2)).join(", ") : "–"],
+      ["Route", node.route.length ? node.route : "–", { glue: " › ", wide: true }],
+      ["Neighbours, seconds since last heard", this.#neighbours(node), { glue: ", ", wide: true }],
     ];
     const list = byId("node-facts");
     const shown = JSON.stringify(facts);
     if (list.dataset.shown === shown) return;
     list.dataset.shown = shown;
-    list.replaceChildren(...facts.map(([name, value, glue, wide]) => this.#fact(name, value, glue, wide)));
+    list.replaceChildren(...facts.map(([name, value, options]) => this.#fact(name, value, options)));
   }
 
   #neighbours(node) {
-    if (!node.ids.length) return "–";
-    const ages = new Map(this.mesh.detail?.node === node.id ? this.mesh.detail.neighbours : []);
-    return node.ids.map((id) => (ages.has(id) ? [id, ages.get(id)] : id));
+    if (!node.neighbours) return "–";
+    return this.mesh.detail?.node === node.id ? this.mesh.detail.neighbours : "…";
   }
 
-  /** A value is a text, or a list of ids, or of [id, age]: ids become links. */
-  #fact(name, value, glue, wide) {
+  /** `value` is a text, a list of ids, or a list of [id, age]; ids become buttons that select the node. */
+  #fact(name, value, { glue = "", before = "", after = "", wide = false } = {}) {
     const box = document.createElement("div");
     if (wide) box.className = "wide";
     const dt = document.createElement("dt");
@@ -73,33 +68,57 @@ export class NodePanel {
     const dd = document.createElement("dd");
     if (typeof value === "string") dd.textContent = value;
     else {
+      dd.append(before);
       value.forEach((item, index) => {
         const [id, age] = [item].flat();
         if (index) dd.append(glue);
         dd.append(idLink(this.mesh, id));
         if (age !== undefined) dd.append(` (${age === 255 ? "255+" : age})`);
       });
+      dd.append(after);
     }
     box.append(dt, dd);
     return box;
   }
 
-  #fillPlace() {
+  #fillGoal() {
     const node = this.mesh.nodes.get(this.mesh.selected);
-    const place = node?.path.length ? node.path.slice(-3) : node?.at;
+    const goal = node?.path.length ? node.path.slice(-3) : node?.position;
+    setText(byId("fly-error"), "");
     ["x", "y", "z"].forEach((axis, index) => {
-      byId(`fly-${axis}`).value = place ? String(index < 2 ? Number(place[index].toFixed(1)) : Math.round(place[index])) : "";
+      byId(`fly-${axis}`).removeAttribute("aria-invalid");
+      byId(`fly-${axis}`).value = goal ? String(index < 2 ? Number(goal[index].toFixed(1)) : Math.round(goal[index])) : "";
     });
   }
 
   #send(event) {
     event.preventDefault();
-    const place = ["x", "y", "z"].map((axis) => Number(byId(`fly-${axis}`).value.trim().replace(",", ".") || NaN));
-    this.fly(this.mesh.selected, ...place);
+    const { coordinate, height } = this.mesh.limits;
+    const goal = [
+      this.#number("x", -coordinate, coordinate, false),
+      this.#number("y", -coordinate, coordinate, false),
+      this.#number("z", 0, height, true),
+    ];
+    const wrong = goal.find((entry) => entry.error);
+    setText(byId("fly-error"), wrong?.error ?? "");
+    if (wrong) wrong.input.select();
+    else this.fly(this.mesh.selected, ...goal.map((entry) => entry.value));
+  }
+
+  /** What was typed for one axis: {input, value, error}; nothing is rounded or clipped. */
+  #number(axis, low, high, whole) {
+    const input = byId(`fly-${axis}`);
+    const text = input.value.trim().replace(",", ".");
+    const value = text === "" ? NaN : Number(text);
+    const good = Number.isFinite(value) && value >= low && value <= high && (!whole || Number.isInteger(value));
+    if (good) input.removeAttribute("aria-invalid");
+    else input.setAttribute("aria-invalid", "true");
+    const kind = whole ? "a whole number" : "a number";
+    return { input, value, error: good ? "" : `${axis} must be ${kind} from ${low} to ${high}` };
   }
 }
 
-/** A button that chooses this node. */
+/** A button that selects this node. */
 export function idLink(mesh, id) {
   const link = document.createElement("button");
   link.type = "button";

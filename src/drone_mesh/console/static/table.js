@@ -1,30 +1,24 @@
 // The table of nodes: one row per node, sorted by the column that was clicked.
 
-import { Mesh, orDash } from "./mesh.js";
+import { orDash } from "./mesh.js";
 
 const COLUMNS = [
   { name: "Node", title: "Id", sort: (n) => n.id, text: (n) => String(n.id) },
-  { name: "State", title: "", sort: (n) => Mesh.stateOf(n), text: (n) => words(n), state: true },
-  { name: "GW", title: "The gateway that it uses", sort: (n) => n.gateway, text: (n) => orDash(n.gateway) },
+  { name: "Condition", title: "", sort: (n) => n.condition, text: (n) => n.condition, condition: true },
+  { name: "GW", title: "The gateway that it uses, or used last", sort: (n) => n.gateway, text: (n) => orDash(n.gateway) },
   { name: "Hops", title: "Hops to that gateway", sort: (n) => n.hops, text: (n) => orDash(n.hops) },
-  { name: "Next", title: "The neighbour that leads there", sort: (n) => n.next, text: (n) => orDash(n.next) },
-  { name: "Nb", title: "Neighbours", sort: (n) => n.ids.length, text: (n) => String(n.ids.length) },
-  { name: "Known", title: "Known nodes; one known through two neighbours counts twice", sort: (n) => n.known, text: (n) => String(n.known) },
-  { name: "Sent", title: "Messages sent successfully", sort: (n) => n.sent, text: (n) => String(n.sent) },
-  { name: "Place", title: "The node whose place it would fly to", sort: (n) => n.place, text: (n) => orDash(n.place) },
-  { name: "x", title: "m", sort: (n) => n.at?.[0] ?? 0, text: (n) => metres(n, 0) },
-  { name: "y", title: "m", sort: (n) => n.at?.[1] ?? 0, text: (n) => metres(n, 1) },
-  { name: "z", title: "m", sort: (n) => n.at?.[2] ?? 0, text: (n) => metres(n, 2) },
+  { name: "Next hop", title: "The neighbour on its route to that gateway", sort: (n) => n.next_hop, text: (n) => orDash(n.next_hop) },
+  { name: "Nb", title: "Neighbours", sort: (n) => n.neighbours, text: (n) => String(n.neighbours) },
+  { name: "Known", title: "Known nodes; one known through two neighbours counts twice", sort: (n) => n.known_nodes, text: (n) => String(n.known_nodes) },
+  { name: "Sent", title: "Messages sent successfully", sort: (n) => n.total_messages, text: (n) => String(n.total_messages) },
+  { name: "Fallback", title: "The node whose position it would fly to", sort: (n) => n.fallback, text: (n) => orDash(n.fallback) },
+  { name: "x", title: "m", sort: (n) => n.position?.[0] ?? 0, text: (n) => metres(n, 0) },
+  { name: "y", title: "m", sort: (n) => n.position?.[1] ?? 0, text: (n) => metres(n, 1) },
+  { name: "z", title: "m", sort: (n) => n.position?.[2] ?? 0, text: (n) => metres(n, 2) },
 ];
 
-export function words(node) {
-  return {
-    gateway: "gateway", connected: "connected", lost: "not connected", flying: "flying", off: "off", stale: "silent",
-  }[Mesh.stateOf(node)];
-}
-
 function metres(node, axis) {
-  return node.at ? node.at[axis].toFixed(1) : "–";
+  return node.position ? node.position[axis].toFixed(1) : "–";
 }
 
 export class NodeTable {
@@ -87,13 +81,14 @@ export class NodeTable {
       row.tabIndex = -1;
       for (const column of COLUMNS) {
         const cell = row.insertCell();
-        if (column.state) cell.append(Object.assign(document.createElement("span"), { className: "state" }));
+        if (column.condition) cell.append(Object.assign(document.createElement("span"), { className: "condition" }));
       }
       this.rows.set(node.id, row);
     }
-    row.dataset.state = Mesh.stateOf(node);
+    row.dataset.condition = node.condition;
+    row.dataset.colour = node.colour;
     COLUMNS.forEach((column, index) => {
-      const cell = column.state ? row.cells[index].firstChild : row.cells[index];
+      const cell = column.condition ? row.cells[index].firstChild : row.cells[index];
       const text = column.text(node);
       if (cell.textContent !== text) cell.textContent = text;
     });

@@ -1,121 +1,70 @@
-"""The node /mesh_markers: the mesh for rviz, as tf frames and one topic of markers."""
+"""MarkerMaker: turns states of the mesh into rviz markers."""
 
 from __future__ import annotations
 
-import threading
-import time
-from typing import Iterable, Sequence
+from typing import Sequence
 
-import rospy
-from geometry_msgs.msg import Point, TransformStamped
+from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
-from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import prepare_node
-from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.state.links import Link, LostLinks, known_links, shortest, way_links
+from drone_mesh.state.condition import condition_of
+from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use, shortest
 from drone_mesh.state.model import NodeStatus, position_is_known
+from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 
-ALL_FRAMES_PERIOD_S = 1.0  # wall time; a drone that stands still is told of no more often
-MOST_KNOWN_LINKS = 1500  # our choice: 254 drones on 1 m have 18,000, which are one blot
-BOX_M = {Role.ROUTER: (0.5, 0.5, 0.25), Role.GATEWAY: (0.5, 0.5, 0.5)}  # larger than life
+MOST_LINKS = 1500  # our choice, per use: 254 drones on 1 m have 18,000, which are one blot
+TIMES_LARGER = 2.5  # than life: the size of the boxes
 LABEL_M = 0.5
-_UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # x y z w
-
-CONNECTED = ColorRGBA(0.16, 0.65, 0.27, 1.0)
-LOST = ColorRGBA(0.85, 0.15, 0.12, 1.0)
-OFF = ColorRGBA(0.55, 0.58, 0.62, 1.0)
-FLYING = ColorRGBA(0.95, 0.60, 0.10, 1.0)
-GATEWAY = ColorRGBA(0.56, 0.20, 0.75, 1.0)
-LABEL = ColorRGBA(1.0, 1.0, 1.0, 1.0)
-KNOWN = ColorRGBA(0.60, 0.66, 0.74, 0.35)
-
-
-def node_colour(node: NodeStatus) -> ColorRGBA:
-    """By role and state."""
-    if not node.on:
-        return OFF
-    if len(node.path):
-        return FLYING
-    if node.role == Role.GATEWAY:
-        return GATEWAY
-    return CONNECTED if node.connected else LOST
+LINK_WIDTH_M = {LinkUse.ROUTE: 0.08, LinkUse.KNOWN: 0.03, LinkUse.LOST: 0.05}
+LINK_OPACITY = {LinkUse.ROUTE: 1.0, LinkUse.KNOWN: 0.6, LinkUse.LOST: 1.0}
+PATH_WIDTH_M = 0.06
 
 
 class MarkerMaker:
-    """Makes markers and frames of states; of markers only those that changed. One thread."""
+    """Makes the markers that changed since the last call. Belongs to one thread."""
 
     def __init__(self) -> None:
         self._shown: dict[tuple[str, int], object] = {}
         self._lost = LostLinks()
-        self._frames: dict[int, tuple[float, ...]] = {}
-        self._all_frames_s = float("-inf")
 
     def forget_shown(self) -> None:
-        """Somebody new looks: the next markers are all of them."""
+        """Make all markers at the next call, for a new subscriber."""
         self._shown.clear()
-
-    def frames(self, state: MeshState, wall_s: float) -> TFMessage:
-        """map -> drone_<id>, of drones that moved, and now and then of all."""
-        if wall_s - self._all_frames_s >= ALL_FRAMES_PERIOD_S:
-            self._all_frames_s = wall_s
-            self._frames.clear()
-        message = TFMessage()
-        for node in state.nodes:
-            place = tuple(node.position)
-            if position_is_known(node) and self._frames.get(node.id) != place:
-                self._frames[node.id] = place
-                message.transforms.append(_transform(node, state.header.stamp))
-        return message
 
     def markers(self, state: MeshState, wall_s: float) -> MarkerArray:
         """What changed since the last call."""
         nodes = [node for node in state.nodes if position_is_known(node)]
-        known, ways = known_links(nodes), way_links(nodes)
+        lost = self._lost.update(known_links(nodes), wall_s)
         array = MarkerArray()
-        for role, size in BOX_M.items():
-            self._add_boxes(array, [node for node in nodes if node.role == role], role, size)
-        lost = shortest(set(self._lost.update(known, wall_s)), nodes, MOST_KNOWN_LINKS)
-        unused = shortest(known - ways, nodes, MOST_KNOWN_LINKS)
-        self._add_links(array, "links: way to a gateway", nodes, sorted(ways), CONNECTED, 0.08)
-        self._add_links(array, "links: known", nodes, unused, KNOWN, 0.03)
-        self._add_links(array, "links: just lost", nodes, lost, LOST, 0.05)
-        self._add_flights(array, nodes)
-        self._add_labels(array, nodes)
+        for role in Role:
+            self._add_boxes(array, [node for node in nodes if node.role == role], role)
+        positions = {node.id: tuple(node.position) for node in nodes}
+        for use, links in links_by_use(nodes, lost).items():
+            lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
+            colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
+            self._add_lines(array, f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
+        self._add_lines(
+            array, "flight paths", _path_lines(nodes), _colour(DARK.path), PATH_WIDTH_M
+        )
+        self._add_ids(array, nodes)
         for marker in array.markers:
             marker.header.stamp, marker.header.frame_id = state.header.stamp, names.MAP_FRAME
         return array
 
-    def _add_boxes(
-        self, array: MarkerArray, nodes: Sequence[NodeStatus], role: Role, size: Sequence[float]
-    ) -> None:
-        points = [_point(node.position, up=size[2] / 2) for node in nodes]
-        content = [(tuple(node.position), id(node_colour(node))) for node in nodes]
-        marker = self._changed(array, f"{role.name.lower()}s", 0, content)
+    def _add_boxes(self, array: MarkerArray, nodes: Sequence[NodeStatus], role: Role) -> None:
+        x_m, y_m, z_m = (TIMES_LARGER * edge_m for edge_m in role.size_m)
+        colours = [DARK.of_node(role, condition_of(node)) for node in nodes]
+        content = [(tuple(node.position), colour) for node, colour in zip(nodes, colours)]
+        marker = self._changed(array, f"{role.word}s", 0, content)
         if marker:
             marker.type = Marker.CUBE_LIST
-            marker.scale.x, marker.scale.y, marker.scale.z = size
-            marker.points = points
-            marker.colors = [node_colour(node) for node in nodes]
-
-    def _add_links(
-        self, array: MarkerArray, name: str, nodes: Sequence[NodeStatus], links: Iterable[Link],
-        colour: ColorRGBA, width_m: float,
-    ) -> None:  # fmt: skip
-        places = {node.id: tuple(node.position) for node in nodes}
-        lines = [(places[a], places[b]) for a, b in links]
-        self._add_lines(array, name, lines, colour, width_m)
-
-    def _add_flights(self, array: MarkerArray, nodes: Sequence[NodeStatus]) -> None:
-        lines = []
-        for node in nodes:
-            corners = [tuple(node.position), *zip(*[iter(node.path)] * 3)]
-            lines += list(zip(corners, corners[1:]))
-        self._add_lines(array, "flights", lines, FLYING, 0.06)
+            marker.scale.x, marker.scale.y, marker.scale.z = x_m, y_m, z_m
+            marker.points = [_point(node.position, up=z_m / 2) for node in nodes]
+            marker.colors = [_colour(colour) for colour in colours]
 
     def _add_lines(
         self, array: MarkerArray, name: str, lines: Sequence[tuple[Sequence[float], ...]],
@@ -128,25 +77,25 @@ class MarkerMaker:
             marker.color = colour
             marker.points = [_point(end, up=0.05) for line in lines for end in line]
 
-    def _add_labels(self, array: MarkerArray, nodes: Sequence[NodeStatus]) -> None:
+    def _add_ids(self, array: MarkerArray, nodes: Sequence[NodeStatus]) -> None:
         for node in nodes:
             marker = self._changed(array, "ids", node.id, [tuple(node.position)])
             if marker:
                 marker.type = Marker.TEXT_VIEW_FACING
                 marker.scale.z = LABEL_M
-                marker.color = LABEL
+                marker.color = _colour(DARK.ink)
                 marker.text = str(node.id)
-                box_m = BOX_M[Role(node.role)][2]
-                marker.pose.position = _point(node.position, up=box_m + 1.2 * LABEL_M)
-        there = {node.id for node in nodes}
+                height_m = TIMES_LARGER * Role(node.role).size_m[2]
+                marker.pose.position = _point(node.position, up=height_m + 1.2 * LABEL_M)
+        present = {node.id for node in nodes}
         for name, number in [key for key in self._shown if key[0] == "ids"]:
-            if number not in there:
+            if number not in present:
                 self._changed(array, name, number, [])
 
     def _changed(
         self, array: MarkerArray, name: str, number: int, content: Sequence[object]
     ) -> Marker | None:
-        """A new marker to fill in, if `content` is not what is shown; without content it goes."""
+        """A new marker to fill in if `content` has changed; an empty one deletes the marker."""
         key = (name, number)
         if self._shown.get(key, []) == content:
             return None
@@ -161,65 +110,17 @@ class MarkerMaker:
         return marker
 
 
-class MeshMarkers:
-    """Subscribes: /mesh/state (MeshState)
-    Publishes:  /mesh/markers (MarkerArray), /tf (TFMessage); both at most as often as the state
-
-    The subscriber's thread does the work; rospy's others only set `_newcomer`.
-    """
-
-    def __init__(self) -> None:
-        self._maker = MarkerMaker()
-        self._newcomer = threading.Event()
-        listener = _Newcomers(self._newcomer)
-        self._markers = rospy.Publisher(
-            names.MARKERS_TOPIC, MarkerArray, subscriber_listener=listener, queue_size=10
-        )
-        self._frames = rospy.Publisher("/tf", TFMessage, queue_size=10)
-        rospy.Subscriber(names.STATE_TOPIC, MeshState, self._show, queue_size=1)
-
-    def _show(self, state: MeshState) -> None:
-        now_s = time.monotonic()
-        frames = self._maker.frames(state, now_s)
-        if frames.transforms:
-            self._frames.publish(frames)
-        if self._markers.get_num_connections() == 0:
-            return
-        if self._newcomer.is_set():
-            self._newcomer.clear()
-            self._maker.forget_shown()
-        markers = self._maker.markers(state, now_s)
-        if markers.markers:
-            self._markers.publish(markers)
+def _path_lines(nodes: Sequence[NodeStatus]) -> list[tuple[Sequence[float], ...]]:
+    lines: list[tuple[Sequence[float], ...]] = []
+    for node in nodes:
+        waypoints = [tuple(node.position), *zip(*[iter(node.path)] * 3)]
+        lines += zip(waypoints, waypoints[1:])
+    return lines
 
 
-class _Newcomers(rospy.SubscribeListener):
-    def __init__(self, came: threading.Event) -> None:
-        super().__init__()
-        self._came = came
-
-    def peer_subscribe(self, *_args: object) -> None:
-        self._came.set()
+def _colour(colour: Colour, opacity: float = 1.0) -> ColorRGBA:
+    return ColorRGBA(*rgb(colour), opacity)
 
 
-def _point(place: Sequence[float], up: float) -> Point:
-    return Point(place[0], place[1], place[2] + up)
-
-
-def _transform(node: NodeStatus, stamp: rospy.Time) -> TransformStamped:
-    message = TransformStamped(child_frame_id=names.drone_frame(node.id))
-    message.header.frame_id = names.MAP_FRAME
-    message.header.stamp = stamp
-    translation, rotation = message.transform.translation, message.transform.rotation
-    translation.x, translation.y, translation.z = node.position
-    rotation.x, rotation.y, rotation.z, rotation.w = _UPRIGHT
-    return message
-
-
-def main() -> None:
-    """Run the node."""
-    prepare_node(MeshMarkers.__doc__)
-    rospy.init_node("mesh_markers")
-    show_library_logs_on_rosout()
-    MeshMarkers()
-    rospy.spin()
+def _point(position: Sequence[float], up: float) -> Point:
+    return Point(position[0], position[1], position[2] + up)

@@ -16,8 +16,8 @@ from drone_mesh.ros.graph.command_line import join_graph, require_master, run_to
 from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.views.look import WAIT_S, NoState, live_state, parse_with_bag, state_in_bag
 from drone_mesh.state.model import MeshStatus
-from drone_mesh.state.table import mesh_table
-from drone_mesh.state.trouble import everybody_is_connected, find_trouble
+from drone_mesh.state.trouble import all_connected, find_trouble
+from drone_mesh.view.table import mesh_table
 
 WATCH_PERIOD_S = 1.0
 OLD_NEWS_S = 3.0  # wall time without a state after which --watch says so
@@ -61,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _show(mesh: MeshStatus, colours: bool) -> int:
     print(mesh_table(mesh, colours))
-    return 0 if everybody_is_connected(find_trouble(mesh.nodes)) else 1
+    return 0 if all_connected(find_trouble(mesh.nodes)) else 1
 
 
 def _watch(colours: bool) -> int:
@@ -87,4 +87,4 @@ def _watch(colours: bool) -> int:
             print(f"{CLEAR_SCREEN if colours else ''}{text}", flush=True)
             time.sleep(WATCH_PERIOD_S)
     except KeyboardInterrupt:
-        return 0 if everybody_is_connected(find_trouble(latest[0][0].nodes)) else 1
+        return 0 if all_connected(find_trouble(latest[0][0].nodes)) else 1

@@ -8,12 +8,12 @@ from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.fleet_parameter import set_fleet_parameter
 from drone_mesh.ros.host.mesh_host import MeshHost
+from drone_mesh.ros.world.drone_views import drone_views
 from drone_mesh.ros.world.engine_server import EngineServer, PositionReporter
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.ros.world.world_window import window_of
-from drone_mesh.state.observation import view_drone
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
 
@@ -82,7 +82,7 @@ class Simulation:
 
         def look() -> WorldView:
             now_s = world.now_s
-            views = [view_drone(drone, now_s) for drone in drones]
+            views = drone_views(drones, now_s)
             return WorldView(now_s, views, runner.wanted_factor, runner.paused)
 
         state = MeshStatePublisher(look, configuration.max_distance)

@@ -1,13 +1,13 @@
-"""What the world's window shows of a running simulation."""
+"""Feeds the world's window from a running simulation."""
 
 from __future__ import annotations
 
 import time
 from typing import Sequence
 
+from drone_mesh.ros.world.drone_views import drone_views
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher
 from drone_mesh.state.links import LostLinks, known_links
-from drone_mesh.state.observation import view_drone
 from drone_mesh.view.picture import Scene
 from drone_mesh.view.scene import scene_of
 from drone_mesh.view.window_process import WindowProcess
@@ -18,7 +18,7 @@ from drone_mesh.world.interfaces import World
 def window_of(
     world: World, drones: Sequence[VirtualDrone], state: MeshStatePublisher
 ) -> WindowProcess:
-    """A window, not started yet: places as they are now, all else as in the latest state."""
+    """A window, not started yet: positions as they are now, all else from the latest state."""
     lost_links = LostLinks()
 
     def look() -> Scene:
@@ -26,7 +26,6 @@ def window_of(
         if mesh is None:
             return Scene(title="starting")
         lost = lost_links.update(known_links(mesh.nodes), time.monotonic())
-        now_s = world.now_s
-        return scene_of(mesh, lost, [view_drone(drone, now_s) for drone in drones])
+        return scene_of(mesh, lost, drone_views(drones, world.now_s))
 
     return WindowProcess(look)

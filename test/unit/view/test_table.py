@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import MeshStatus, NodeStatus
-from drone_mesh.state.table import mesh_table
+from drone_mesh.view.table import mesh_table
 
 MESH = MeshStatus(
     12.34,
@@ -25,7 +25,7 @@ def test_the_table_in_a_pipe_is_plain_text():
     assert lines[0] == "t = 12.3 s, speed 2x: 0 of 1 routers connected, 1 switched off"
     assert lines[1].split() == [
         "node", "kind", "power", "connected", "gateway", "hops", "neighbours", "known", "sent",
-        "place", "(x,", "y,", "z)", "route", "remark",
+        "position", "(x,", "y,", "z)", "route", "remark",
     ]  # fmt: skip
     assert lines[2].split() == [
         "0", "gateway", "on", "yes", "0", "0", "1", "0", "0", "-1.0,", "0.0,", "0.0", "0",
@@ -38,13 +38,13 @@ def test_the_table_in_a_pipe_is_plain_text():
     assert "\x1b" not in "".join(lines)
 
 
-def test_on_a_terminal_rows_with_trouble_have_a_colour():
+def test_on_a_terminal_rows_have_the_colour_of_their_condition():
     lines = mesh_table(MESH, colours=True).splitlines()
     assert lines[0].startswith("\x1b[31m")
     assert "\x1b" not in lines[2]
-    assert lines[3].startswith("\x1b[31m")
+    assert lines[3].startswith("\x1b[33m")
     assert lines[3].endswith("\x1b[0m")
-    assert lines[4].startswith("\x1b[33m")
+    assert lines[4].startswith("\x1b[90m")
 
 
 def test_columns_are_aligned():

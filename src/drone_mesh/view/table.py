@@ -6,25 +6,21 @@ from typing import Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
-from drone_mesh.state.trouble import Severity, Trouble, find_trouble, summarise
+from drone_mesh.state.trouble import Trouble, find_trouble, summarise
+from drone_mesh.view.palette import ansi
 
-_COLOUR = {
-    Severity.OK: "\x1b[32m",
-    Severity.WARN: "\x1b[33m",
-    Severity.ERROR: "\x1b[31m",
-    Severity.STALE: "\x1b[35m",
-}
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
 _LONGEST_ROUTE = 6  # ids shown of a route before its middle is left out
 _HEADINGS = (
     "node", "kind", "power", "connected", "gateway", "hops", "neighbours", "known", "sent",
-    "place (x, y, z)", "route", "remark",
+    "position (x, y, z)", "route", "remark",
 )  # fmt: skip
 
 
 def mesh_table(mesh: MeshStatus, colours: bool) -> str:
-    """One heading line, a table with one row per node, one line per kind of news. No line end."""
+    """A summary line and a table with one row per node; no line end. `colours`: for a terminal."""
     troubles = {trouble.node: trouble for trouble in find_trouble(mesh.nodes)}
     summary = summarise(mesh.nodes, list(troubles.values()))
     speed = "paused" if mesh.paused else f"speed {mesh.achieved_real_time_factor:.2g}x"
@@ -33,11 +29,13 @@ def mesh_table(mesh: MeshStatus, colours: bool) -> str:
     widths = [max(len(row[i]) for row in [_HEADINGS, *rows]) for i in range(len(_HEADINGS))]
     lines = [_line(_HEADINGS, widths), *(_line(row, widths) for row in rows)]
     if colours:
-        heading = f"{_COLOUR[summary.severity]}{heading}{_PLAIN}"
+        heading = ansi(heading, summary.severity)
         lines[0] = f"{_BOLD}{lines[0]}{_PLAIN}"
         for number, node in enumerate(mesh.nodes, start=1):
-            if node.id in troubles:
-                lines[number] = f"{_COLOUR[troubles[node.id].severity]}{lines[number]}{_PLAIN}"
+            condition = condition_of(node)
+            connected_badly = condition is Condition.CONNECTED and node.id in troubles
+            what = troubles[node.id].severity if connected_badly else condition
+            lines[number] = ansi(lines[number], what)
     return "\n".join([heading, *lines])
 
 
@@ -52,7 +50,7 @@ def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
         str(len(node.neighbours)),
         str(node.known_nodes),
         str(node.total_messages),
-        _place(node),
+        _position(node),
         _route(node.route),
         trouble.text if trouble else "",
     )
@@ -66,14 +64,14 @@ def _number(value: int) -> str:
     return "-" if value == NO_ROUTE else str(value)
 
 
-def _place(node: NodeStatus) -> str:
+def _position(node: NodeStatus) -> str:
     if not position_is_known(node):
         return "-"
-    place = ", ".join(f"{metres:.1f}" for metres in node.position)
+    position = ", ".join(f"{metres:.1f}" for metres in node.position)
     if not len(node.path):
-        return place
+        return position
     goal = ", ".join(f"{metres:.1f}" for metres in node.path[-3:])
-    return f"{place} -> {goal}"
+    return f"{position} -> {goal}"
 
 
 def _route(route: Sequence[int]) -> str:

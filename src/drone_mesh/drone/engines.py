@@ -1,0 +1,71 @@
+"""Engines by name, so that an option can choose one."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass, field
+
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.errors import ConfigurationError
+
+GROUND = "ground"
+MAVLINK = "mavlink:"
+
+
+@dataclass(frozen=True)
+class FlightOptions:
+    """How the drones of a program fly."""
+
+    drone: str = GROUND  # "ground", "mavlink:ADDRESS" or "package.module:Class"
+    origin: Origin | None = None
+    limits: FlightLimits = field(default_factory=FlightLimits)
+    permissions: Permissions = field(default_factory=Permissions)
+
+    def __post_init__(self) -> None:
+        """Raises ConfigurationError for a combination that cannot fly."""
+        if self.drone.startswith(MAVLINK) and self.origin is None:
+            raise ConfigurationError("--drone mavlink: needs --origin LAT,LON,ALT")
+
+
+def create_engine(node_id: int, location: Location, options: FlightOptions) -> IDroneEngine:
+    """The engine of one node; `location` is where one on the ground stands.
+
+    Raises ConfigurationError if the engine cannot be had.
+    """
+    if options.drone == GROUND:
+        return GroundEngine(node_id, location)
+    if options.drone.startswith(MAVLINK):
+        return _mavlink_engine(node_id, options)
+    return _own_engine(node_id, options.drone)
+
+
+def _mavlink_engine(node_id: int, options: FlightOptions) -> IDroneEngine:
+    try:  # pymavlink's classes take a second to load on a Raspberry Pi
+        from drone_mesh.drone.mavlink.engine import MavlinkEngine
+    except ImportError as error:
+        raise ConfigurationError(
+            f"the Python package {error.name} is missing, which --drone mavlink: needs: "
+            "pip install 'drone_mesh[raspberry]'"
+        ) from error
+    assert options.origin is not None  # FlightOptions sees to that
+    address = options.drone[len(MAVLINK) :]
+    return MavlinkEngine(node_id, address, options.origin, options.limits, options.permissions)
+
+
+def _own_engine(node_id: int, name: str) -> IDroneEngine:
+    module_name, colon, class_name = name.partition(":")
+    if not colon:
+        raise ConfigurationError(
+            f"invalid --drone {name!r}: use ground, mavlink:ADDRESS or package.module:Class"
+        )
+    try:
+        make = getattr(importlib.import_module(module_name), class_name)
+        engine = make(node_id)
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise ConfigurationError(f"--drone {name} cannot be made: {error}") from error
+    if not isinstance(engine, IDroneEngine):
+        raise ConfigurationError(f"--drone {name} is not an IDroneEngine")
+    return engine

@@ -1,0 +1,200 @@
+"""What is said to an autopilot: heartbeats, commands until they are acknowledged, targets."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any, Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from drone_mesh.drone.geodesy import EarthPlace
+from drone_mesh.drone.mavlink.autopilots import Requirement
+from drone_mesh.drone.mavlink.telemetry import STREAMS_HZ, Message, Telemetry
+
+HEARTBEAT_PERIOD_S = 1.0  # MAVLink's own rule
+ASK_STREAMS_PERIOD_S = 5.0  # our choice
+COMMAND_PERIOD_S = 1.0  # our choice: an autopilot answers within tens of milliseconds
+COMMAND_TRIES = 3  # our choice
+PARAMETER_PERIOD_S = 0.5  # our choice
+PARAMETER_TRIES = 6  # our choice, for all names of a requirement together
+
+POSITION_ONLY = (
+    mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VZ_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
+)
+
+_log = logging.getLogger(__name__)
+
+
+class Commander:
+    """Speaks to the autopilot that `telemetry` listens to."""
+
+    def __init__(self, telemetry: Telemetry, send: Callable[[Message], None]) -> None:
+        """`send` brings a message to the link; it may lose it."""
+        self._telemetry = telemetry
+        self._send = send
+        self._heartbeat_due_s = -math.inf
+        self._streams_due_s = -math.inf
+        self._command: tuple[int, tuple[float, ...]] | None = None
+        self._tries = 0
+        self._try_due_s = math.inf
+        self._refusal = ""
+
+    def tick(self, now_s: float) -> None:
+        """Send what is due all the time."""
+        if now_s >= self._heartbeat_due_s:
+            self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
+            self._send(
+                mavlink.MAVLink_heartbeat_message(
+                    mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+                    mavlink.MAV_AUTOPILOT_INVALID,
+                    0,
+                    0,
+                    mavlink.MAV_STATE_ACTIVE,
+                    3,
+                )
+            )
+        telemetry = self._telemetry
+        if (
+            telemetry.autopilot is not None
+            and now_s >= self._streams_due_s
+            and telemetry.streams_missing(now_s)
+        ):
+            self._streams_due_s = now_s + ASK_STREAMS_PERIOD_S
+            for message_id, rate_hz in STREAMS_HZ.items():
+                self._send_command(
+                    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate_hz)
+                )
+
+    def command(self, command: int, parameters: tuple[float, ...], now_s: float) -> str:
+        """Give this command, again and again until its effect ends the calls.
+
+        Returns why it will not be done, once that is known, else nothing. Changing the command
+        starts anew.
+        """
+        if self._command != (command, parameters):
+            self._command = (command, parameters)
+            self._tries, self._refusal, self._try_due_s = 0, "", now_s
+        if not self._refusal and now_s >= self._try_due_s:
+            if self._tries == COMMAND_TRIES:
+                self._refusal = "the autopilot did not do it"
+            else:
+                self._tries += 1
+                self._try_due_s = now_s + COMMAND_PERIOD_S
+                self._send_command(command, parameters)
+        return self._refusal
+
+    def no_command(self) -> None:
+        """Forget the command that was being given."""
+        self._command = None
+
+    def on_ack(self, message: Message) -> None:
+        """COMMAND_ACK."""
+        if self._command is None or message.command != self._command[0]:
+            return
+        done = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
+        if message.result not in done and message.result != mavlink.MAV_RESULT_TEMPORARILY_REJECTED:
+            self._refusal = f"the autopilot refused: {result_name(message.result)}"
+
+    def target(self, place: EarthPlace) -> None:
+        """Where to fly now."""
+        telemetry = self._telemetry
+        self._send(
+            mavlink.MAVLink_set_position_target_global_int_message(
+                0,
+                telemetry.system_id,
+                telemetry.component_id,
+                mavlink.MAV_FRAME_GLOBAL_INT,
+                POSITION_ONLY,
+                round(place.latitude_deg * 1e7),
+                round(place.longitude_deg * 1e7),
+                place.altitude_m,
+                *(0.0,) * 8,
+            )
+        )
+
+    def read_parameter(self, name: str) -> None:
+        """Ask for one; the answer is a PARAM_VALUE."""
+        telemetry = self._telemetry
+        self._send(
+            mavlink.MAVLink_param_request_read_message(
+                telemetry.system_id, telemetry.component_id, name.encode(), -1
+            )
+        )
+
+    def _send_command(self, command: int, parameters: tuple[float, ...]) -> None:
+        telemetry = self._telemetry
+        padded = (*parameters, *(0.0,) * (7 - len(parameters)))
+        self._send(
+            mavlink.MAVLink_command_long_message(
+                telemetry.system_id, telemetry.component_id, command, 0, *padded
+            )
+        )
+
+
+def result_name(result: int) -> str:
+    """The word for a MAV_RESULT."""
+    entry: Any = mavlink.enums["MAV_RESULT"].get(result)
+    return str(entry.name)[len("MAV_RESULT_") :].lower() if entry else f"result {result}"
+
+
+class ParameterCheck:
+    """Reads the parameters that make a flight safe, and says which are not as they have to be."""
+
+    def __init__(self, commander: Commander, telemetry: Telemetry) -> None:
+        self._commander = commander
+        self._telemetry = telemetry
+        self._open: list[Requirement] | None = None  # None: not begun
+        self._due_s = -math.inf
+        self._asked = 0
+        self.complaints: tuple[str, ...] = ()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether every parameter was read or given up."""
+        return self._open is not None and not self._open
+
+    def tick(self, now_s: float) -> None:
+        """Ask for the next one."""
+        autopilot = self._telemetry.autopilot
+        if autopilot is None:
+            return
+        if self._open is None:
+            self._open = list(autopilot.requirements)
+        if not self._open or now_s < self._due_s:
+            return
+        requirement = self._open[0]
+        if self._asked == PARAMETER_TRIES:
+            self._close(f"{requirement.names[-1]} could not be read (wanted: {requirement.wanted})")
+            return
+        self._commander.read_parameter(requirement.names[self._asked % len(requirement.names)])
+        self._asked += 1
+        self._due_s = now_s + PARAMETER_PERIOD_S
+
+    def on_value(self, message: Message) -> None:
+        """PARAM_VALUE."""
+        autopilot = self._telemetry.autopilot
+        if not self._open or autopilot is None or message.param_id not in self._open[0].names:
+            return
+        value = autopilot.parameter_value(message.param_value, message.param_type)
+        requirement = self._open[0]
+        self._close(
+            ""
+            if requirement.holds(value)
+            else f"{message.param_id} is {value:g} (wanted: {requirement.wanted})"
+        )
+
+    def _close(self, complaint: str) -> None:
+        assert self._open
+        self._open.pop(0)
+        self._asked, self._due_s = 0, -math.inf
+        if complaint:
+            self.complaints += (complaint,)
+            _log.warning("autopilot: %s; see docs/flying.md", complaint)

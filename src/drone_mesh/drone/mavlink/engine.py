@@ -1,0 +1,128 @@
+"""MavlinkEngine: the drone of a node that has a MAVLink autopilot."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.drone.mavlink.link import MavlinkLink
+from drone_mesh.drone.mavlink.pilot import MavlinkPilot, PilotStatus
+from drone_mesh.errors import GoalRefused, LocationUnknown
+
+TICK_S = 0.05  # our choice: four looks for each target
+STALE_S = 2.0  # a look that is older says nothing about the drone
+
+_log = logging.getLogger(__name__)
+
+
+class MavlinkEngine(IDroneEngine):
+    """Any thread may call it; its own thread owns the link and the pilot, until `close`.
+
+    When it is closed, or dies, the drone does what its autopilot is set to do without a ground
+    station: docs/flying.md.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        address: str,
+        origin: Origin,
+        limits: FlightLimits,
+        permissions: Permissions,
+    ) -> None:
+        """Open the link. Raises ConfigurationError if that cannot be done."""
+        self._node_id = node_id
+        self._limits = limits
+        self._link = MavlinkLink(address)
+        self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send)
+        self._goals: deque[tuple[Location, bool]] = deque()  # with: whether it lands there
+        self._look = (PilotStatus(), time.monotonic())
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"mavlink {node_id}", daemon=True)
+        self._thread.start()
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly there, and land if the height is 0. Raises GoalRefused, with the reason."""
+        self._take(Location(latitude, longitude, height), lands=height <= 0.0)
+
+    def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
+        """Fly there and hover: at --hover, or else at the height that the drone has now."""
+        status = self.status()
+        hover_m = self._limits.hover_m
+        if hover_m is None:
+            here = status.location
+            in_air = here is not None and status.on_ground is False
+            hover_m = (
+                here.height
+                if here is not None and in_air
+                else self._limits.layer_height_m(self._node_id)
+            )
+        self._take(Location(latitude, longitude, hover_m), lands=False)
+
+    def get_location(self) -> Location:
+        """Where the drone is. Raises LocationUnknown, with the reason."""
+        status = self.status()
+        if status.location is None:
+            raise LocationUnknown(status.location_trouble)
+        return status.location
+
+    def why_not_fly(self) -> str:
+        """Why it would not fly to a goal now; empty while it would."""
+        return self.status().why_not_fly
+
+    def is_flying(self) -> bool:
+        """Whether a flight to a goal is under way."""
+        return bool(self._goals) or self.status().is_flying
+
+    def status(self) -> PilotStatus:
+        """The last look at the drone; without a place if that is too long ago."""
+        status, taken_s = self._look
+        if time.monotonic() - taken_s > STALE_S:
+            silent = "the engine does not answer"
+            return PilotStatus(location_trouble=silent, why_not_fly=silent)
+        return status
+
+    def close(self) -> None:
+        """End the thread and give the link back."""
+        self._ended.set()
+        self._thread.join()
+
+    def _take(self, goal: Location, lands: bool) -> None:
+        status = self.status()
+        if status.why_not_fly:
+            raise GoalRefused(f"the drone cannot fly: {status.why_not_fly}")
+        assert status.home is not None  # else there was a reason
+        self._limits.check(goal, status.home)
+        self._goals.append((goal, lands))
+
+    def _run(self) -> None:
+        tick_due_s = 0.0
+        try:
+            while not self._ended.is_set():
+                messages = self._link.receive(TICK_S)
+                now_s = time.monotonic()
+                for message in messages:
+                    self._pilot.on_message(message, now_s)
+                if now_s >= tick_due_s or self._goals:
+                    tick_due_s = now_s + TICK_S
+                    self._tick(now_s)
+        finally:
+            self._link.close()
+
+    def _tick(self, now_s: float) -> None:
+        while self._goals:
+            goal, lands = self._goals[0]
+            try:
+                self._pilot.set_goal(goal, lands, now_s)
+            except GoalRefused as error:
+                _log.warning("node %d: the goal is refused: %s", self._node_id, error)
+            self._pilot.tick(now_s)
+            self._look = (self._pilot.status(now_s), now_s)
+            self._goals.popleft()
+        self._pilot.tick(now_s)
+        self._look = (self._pilot.status(now_s), now_s)

@@ -1,0 +1,74 @@
+"""The way of one flight: up, across, down; and the target that leads the drone along it."""
+
+from __future__ import annotations
+
+from drone_mesh.drone.flight_path import between
+from drone_mesh.drone.interfaces import Location
+
+LEAD_S = 1.5  # our choice: the target is at most so far ahead, in seconds of flight
+SHORTEST_LEAD_M = 2.0  # our choice: wider than the noise of a position
+CORNER_M = 1.0  # our choice: so near a corner is round it
+
+
+class Route:
+    """Straight lines from here to the goal, over one height.
+
+    The target moves at the speed of the flight and waits for the drone: a drone whose link breaks
+    ends at the last target, a few metres ahead of it, and never cuts a corner.
+    """
+
+    def __init__(
+        self, start: Location, goal: Location, cross_at_m: float, lands: bool, speed_m_s: float
+    ) -> None:
+        """`cross_at_m` is the height between; `lands` leaves the last way down out."""
+        height = max(cross_at_m, start.height, goal.height)
+        corners = [start, start._replace(height=height), goal._replace(height=height)]
+        if not lands:
+            corners.append(goal)
+        self._corners = corners
+        self._next = 1  # the corner that the target moves to
+        self._target = start
+        self._speed_m_s = speed_m_s
+        self._lead_m = max(SHORTEST_LEAD_M, LEAD_S * speed_m_s)
+
+    @property
+    def target(self) -> Location:
+        """Where the drone is to fly now."""
+        return self._target
+
+    @property
+    def end(self) -> Location:
+        """The last corner."""
+        return self._corners[-1]
+
+    @property
+    def highest_m(self) -> float:
+        """The greatest height on the way."""
+        return max(corner.height for corner in self._corners)
+
+    def advance(self, here: Location, passed_s: float) -> bool:
+        """Move the target for this time; whether the drone is at the end of the route."""
+        budget_m = self._speed_m_s * passed_s
+        while budget_m > 0.0:
+            corner = self._corners[self._next]
+            remaining_m = self._target.distance_m(corner)
+            if remaining_m == 0.0:
+                if here.distance_m(corner) > CORNER_M:
+                    break  # it waits at the corner
+                if self._next == len(self._corners) - 1:
+                    return True
+                self._next += 1
+                continue
+            if self._target.distance_m(here) > self._lead_m:
+                break  # it waits for the drone
+            step_m = min(budget_m, remaining_m)
+            budget_m -= step_m
+            if step_m == remaining_m:
+                self._target = corner
+            else:
+                self._target = _towards(self._target, corner, step_m / remaining_m)
+        return False
+
+
+def _towards(start: Location, end: Location, share: float) -> Location:
+    return Location.from_vector(between(start.to_vector(), end.to_vector(), share))

@@ -1,0 +1,50 @@
+"""The simulated drone itself: where it is, how it moves, what is left in its battery."""
+
+from __future__ import annotations
+
+from drone_mesh.drone.flight_path import between
+from drone_mesh.drone.interfaces import Location
+
+LANDING_SPEED_M_S = 1.0  # our choice
+ARRIVED_M = 0.05  # our choice
+
+
+class Body:
+    """Moves in straight lines at one speed, as the in-process drone does. Places are about home."""
+
+    def __init__(self, speed_m_s: float, drain_percent_s: float) -> None:
+        """`drain_percent_s` is what a second in the air takes out of the battery."""
+        self.place = Location(0.0, 0.0, 0.0)
+        self.armed = False
+        self.battery_percent = 100.0
+        self.speed_m_s = speed_m_s
+        self.velocity = (0.0, 0.0, 0.0)  # north, east, up; m/s
+        self._drain_percent_s = drain_percent_s
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether it stands on the ground, which is level here."""
+        return self.place.height <= 0.0
+
+    def move(self, target: Location | None, passed_s: float, speed_m_s: float) -> bool:
+        """Move towards `target` (None: stay); whether it is there."""
+        before = self.place
+        if self.armed and target is not None:
+            distance_m = before.distance_m(target)
+            step_m = speed_m_s * passed_s
+            self.place = target if step_m >= distance_m else _on_the_way(before, target, step_m)
+        if passed_s > 0.0:
+            self.velocity = (
+                (self.place.latitude - before.latitude) / passed_s,
+                (self.place.longitude - before.longitude) / passed_s,
+                (self.place.height - before.height) / passed_s,
+            )
+        if self.armed and not self.on_ground:
+            drained = self._drain_percent_s * passed_s
+            self.battery_percent = max(0.0, self.battery_percent - drained)
+        return target is not None and self.place.distance_m(target) <= ARRIVED_M
+
+
+def _on_the_way(start: Location, end: Location, step_m: float) -> Location:
+    share = step_m / start.distance_m(end)
+    return Location.from_vector(between(start.to_vector(), end.to_vector(), share))

@@ -1,0 +1,19 @@
+"""What can be wrong with a simulated vehicle; set at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Faults:
+    """All is well at first."""
+
+    silent: bool = False  # the link is broken: nothing goes out, nothing comes in
+    fix_type: int = 3  # GPS_FIX_TYPE
+    estimate_good: bool = True
+    positions_stop: bool = False
+    fence_breached: bool = False
+    refuses_to_arm: bool = False
+    battery_known: bool = True
+    stick_us: int = 1500  # of the roll stick

@@ -1,0 +1,52 @@
+"""The modes that the simulated vehicle has, for each kind of autopilot."""
+
+from __future__ import annotations
+
+import enum
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4, Autopilot, px4_mode
+
+
+class Mode(enum.Enum):
+    """What the vehicle's autopilot is doing."""
+
+    PILOT = "its pilot flies"
+    HOLD = "holds its position"
+    FOLLOW = "follows targets"  # GUIDED, OFFBOARD
+    TAKE_OFF = "takes off"  # PX4 alone
+    LAND = "lands"
+    RETURN = "returns home and lands"
+
+
+_NUMBERS = {
+    ARDUPILOT.name: {
+        Mode.PILOT: mavlink.COPTER_MODE_STABILIZE,
+        Mode.HOLD: mavlink.COPTER_MODE_LOITER,
+        Mode.FOLLOW: mavlink.COPTER_MODE_GUIDED,
+        Mode.LAND: mavlink.COPTER_MODE_LAND,
+        Mode.RETURN: mavlink.COPTER_MODE_RTL,
+    },
+    PX4.name: {
+        Mode.PILOT: px4_mode(3),
+        Mode.HOLD: px4_mode(4, 3),
+        Mode.FOLLOW: px4_mode(6),
+        Mode.TAKE_OFF: px4_mode(4, 2),
+        Mode.LAND: px4_mode(4, 6),
+        Mode.RETURN: px4_mode(4, 5),
+    },
+}
+
+
+def mode_number(autopilot: Autopilot, mode: Mode) -> int:
+    """`custom_mode` of this mode."""
+    return int(_NUMBERS[autopilot.name][mode])
+
+
+def mode_of(autopilot: Autopilot, number: int) -> Mode | None:
+    """The mode that `custom_mode` means; None: the vehicle does not have it."""
+    for mode, its_number in _NUMBERS[autopilot.name].items():
+        if its_number == number:
+            return mode
+    return None

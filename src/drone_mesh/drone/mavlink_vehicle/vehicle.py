@@ -1,0 +1,367 @@
+"""MavlinkVehicle: a drone with an autopilot, as seen through its MAVLink port."""
+
+from __future__ import annotations
+
+import math
+from typing import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from drone_mesh.drone.geodesy import EarthPlace, Origin
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
+from drone_mesh.drone.mavlink.telemetry import Message
+from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body
+from drone_mesh.drone.mavlink_vehicle.faults import Faults
+from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
+from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
+from drone_mesh.drone.mavlink_vehicle.reports import Reports
+
+RETURN_HEIGHT_M = 15.0  # ArduPilot's RTL_ALT
+GROUND_STATION_LOST_S = 5.0  # ArduPilot's FS_GCS_TIMEOUT
+LOW_BATTERY_PERCENT = 15.0  # PX4's BAT_LOW_THR
+MOST_DISTANCE_M = 100_000.0  # our choice: a target beyond is noise
+DISARMS_AFTER_S = 10.0  # on the ground, armed, nothing to do: both autopilots disarm
+
+ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
+DENIED = mavlink.MAV_RESULT_DENIED
+UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
+REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+
+
+class MavlinkVehicle:
+    """Driven from outside: messages and ticks come in, messages go out through `send`.
+
+    The ground is level, at the height of home. Nothing here reads a clock.
+    """
+
+    def __init__(
+        self,
+        autopilot: Autopilot,
+        home: Origin,
+        send: Callable[[Message], None],
+        system_id: int = 1,
+        speed_m_s: float = 5.0,
+        drain_percent_s: float = 0.05,
+    ) -> None:
+        """Stands at home, disarmed, in its mode for holding.
+
+        `speed_m_s` is its own; targets may lead it slower. `drain_percent_s` is what a second in
+        the air takes out of the battery.
+        """
+        self.autopilot = autopilot
+        self.system_id = system_id
+        self.home = home
+        self.faults = Faults()
+        self.body = Body(speed_m_s, drain_percent_s)
+        self.parameters = Parameters(autopilot)
+        self.mode = Mode.HOLD
+        self.in_failsafe = False
+        self.now_s = 0.0
+        self._transmit = send
+        self._target: Location | None = None
+        self._target_s = -math.inf
+        self._stands_since_s = math.inf
+        self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
+        self._reports = Reports(self)
+        self._takes: dict[str, Callable[[Message], None]] = {
+            "HEARTBEAT": self._take_heartbeat,
+            "COMMAND_LONG": self._take_command,
+            "COMMAND_INT": self._take_command,
+            "SET_MODE": self._take_set_mode,
+            "SET_POSITION_TARGET_GLOBAL_INT": self._take_target,
+            "PARAM_REQUEST_READ": self._take_parameter_request,
+            "PARAM_REQUEST_LIST": self._take_parameter_list_request,
+            "PARAM_SET": self._take_parameter,
+            "MISSION_REQUEST_LIST": self._take_mission_request,
+            "TIMESYNC": self._take_timesync,
+        }
+
+    # What its human pilot does ---------------------------------------------------------------
+
+    def choose_mode(self, mode: Mode) -> None:
+        """The pilot turns the switch."""
+        self.in_failsafe = False
+        self._enter(mode)
+
+    def arm(self) -> None:
+        """The pilot arms it."""
+        self.body.armed = True
+        self._stands_since_s = self.now_s
+
+    def lift(self, height_m: float) -> None:
+        """The pilot has brought it to this height, and lets it hover there."""
+        self.arm()
+        self.body.place = self.body.place._replace(height=height_m)
+        self.choose_mode(Mode.HOLD)
+
+    # From outside ----------------------------------------------------------------------------
+
+    def on_message(self, message: Message, now_s: float) -> None:
+        """Take a message from the link."""
+        self.now_s = now_s
+        addressee = getattr(message, "target_system", 0)
+        if self.faults.silent or addressee not in (0, self.system_id):
+            return
+        take = self._takes.get(message.get_type())
+        if take is not None:
+            take(message)
+
+    def tick(self, now_s: float) -> None:
+        """Fly on to this time, and send what is due."""
+        passed_s = min(1.0, max(0.0, now_s - self.now_s))
+        self.now_s = now_s
+        self._watch_for_failsafes()
+        self._fly(passed_s)
+        for message in self._reports.due(now_s):
+            self._send(message)
+
+    def _send(self, message: Message) -> None:
+        if not self.faults.silent:
+            self._transmit(message)
+
+    # Flight ----------------------------------------------------------------------------------
+
+    def _fly(self, passed_s: float) -> None:
+        body = self.body
+        here = body.place
+        target, speed_m_s = self._target, body.speed_m_s
+        if self.mode is Mode.LAND:
+            target, speed_m_s = here._replace(height=0.0), LANDING_SPEED_M_S
+        elif self.mode is Mode.RETURN:
+            target, speed_m_s = self._way_home(here)
+        elif self.mode in (Mode.PILOT, Mode.HOLD) and self._target is None:
+            target = here
+        arrived = body.move(target, passed_s, speed_m_s)
+        if self.mode is Mode.TAKE_OFF and arrived:
+            self._enter(Mode.HOLD)
+        self._disarm_on_ground()
+
+    def _way_home(self, here: Location) -> tuple[Location, float]:
+        above_home = Location(0.0, 0.0, max(RETURN_HEIGHT_M, here.height))
+        if math.hypot(here.latitude, here.longitude) < 0.1:
+            return Location(0.0, 0.0, 0.0), LANDING_SPEED_M_S
+        if here.height < RETURN_HEIGHT_M - 0.1:
+            return here._replace(height=RETURN_HEIGHT_M), self.body.speed_m_s
+        return above_home, self.body.speed_m_s
+
+    def _disarm_on_ground(self) -> None:
+        body = self.body
+        if not body.armed or not body.on_ground:
+            self._stands_since_s = self.now_s
+        elif (
+            self.mode in (Mode.LAND, Mode.RETURN)
+            or self.now_s - self._stands_since_s > DISARMS_AFTER_S
+        ):
+            body.armed = False
+            self._target = None
+
+    def _enter(self, mode: Mode) -> None:
+        if mode is not self.mode:
+            self.mode = mode
+            self._target = None
+
+    # Failsafes -------------------------------------------------------------------------------
+
+    def _watch_for_failsafes(self) -> None:
+        if not self.body.armed or self.body.on_ground:
+            return
+        if self.body.battery_percent < LOW_BATTERY_PERCENT or not self.faults.estimate_good:
+            self._fail_to(Mode.LAND)
+        elif self.faults.fence_breached:
+            self._fail_to(Mode.RETURN)
+        elif self.mode is Mode.FOLLOW:
+            self._watch_link()
+
+    def _watch_link(self) -> None:
+        if self.autopilot is PX4:
+            if self.now_s - self._target_s > self.parameters["COM_OF_LOSS_T"]:
+                actions = {3: Mode.RETURN, 4: Mode.LAND, 5: Mode.HOLD}
+                action = actions.get(int(self.parameters["COM_OBL_RC_ACT"]), Mode.PILOT)
+                self._fail_to(action)
+        elif self.now_s - self._ground_station_s > GROUND_STATION_LOST_S:
+            actions = {0: Mode.FOLLOW, 1: Mode.RETURN, 5: Mode.LAND}
+            self._fail_to(actions.get(int(self.parameters["FS_GCS_ENABLE"]), Mode.LAND))
+
+    def _fail_to(self, mode: Mode) -> None:
+        if self.mode in (Mode.LAND, Mode.RETURN) or mode is self.mode:
+            return
+        self._enter(mode)
+        self.in_failsafe = mode is not Mode.HOLD
+        self._send(
+            mavlink.MAVLink_statustext_message(
+                mavlink.MAV_SEVERITY_CRITICAL, f"failsafe: {mode.value}".encode()
+            )
+        )
+
+    # Messages --------------------------------------------------------------------------------
+
+    def _take_heartbeat(self, message: Message) -> None:
+        if message.get_srcSystem() == OUR_SYSTEM_ID:
+            self._ground_station_s = self.now_s
+
+    def _take_set_mode(self, message: Message) -> None:
+        self._set_mode(mode_of(self.autopilot, message.custom_mode))
+
+    def _take_target(self, message: Message) -> None:
+        ignored = mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
+        if message.type_mask & ignored or not math.isfinite(message.alt):
+            return
+        target = self._place(
+            message.lat_int, message.lon_int, message.alt, message.coordinate_frame
+        )
+        if target is None:
+            return
+        self._target_s = self.now_s
+        if self.mode is not Mode.FOLLOW:
+            return
+        if self.autopilot is not PX4 and self.body.on_ground:
+            return  # ArduPilot wants a take-off first
+        self._target = target
+
+    def _place(self, lat: int, lon: int, altitude_m: float, frame: int) -> Location | None:
+        """About home; None: not on the earth, or too far to be meant."""
+        if abs(lat) > 90e7 or abs(lon) > 180e7:
+            return None
+        relative = frame in (
+            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        )
+        place = self.home.to_frame(
+            EarthPlace(
+                lat / 1e7, lon / 1e7, altitude_m + (self.home.altitude_m if relative else 0.0)
+            )
+        )
+        if max(map(abs, place)) > MOST_DISTANCE_M:
+            return None
+        return place._replace(height=max(0.0, place.height))
+
+    def _take_command(self, message: Message) -> None:
+        result = self._obey(message)
+        self._send(mavlink.MAVLink_command_ack_message(message.command, result))
+
+    def _obey(self, message: Message) -> int:
+        orders: dict[int, Callable[[Message], int]] = {
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._obey_arm,
+            mavlink.MAV_CMD_DO_SET_MODE: self._obey_mode,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._obey_take_off,
+            mavlink.MAV_CMD_NAV_LAND: lambda _message: self._set_mode(Mode.LAND),
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _message: self._set_mode(Mode.RETURN),
+            mavlink.MAV_CMD_DO_REPOSITION: self._obey_reposition,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: lambda _message: ACCEPTED,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._obey_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._obey_request,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._obey_capabilities,
+        }
+        obey = orders.get(message.command)
+        return obey(message) if obey is not None else UNSUPPORTED
+
+    def _obey_arm(self, message: Message) -> int:
+        if message.param1 == 0.0:
+            if not self.body.on_ground:
+                return int(DENIED)
+            self.body.armed = False
+        elif self.faults.refuses_to_arm or self.faults.fix_type < mavlink.GPS_FIX_TYPE_3D_FIX:
+            return int(DENIED)
+        else:
+            self.arm()
+        return int(ACCEPTED)
+
+    def _obey_mode(self, message: Message) -> int:
+        if not (math.isfinite(message.param2) and math.isfinite(message.param3)):
+            return int(DENIED)
+        number = int(message.param2)
+        if self.autopilot is PX4:
+            number = (number & 0xFF) << 16 | (int(message.param3) & 0xFF) << 24
+        return self._set_mode(mode_of(self.autopilot, number))
+
+    def _set_mode(self, mode: Mode | None) -> int:
+        if mode is None:
+            return int(DENIED)
+        if mode is Mode.FOLLOW and self.autopilot is PX4 and self.now_s - self._target_s > 1.0:
+            return int(REJECTED)  # PX4 wants targets first
+        self._enter(mode)
+        return int(ACCEPTED)
+
+    def _obey_take_off(self, message: Message) -> int:
+        height_m = message.param7 if message.get_type() == "COMMAND_LONG" else message.z
+        if not self.body.armed:
+            return int(DENIED)
+        if self.autopilot is PX4:
+            self._enter(Mode.TAKE_OFF)
+            height_m -= self.home.altitude_m
+            if not math.isfinite(height_m):
+                height_m = self.parameters["MIS_TAKEOFF_ALT"]
+        elif self.mode is not Mode.FOLLOW or not self.body.on_ground:
+            return int(DENIED)
+        if not 0.0 < height_m < MOST_DISTANCE_M:
+            return int(DENIED)
+        self._target = self.body.place._replace(height=height_m)
+        return int(ACCEPTED)
+
+    def _obey_reposition(self, message: Message) -> int:
+        if message.get_type() != "COMMAND_INT" or not math.isfinite(message.z):
+            return int(UNSUPPORTED)
+        target = self._place(message.x, message.y, message.z, message.frame)
+        if target is None or not self.body.armed or self.body.on_ground:
+            return int(DENIED)
+        self._enter(Mode.HOLD if self.autopilot is PX4 else Mode.FOLLOW)
+        self._target = target
+        return int(ACCEPTED)
+
+    def _obey_interval(self, message: Message) -> int:
+        if not math.isfinite(message.param1):
+            return int(DENIED)
+        known = self._reports.set_interval(int(message.param1), message.param2)
+        return int(ACCEPTED if known else UNSUPPORTED)
+
+    def _obey_request(self, message: Message) -> int:
+        if not math.isfinite(message.param1):
+            return int(DENIED)
+        if message.param1 == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            return self._obey_capabilities(message)
+        answer = self._reports.make(int(message.param1))
+        if answer is None:
+            return int(UNSUPPORTED)
+        self._send(answer)
+        return int(ACCEPTED)
+
+    def _obey_capabilities(self, _message: Message) -> int:
+        capabilities = (
+            mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+        )
+        self._send(
+            mavlink.MAVLink_autopilot_version_message(
+                capabilities, 0x01000000, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
+            )
+        )
+        return int(ACCEPTED)
+
+    def _take_parameter_request(self, message: Message) -> None:
+        names = self.parameters.names()
+        if 0 <= message.param_index < len(names):
+            self._send(self.parameters.message(names[message.param_index]))
+        elif message.param_id in self.parameters:
+            self._send(self.parameters.message(message.param_id))
+
+    def _take_parameter_list_request(self, _message: Message) -> None:
+        for name in self.parameters.names():
+            self._send(self.parameters.message(name))
+
+    def _take_parameter(self, message: Message) -> None:
+        if message.param_id in self.parameters and math.isfinite(message.param_value):
+            self.parameters.take(message.param_id, message.param_value)
+            self._send(self.parameters.message(message.param_id))
+
+    def _take_mission_request(self, message: Message) -> None:
+        self._send(
+            mavlink.MAVLink_mission_count_message(
+                message.get_srcSystem(), message.get_srcComponent(), 0
+            )
+        )
+
+    def _take_timesync(self, message: Message) -> None:
+        if message.tc1 == 0:
+            self._send(mavlink.MAVLink_timesync_message(int(self.now_s * 1e9), message.ts1))

@@ -1,0 +1,67 @@
+"""The ground of a snapshot: a grid with numbers, and the shadows of the drones."""
+
+from __future__ import annotations
+
+import math
+from typing import Sequence
+
+from drone_mesh.view.palette import AXIS, GRID, LIGHT, SHADOW
+from drone_mesh.view.picture import DronePicture
+from drone_mesh.view.sketch import OVERSAMPLING, Sketch
+
+GRID_LINES = 12  # about as many as should be visible across
+
+
+def draw_ground(sketch: Sketch, drones: Sequence[DronePicture], scale: float) -> None:
+    """Grid lines, axes, their numbers, and each drone's shadow with a line up to the drone."""
+    width, height = sketch.camera.size
+    corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)]
+    seen = [point for point in map(sketch.camera.on_ground, corners) if point is not None]
+    west, south = (min(point[axis] for point in seen) for axis in (0, 1))
+    east, north = (max(point[axis] for point in seen) for axis in (0, 1))
+    step_m = _round_step((east - west) / GRID_LINES)
+    for x in _multiples(west, east, step_m):
+        sketch.line([(x, south, 0.0), (x, north, 0.0)], AXIS if x == 0 else GRID, 1)
+    for y in _multiples(south, north, step_m):
+        sketch.line([(west, y, 0.0), (east, y, 0.0)], AXIS if y == 0 else GRID, 1)
+    for drone in drones:
+        x, y, _ = drone.position
+        half_x, half_y = (edge_m / 2 for edge_m in drone.size_m(scale)[:2])
+        sketch.area(
+            [
+                (x + east_m, y + north_m, 0.0)
+                for east_m, north_m in (
+                    (-half_x, -half_y),
+                    (half_x, -half_y),
+                    (half_x, half_y),
+                    (-half_x, half_y),
+                )
+            ],
+            SHADOW,
+        )
+        sketch.line([(x, y, 0.0), drone.position], SHADOW, 1.5)
+    _number_grid(sketch, step_m, (west, south, east, north))
+
+
+def _number_grid(sketch: Sketch, step_m: float, ground: tuple[float, float, float, float]) -> None:
+    """x (longitude) along the lower edge, y (latitude) along the left one."""
+    west, south, east, north = ground
+    width, height = sketch.size
+    bottom = sketch.camera.on_ground((0.0, sketch.camera.size[1] - 14.0 * OVERSAMPLING))
+    for x in _multiples(west, east, step_m):
+        if bottom is not None:
+            sketch.label((x, bottom[1], 0.0), f"{x:g} m", 11, LIGHT.muted, "mm")
+    for y in _multiples(south, north, step_m):
+        (_, row), *_rest = sketch.camera.project([(0.0, y, 0.0)]) / OVERSAMPLING
+        if 50 < row < height - 30:
+            sketch.words((8, row), f"{y:g} m", 11, LIGHT.muted, "lm")
+
+
+def _round_step(step_m: float) -> float:
+    """The smallest of 1, 2 and 5 times a power of ten that is not below this."""
+    decade = 10.0 ** math.floor(math.log10(step_m))
+    return next(factor * decade for factor in (1, 2, 5, 10) if factor * decade >= step_m)
+
+
+def _multiples(low: float, high: float, step: float) -> list[float]:
+    return [n * step for n in range(math.ceil(low / step), math.floor(high / step) + 1)]

@@ -1,0 +1,122 @@
+"""What stands in the world's window: boxes, ids, lines and text, changed as little as possible."""
+
+from __future__ import annotations
+
+from typing import Sequence, Tuple
+
+import pybullet
+
+from drone_mesh.drone.flight_path import Vector
+from drone_mesh.view.boxes import add_box
+from drone_mesh.view.camera import Camera
+from drone_mesh.view.palette import LIGHT, Colour, rgb
+from drone_mesh.view.picture import DronePicture
+
+LINE_HEIGHT = 22  # pixels
+TEXT_DEPTH_M = 1.0  # how far in front of the camera text hangs
+TEXT_SIZE = 1.2  # in units of pybullet
+INK = rgb(LIGHT.ink)
+
+Line = Tuple[Vector, Vector, Colour, float]  # start, end, colour, width in pixels
+_Item = int  # pybullet's number of a line or text
+
+
+class WindowItems:
+    """The items of one pybullet window. Belongs to the window's thread.
+
+    pybullet draws a frame for each new item, so an item that still fits is kept or replaced.
+    """
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+        self._boxes: dict[int, tuple[int, DronePicture]] = {}
+        self._ids: dict[int, _Item] = {}
+        self._lines: dict[Line, _Item] = {}
+        self._texts: list[_Item] = []
+        self._written: object = None
+
+    def show(
+        self, drones: Sequence[DronePicture], lines: set[Line], scale: float, rescaled: bool,
+        with_ids: bool,
+    ) -> None:  # fmt: skip
+        """Show these drones and lines and nothing else; `rescaled`: `scale` is a new one."""
+        shown = {drone.node_id for drone in drones}
+        busy = rescaled or shown != set(self._boxes) or lines != set(self._lines)
+        if busy:
+            self._render(False)  # or each new item waits for a frame
+        self._show_boxes(drones, scale, rescaled)
+        self._show_ids(scale, with_ids)
+        self._show_lines(lines)
+        if busy:
+            self._render(True)
+
+    def write(self, words: Sequence[str], camera: Camera) -> None:
+        """Lines of text in the upper left corner; they hang before the camera and move with it."""
+        if self._written == (words, camera):
+            return
+        self._written = (words, camera)
+        while len(self._texts) > len(words):
+            self._remove(self._texts.pop())
+        for row, text in enumerate(words):
+            point = camera.before((16, 28 + row * LINE_HEIGHT), TEXT_DEPTH_M)
+            replaced = {"replaceItemUniqueId": self._texts[row]} if row < len(self._texts) else {}
+            item = pybullet.addUserDebugText(
+                text, point, INK, TEXT_SIZE, physicsClientId=self._client, **replaced
+            )
+            self._texts[row : row + 1] = [item]
+
+    def _render(self, on: bool) -> None:
+        pybullet.configureDebugVisualizer(
+            pybullet.COV_ENABLE_RENDERING, int(on), physicsClientId=self._client
+        )
+
+    def _show_boxes(self, drones: Sequence[DronePicture], scale: float, rescaled: bool) -> None:
+        shown = {drone.node_id for drone in drones}
+        for node_id in [n for n in self._boxes if rescaled or n not in shown]:
+            if node_id in self._ids:
+                self._remove(self._ids.pop(node_id))
+            pybullet.removeBody(self._boxes.pop(node_id)[0], physicsClientId=self._client)
+        for drone in drones:
+            if drone.node_id not in self._boxes:
+                box = add_box(self._client, drone, scale)
+            else:
+                box, before = self._boxes[drone.node_id]
+                if before.position != drone.position:
+                    pybullet.resetBasePositionAndOrientation(
+                        box, drone.centre(scale), (0, 0, 0, 1), physicsClientId=self._client
+                    )
+                if before.colour != drone.colour:
+                    pybullet.changeVisualShape(
+                        box, -1, rgbaColor=(*rgb(drone.colour), 1.0), physicsClientId=self._client
+                    )
+            self._boxes[drone.node_id] = (box, drone)
+
+    def _show_ids(self, scale: float, with_ids: bool) -> None:
+        for node_id, (box, drone) in self._boxes.items():
+            if not with_ids:
+                if node_id in self._ids:
+                    self._remove(self._ids.pop(node_id))
+            elif node_id not in self._ids:
+                self._ids[node_id] = pybullet.addUserDebugText(
+                    str(node_id),
+                    (0.0, 0.0, drone.size_m(scale)[2]),
+                    INK,
+                    TEXT_SIZE,
+                    parentObjectUniqueId=box,
+                    physicsClientId=self._client,
+                )
+
+    def _show_lines(self, lines: set[Line]) -> None:
+        spare = [self._lines.pop(line) for line in list(self._lines) if line not in lines]
+        for line in lines:
+            if line not in self._lines:
+                start, end, colour, width = line
+                replaced = {"replaceItemUniqueId": spare.pop()} if spare else {}
+                self._lines[line] = pybullet.addUserDebugLine(
+                    start, end, rgb(colour), width, physicsClientId=self._client, **replaced
+                )
+        for item in spare:
+            self._remove(item)
+
+    def _remove(self, item: _Item) -> None:
+        pybullet.removeUserDebugItem(item, physicsClientId=self._client)

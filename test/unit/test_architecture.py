@@ -1,0 +1,58 @@
+"""docs/architecture.md shows what the import contracts in pyproject.toml say."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+tomllib = pytest.importorskip("tomllib", reason="part of Python from 3.11 on")
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+CONTRACTS = SETTINGS["tool"]["importlinter"]["contracts"]
+
+
+def floors_on_the_page(heading):
+    """The rooms of each floor, the highest first, of the table with this heading."""
+    table = PAGE.partition(f"| floor | {heading} |\n|---|---|\n")[2].partition("\n\n")[0]
+    rows = [re.fullmatch(r"\| (\d+) \| (.+) \|", row).groups() for row in table.splitlines()]
+    assert [int(number) for number, _rooms in rows] == list(range(len(rows), 0, -1))
+    return [sorted(re.findall(r"`(\w+)`", rooms)) for _number, rooms in rows]
+
+
+def floors_in_the_contract(package):
+    (contract,) = (c for c in CONTRACTS if c.get("containers") == [package])
+    return [sorted(layer.split(" | ")) for layer in contract["layers"]]
+
+
+@pytest.mark.parametrize(
+    ("heading", "package"), [("rooms", "drone_mesh"), ("rooms of `ros`", "drone_mesh.ros")]
+)
+def test_the_floors_of_the_page_are_those_of_the_contracts(heading, package):
+    assert floors_on_the_page(heading) == floors_in_the_contract(package)
+
+
+def test_the_page_lists_the_other_contracts_by_their_names():
+    names = [c["name"] for c in CONTRACTS if c["type"] == "forbidden"]
+    listed = PAGE.partition("Further contracts:\n\n")[2].partition("\n\n")[0]
+    assert listed.splitlines() == [f"* {name}" for name in names]
+
+
+def test_each_room_is_described():
+    described = set(re.findall(r"`([\w/]+)`", "".join(re.findall(r"\n\| (`[^|]*) \|", PAGE))))
+    rooms = [room for floor in floors_in_the_contract("drone_mesh") for room in floor]
+    parts = [f"ros/{room}" for floor in floors_in_the_contract("drone_mesh.ros") for room in floor]
+    assert set(rooms) - {"ros"} | set(parts) <= described
+
+
+def test_each_room_has_a_floor():
+    """import-linter checks this as well, but not on Python 3.8 to 3.10."""
+    package = ROOT / "src" / "drone_mesh"
+    rooms = {path.stem for path in package.glob("*.py")} | {
+        path.parent.name for path in package.glob("*/__init__.py")
+    }
+    floors = {room for floor in floors_in_the_contract("drone_mesh") for room in floor}
+    assert rooms - {"__init__", "msg", "srv"} == floors
