@@ -5,7 +5,8 @@ A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), 
 ago that was: a page that falls behind gets a larger difference, and nothing is queued for it.
 
 The fields of a node are those of NodeState.msg, with what is decided here and only shown there:
-its condition, the name of its colour, its trouble, and the links it has with nodes of higher ids.
+its condition, the name of its colour, its trouble, its slot among nodes at the same position, and
+the links it has with nodes of higher ids.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.outages import MeshSample, take_sample
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
+from drone_mesh.view.fan import fan_out
 from drone_mesh.view.palette import node_colour_name
 
 EVENTS_KEPT = 1000  # our choice: more than a person scrolls back
@@ -67,8 +69,10 @@ class FrameStore:
             del self._nodes[gone]
             del self._changed_at[gone]
             self._gone_at[gone] = self.version
+        slots = fan_out(mesh.nodes)
         for node in mesh.nodes:
-            self._update_node(node.id, _fields(node, troubles.get(node.id)))
+            fields = _fields(node, troubles.get(node.id))
+            self._update_node(node.id, {**fields, "slot": slots.get(node.id)})
         for node_id, fields in self._links(mesh.nodes, wall_s).items():
             self._update_node(node_id, fields)
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:

@@ -36,7 +36,7 @@ from drone_mesh.console.orders import (
     number_of,
     parse_request,
 )
-from drone_mesh.view.palette import style_sheet
+from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied
 
 log = logging.getLogger(__name__)
@@ -151,7 +151,9 @@ class ConsoleServer:
         return FileResponse(STATIC / "index.html")
 
     async def _palette(self, _request: Request) -> Response:
-        return Response(style_sheet(':root[data-theme="dark"]'), media_type="text/css")
+        rules = {":root": LIGHT, ':root[data-theme="dark"]': DARK}
+        text = "".join(f"{where} {{ {css_variables(what)} }}\n" for where, what in rules.items())
+        return Response(text, media_type="text/css")
 
     async def _websocket(self, socket: WebSocket) -> None:
         if len(self._pages) >= MOST_PAGES:

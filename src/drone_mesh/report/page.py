@@ -6,15 +6,13 @@ from pathlib import Path
 
 import jinja2
 
-from drone_mesh.report.figures import (
-    maps_figure,
-    messages_figure,
-    outages_figure,
-    timeline_figure,
-)
+from drone_mesh.report.charts import messages_figure, timeline_figure
+from drone_mesh.report.maps import maps_figure
+from drone_mesh.report.outage_bars import outages_figure
 from drone_mesh.report.story import RunStory
 from drone_mesh.report.tables import EVENT_KINDS_LEFT_OUT, key_numbers, repair_rows
 from drone_mesh.state.trouble import find_trouble, summarise
+from drone_mesh.view.palette import DARK, LIGHT, css_variables
 
 _TEMPLATE = Path(__file__).resolve().parent / "page.html"
 
@@ -25,6 +23,8 @@ def render_page(story: RunStory, title: str) -> str:
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
     return template.render(
         title=title,
+        light=css_variables(LIGHT),
+        dark=css_variables(DARK),
         numbers=key_numbers(story),
         summary=summarise(story.after.nodes, find_trouble(story.after.nodes)),
         repairs=repair_rows(story),

@@ -111,9 +111,9 @@ class MeshSample:
     most_hops: int
 
     @property
-    def connected_share(self) -> float:
-        """0..1, of the routers that are on; 1 when none is."""
-        return self.routers_connected / self.routers_on if self.routers_on else 1.0
+    def connected_share(self) -> float | None:
+        """0..1, of the routers that are on; None if no router is on."""
+        return self.routers_connected / self.routers_on if self.routers_on else None
 
 
 def take_sample(mesh: MeshStatus) -> MeshSample:

@@ -107,19 +107,24 @@ def rgb(colour: Colour) -> tuple[float, float, float]:
     return (red, green, blue)
 
 
-def style_sheet(dark_selector: str) -> str:
-    """Both palettes as CSS variables; the dark one applies where `dark_selector` matches."""
-    return f":root {_variables(LIGHT)}\n{dark_selector} {_variables(DARK)}\n"
-
-
-def _variables(palette: Palette) -> str:
-    colours = {field.name.replace("_", "-"): palette.named(field.name) for field in fields(palette)}
+def css_variables(palette: Palette) -> str:
+    """The body of a CSS rule that sets `color-scheme` and a variable for each colour."""
+    colours = {_variable(field.name): palette.named(field.name) for field in fields(palette)}
     colours.update(
         {f"{use.name.lower()}-link": palette.of_link(use) for use in LinkUse}, path=palette.path
     )
-    scheme = "dark" if palette is DARK else "light"
     variables = " ".join(f"--{name}: {colour};" for name, colour in colours.items())
-    return f"{{ color-scheme: {scheme}; {variables} }}"
+    return f"color-scheme: {'dark' if palette is DARK else 'light'}; {variables}"
+
+
+def variable_names(palette: Palette) -> dict[Colour, str]:
+    """The CSS variable, without its dashes, that has each colour of a palette."""
+    # Of two names for one colour the first is meant: the second is a colour on another one.
+    return {palette.named(f.name): _variable(f.name) for f in reversed(fields(palette))}
+
+
+def _variable(name: str) -> str:
+    return name.replace("_", "-")
 
 
 def ansi(text: str, what: Severity | Condition) -> str:

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.report.figures import phases_of
+from drone_mesh.report.outage_bars import phases_of
 from drone_mesh.report.page import render_page
 from drone_mesh.report.story import NothingRecorded, tell_story
 from drone_mesh.report.tables import key_numbers, repair_rows, write_csv
@@ -82,7 +82,7 @@ def test_the_phases_of_a_bar_follow_one_another():
         (101.0, 131.0, "waits for a gateway"),
         (131.0, 138.0, "negotiates"),
         (138.0, 141.0, "flies"),
-        (141.0, 142.5, "joins again"),
+        (141.0, 142.5, "reconnects"),
     ]
 
 

@@ -96,3 +96,7 @@ def test_a_sample_counts_routers_that_are_on():
     assert (sample.routers_on, sample.routers_connected, sample.messages) == (3, 2, 15)
     assert (sample.mean_hops, sample.most_hops) == (2.5, 4)
     assert sample.connected_share == 2 / 3
+
+
+def test_of_no_routers_there_is_no_connected_share():
+    assert take_sample(MeshStatus(1.0, [NodeStatus(1, on=False)])).connected_share is None

@@ -6,6 +6,7 @@ const LEFT_PX = 34;
 const BOTTOM_PX = 17;
 const TOP_PX = 8;
 const RIGHT_PX = 8;
+const TICK_PX = 50; // room for one time
 const RATE_OVER = 10; // samples; one check period of the mesh at normal speed
 
 export class Charts {
@@ -14,8 +15,8 @@ export class Charts {
     this.colours = readColours();
     this.hover = null; // 0..1 across every chart
     this.charts = [
-      { id: "share", top: () => 100, lines: [{ colour: "connected", fill: true, value: (s) => 100 * share(s) }], text: (v) => `${v[0].toFixed(0)} %` },
-      { id: "rate", lines: [{ colour: "accent", fill: true, value: (s) => s.rate }], text: (v) => v[0].toFixed(0) },
+      { id: "share", top: () => 100, lines: [{ colour: "connected", fill: true, value: share }], text: (v) => (v[0] === null ? "–" : `${v[0].toFixed(0)} %`) },
+      { id: "rate", lines: [{ colour: "accent", fill: true, value: (s) => s.rate }], text: (v) => v[0]?.toFixed(0) ?? "–" },
       { id: "hops", lines: [{ colour: "flying", value: (s) => s.most_hops }, { colour: "gateway", value: (s) => s.mean_hops }], text: (v) => `${v[1].toFixed(1)} / ${v[0]}` },
     ];
     for (const chart of this.charts) {
@@ -66,7 +67,10 @@ export class Charts {
     const x = (t) => LEFT_PX + ((t - start) / (end - start || 1)) * (width - LEFT_PX - RIGHT_PX);
     const y = (value) => height - BOTTOM_PX - (value / top) * (height - BOTTOM_PX - TOP_PX);
     this.#axes(context, x, y, width, height, start, end, top, chart.top ? 50 : step);
-    chart.lines.forEach((line, index) => this.#line(context, samples.map((s) => x(s.stamp_s)), values[index].map(y), line, y(0)));
+    chart.lines.forEach((line, index) => {
+      const points = samples.map((s, i) => [x(s.stamp_s), values[index][i] === null ? null : y(values[index][i])]);
+      this.#line(context, points, line, y(0));
+    });
     chart.now.textContent = this.#reading(context, chart, samples, values, x, y, start, end, height);
   }
 
@@ -83,26 +87,32 @@ export class Charts {
     }
     context.stroke();
     context.textAlign = "center";
-    const spacing = niceStep(((end - start) * 80) / Math.max(width - LEFT_PX, 1) || 1);
+    const spacing = niceStep(((end - start) * TICK_PX) / Math.max(width - LEFT_PX, 1) || 1);
+    let ticks = 0;
     for (let t = Math.ceil(start / spacing) * spacing; t <= end; t += spacing) {
-      if (x(t) < width - 26) context.fillText(`${Number(t.toPrecision(6))} s`, x(t), height - 4);
+      context.textAlign = x(t) > width - TICK_PX / 2 ? "right" : "center";
+      context.fillText(`${Number(t.toPrecision(6))} s`, Math.min(x(t), width - 1), height - 4);
+      ticks++;
     }
+    context.canvas.dataset.ticks = ticks;
   }
 
-  #line(context, xs, ys, line, base) {
-    context.strokeStyle = this.colours[line.colour];
+  /** One line, with gaps where there is no value. */
+  #line(context, points, line, base) {
+    context.strokeStyle = context.fillStyle = this.colours[line.colour];
     context.lineWidth = 1.75;
     context.lineJoin = "round";
-    context.beginPath();
-    xs.forEach((px, i) => (i ? context.lineTo(px, ys[i]) : context.moveTo(px, ys[i])));
-    context.stroke();
-    if (!line.fill) return;
-    context.lineTo(xs[xs.length - 1], base);
-    context.lineTo(xs[0], base);
-    context.globalAlpha = 0.12;
-    context.fillStyle = this.colours[line.colour];
-    context.fill();
-    context.globalAlpha = 1;
+    for (const run of runsOf(points)) {
+      context.beginPath();
+      run.forEach(([px, py], i) => (i ? context.lineTo(px, py) : context.moveTo(px, py)));
+      context.stroke();
+      if (!line.fill) continue;
+      context.lineTo(run[run.length - 1][0], base);
+      context.lineTo(run[0][0], base);
+      context.globalAlpha = 0.12;
+      context.fill();
+      context.globalAlpha = 1;
+    }
   }
 
   /** The words above a chart: the newest values, or those under the pointer. */
@@ -122,8 +132,19 @@ export class Charts {
   }
 }
 
+/** Runs of [x, y] without a gap; y is null in gaps. */
+function runsOf(points) {
+  const runs = [[]];
+  for (const point of points) {
+    if (point[1] !== null) runs[runs.length - 1].push(point);
+    else if (runs[runs.length - 1].length) runs.push([]);
+  }
+  return runs.filter((run) => run.length);
+}
+
+/** Percent of the routers that are on; null while none is. */
 function share(sample) {
-  return sample.routers_on ? sample.routers_connected / sample.routers_on : 1;
+  return sample.routers_on ? (100 * sample.routers_connected) / sample.routers_on : null;
 }
 
 /** Messages per simulated second, over a few samples: nodes speak in bursts. */
@@ -131,6 +152,6 @@ function withRates(samples) {
   return samples.map((sample, i) => {
     const before = samples[Math.max(0, i - RATE_OVER)];
     const seconds = sample.stamp_s - before.stamp_s;
-    return { ...sample, rate: seconds > 0 ? Math.max(0, sample.messages - before.messages) / seconds : 0 };
+    return { ...sample, rate: seconds > 0 ? Math.max(0, sample.messages - before.messages) / seconds : null };
   });
 }

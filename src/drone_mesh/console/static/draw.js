@@ -1,5 +1,6 @@
 // Draws one picture of the mesh on a canvas.
 
+const SMALLEST_ID_PX = 7;
 const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and only the selected node's are drawn
 
 /** The palette's colours in the present theme, by name. */
@@ -16,6 +17,22 @@ export function droneRadius(camera, mesh) {
   const span = (axis) => Math.max(...positions.map((at) => at[axis])) - Math.min(...positions.map((at) => at[axis])) + 1;
   const apart = Math.sqrt((span(0) * span(1)) / positions.length) * camera.scale;
   return Math.min(13, Math.max(4.5, apart * 0.3));
+}
+
+/** Where a node is drawn, px: nodes at one position are fanned out around it. */
+export function onScreen(camera, node, radius) {
+  const [x, y] = camera.toScreen(node.position[0], node.position[1]);
+  if (!node.slot) return [x, y];
+  const [number, size] = node.slot;
+  const angle = Math.PI / 2 - (2 * Math.PI * number) / size;
+  const distance = (1.15 * radius) / Math.sin(Math.PI / size);
+  return [x + distance * Math.cos(angle), y - distance * Math.sin(angle)];
+}
+
+/** Nodes in the order in which they are drawn: gateways above routers, the selected node on top. */
+export function drawingOrder(mesh) {
+  const rank = (node) => (node.id === mesh.selected ? 2 : node.role);
+  return [...mesh.nodes.values()].sort((a, b) => rank(a) - rank(b) || a.id - b.id);
 }
 
 /**
@@ -36,18 +53,18 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
   if (options.known) {
     const crowd = mesh.links.known.length > MOST_LINKS;
     const links = crowd ? mesh.links.known.filter((link) => link.includes(mesh.selected)) : mesh.links.known;
-    drawn.linksDrawn = drawLines(context, camera, ends(links), colours["known-link"], 1, []);
+    drawn.linksDrawn = drawLines(context, camera, radius, ends(links), colours["known-link"], 1, []);
   }
-  drawn.lostLinks = drawLines(context, camera, ends(mesh.links.lost), colours["lost-link"], 1.5, [5, 5]);
+  drawn.lostLinks = drawLines(context, camera, radius, ends(mesh.links.lost), colours["lost-link"], 1.5, [5, 5]);
   const width = Math.min(3, Math.max(1, radius * 0.25));
-  drawn.routeLinks = drawLines(context, camera, ends(mesh.links.route), colours["route-link"], width, []);
+  drawn.routeLinks = drawLines(context, camera, radius, ends(mesh.links.route), colours["route-link"], width, []);
   drawn.linksDrawn += drawn.routeLinks;
   if (selected?.route.length > 1) {
     const stops = selected.route.map((id) => mesh.nodes.get(id));
-    drawLines(context, camera, stops.slice(1).map((stop, i) => [stops[i], stop]), colours.accent, 4, []);
+    drawLines(context, camera, radius, stops.slice(1).map((stop, i) => [stops[i], stop]), colours.accent, 4, []);
   }
-  for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours);
-  for (const node of mesh.nodes.values()) drawn.drones += drawDrone(context, camera, node, mesh.selected, colours, radius);
+  for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours, radius);
+  for (const node of drawingOrder(mesh)) drawn.drones += drawDrone(context, camera, node, mesh.selected, colours, radius);
   if (drag) drawDrag(context, camera, mesh.nodes.get(drag.id), drag, colours, radius);
   return drawn;
 }
@@ -104,7 +121,7 @@ function drawRange(context, camera, mesh, node, colours, alpha) {
   context.globalAlpha = 1;
 }
 
-function drawLines(context, camera, pairs, colour, width, dash) {
+function drawLines(context, camera, radius, pairs, colour, width, dash) {
   let count = 0;
   context.strokeStyle = colour;
   context.lineWidth = width;
@@ -112,8 +129,8 @@ function drawLines(context, camera, pairs, colour, width, dash) {
   context.beginPath();
   for (const [a, b] of pairs) {
     if (!a?.position || !b?.position) continue;
-    context.moveTo(...camera.toScreen(a.position[0], a.position[1]));
-    context.lineTo(...camera.toScreen(b.position[0], b.position[1]));
+    context.moveTo(...onScreen(camera, a, radius));
+    context.lineTo(...onScreen(camera, b, radius));
     count++;
   }
   context.stroke();
@@ -121,13 +138,13 @@ function drawLines(context, camera, pairs, colour, width, dash) {
   return count;
 }
 
-function drawPath(context, camera, node, colours) {
+function drawPath(context, camera, node, colours, radius) {
   if (!node.path.length || !node.position) return;
   context.strokeStyle = colours.path;
   context.lineWidth = 2;
   context.setLineDash([2, 5]);
   context.beginPath();
-  context.moveTo(...camera.toScreen(node.position[0], node.position[1]));
+  context.moveTo(...onScreen(camera, node, radius));
   for (let i = 0; i < node.path.length; i += 3) context.lineTo(...camera.toScreen(node.path[i], node.path[i + 1]));
   context.stroke();
   context.setLineDash([]);
@@ -142,7 +159,7 @@ function drawPath(context, camera, node, colours) {
 
 function drawDrone(context, camera, node, selected, colours, r) {
   if (!node.position) return 0;
-  const [px, py] = camera.toScreen(node.position[0], node.position[1]);
+  const [px, py] = onScreen(camera, node, r);
   const colour = colours[node.colour];
   const hollow = !node.on;
   if (node.id === selected) {
@@ -160,15 +177,20 @@ function drawDrone(context, camera, node, selected, colours, r) {
   context.strokeStyle = hollow ? colour : colours.card;
   context.lineWidth = hollow ? 2 : 1.5;
   context.stroke();
-  if (r >= 7) {
+  if (idSize(node.id, r) >= SMALLEST_ID_PX) {
     context.fillStyle = hollow ? colour : colours.card;
-    context.font = `600 ${Math.max(9, r * (node.id > 99 ? 0.8 : 0.95))}px system-ui, sans-serif`;
+    context.font = `600 ${idSize(node.id, r)}px system-ui, sans-serif`;
     context.textAlign = "center";
     context.textBaseline = "middle";
     context.fillText(node.id, px, py + 0.5);
     context.textBaseline = "alphabetic";
   }
   return 1;
+}
+
+/** Height of an id's digits, px, so that they fit into a drone of radius `r`. */
+export function idSize(id, r) {
+  return Math.min(0.95 * r, (2 * 0.85 * r) / (0.62 * String(id).length));
 }
 
 function drawDrag(context, camera, node, drag, colours, r) {

@@ -1,7 +1,7 @@
 // The map: pan, zoom, choose, drag. Drawing itself is in draw.js.
 
 import { Camera } from "./camera.js";
-import { drawMesh, droneRadius, readColours } from "./draw.js";
+import { drawMesh, drawingOrder, droneRadius, onScreen, readColours } from "./draw.js";
 
 const DRAG_AFTER_PX = 6;
 const NEAR_PX = 8; // how far beside a drone a click still means it
@@ -106,12 +106,13 @@ export class MapView {
 
   #nodeAt(px, py) {
     let nearest = null;
-    let best = droneRadius(this.camera, this.mesh) + NEAR_PX;
-    for (const node of this.mesh.nodes.values()) {
+    const radius = droneRadius(this.camera, this.mesh);
+    let best = radius + NEAR_PX;
+    for (const node of drawingOrder(this.mesh)) {
       if (!node.position) continue;
-      const [x, y] = this.camera.toScreen(node.position[0], node.position[1]);
+      const [x, y] = onScreen(this.camera, node, radius);
       const distance = Math.hypot(x - px, y - py);
-      if (distance < best) [nearest, best] = [node, distance];
+      if (distance <= best) [nearest, best] = [node, distance];
     }
     return nearest;
   }

@@ -1,0 +1,67 @@
+"""Figures as SVG text whose colours follow the page's light or dark theme (matplotlib)."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import Sequence
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from drone_mesh.view.palette import LIGHT, variable_names
+
+WIDTH_IN = 10.0  # the page scales it
+_STYLE = {
+    "axes.edgecolor": LIGHT.muted,
+    "axes.facecolor": "none",
+    "axes.labelcolor": LIGHT.muted,
+    "figure.facecolor": "none",
+    "grid.color": LIGHT.grid,
+    "grid.linewidth": 0.6,
+    "savefig.facecolor": "none",
+    "svg.hashsalt": "drone_mesh",  # so that the same run gives the same page
+    "text.color": LIGHT.ink,
+    "xtick.color": LIGHT.muted,
+    "ytick.color": LIGHT.muted,
+}
+_VARIABLES = {colour: f"var(--{name})" for colour, name in variable_names(LIGHT).items()}
+
+
+def figure_with_rows(
+    height_in: float, rows: int = 1, heights: Sequence[float] = (1,)
+) -> tuple[Figure, list[Axes]]:
+    """A figure with axes one below the other that share their x axis."""
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+        axes = figure.subplots(
+            rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
+        )
+    for one in axes[:, 0]:
+        one.spines[["top", "right"]].set_visible(False)
+        one.grid(axis="y")
+        one.set_axisbelow(True)
+    return figure, list(axes[:, 0])
+
+
+def figure_with_columns(height_in: float, columns: int) -> tuple[Figure, list[Axes]]:
+    """A figure with axes side by side that show the same area."""
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+        axes = figure.subplots(1, columns, sharex=True, sharey=True)
+    for one in axes:
+        one.grid()
+        one.set_axisbelow(True)
+    return figure, list(axes)
+
+
+def svg_of(figure: Figure) -> str:
+    """The figure as an SVG element, each colour of the palette as its CSS variable."""
+    text = io.StringIO()
+    with matplotlib.rc_context(_STYLE):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    _prologue, start, drawing = text.getvalue().partition("<svg")
+    return start + re.sub(
+        r"#[0-9a-f]{6}\b", lambda found: _VARIABLES.get(str(found[0]), str(found[0])), drawing
+    )

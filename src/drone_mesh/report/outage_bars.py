@@ -1,0 +1,62 @@
+"""One bar per node that was without a gateway: what it did, and for how long."""
+
+from __future__ import annotations
+
+from drone_mesh.report.drawing import figure_with_rows, svg_of
+from drone_mesh.report.story import RunStory
+from drone_mesh.state.outages import Outage
+from drone_mesh.view.palette import LIGHT
+
+SHORTEST_S = 0.05  # a shorter phase would be invisible
+PHASES = (  # of an outage: until when, name, colour
+    ("emergency_s", "waits for a gateway", LIGHT.disconnected),
+    ("decided_s", "negotiates", LIGHT.gateway),
+    ("landed_s", "flies", LIGHT.flying),
+    ("connected_s", "reconnects", LIGHT.connected),
+)
+OPACITY = 0.6
+
+
+def outages_figure(story: RunStory) -> str:
+    """The bars over simulated time."""
+    nodes = sorted({outage.node for outage in story.outages})
+    figure, (axes,) = figure_with_rows(1.2 + 0.32 * len(nodes))
+    end_s = story.samples[-1].stamp_s
+    named: set[str] = set()
+    for outage in story.outages:
+        row = nodes.index(outage.node)
+        for start_s, stop_s, name, colour in phases_of(outage, end_s):
+            label = name if name not in named else None
+            named.add(name)
+            axes.barh(
+                row, stop_s - start_s, left=start_s, height=0.62, color=colour, alpha=OPACITY,
+                label=label,
+            )  # fmt: skip
+        if outage.connected_s is None:
+            axes.text(end_s, row, " still disconnected", va="center", color=LIGHT.disconnected)
+    axes.set_yticks(range(len(nodes)), [f"node {node}" for node in nodes])
+    axes.invert_yaxis()
+    axes.set_xlabel("simulated time, s")
+    figure.legend(loc="outside upper left", ncols=4, frameon=False)
+    return svg_of(figure)
+
+
+def phases_of(outage: Outage, end_s: float) -> list[tuple[float, float, str, str]]:
+    """(start, stop, name, colour) of each phase; `end_s` is the end of the recording."""
+    phases = []
+    start_s = outage.lost_s
+    for attribute, name, colour in PHASES:
+        stop_s = getattr(outage, attribute)
+        if stop_s is None and attribute != "connected_s":
+            continue
+        # A node that did not fly has nothing to reconnect after, and a node that a neighbour drew
+        # into a negotiation had no emergency of its own: both were waiting.
+        if attribute == "connected_s" and outage.landed_s is None:
+            name, colour = PHASES[0][1:] if outage.decided_s is None else PHASES[2][1:]
+        elif attribute == "decided_s" and outage.emergency_s is None:
+            name, colour = PHASES[0][1:]
+        stop_s = end_s if stop_s is None else min(stop_s, outage.connected_s or end_s)
+        if stop_s - start_s > SHORTEST_S:
+            phases.append((start_s, stop_s, name, colour))
+        start_s = max(start_s, stop_s)
+    return phases
