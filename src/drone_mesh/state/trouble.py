@@ -68,8 +68,7 @@ def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summa
     routers = [
         node
         for node in nodes
-        if node.role == Role.ROUTER
-        and conditions[node.id] not in (Condition.OFF, Condition.SILENT)
+        if node.role == Role.ROUTER and conditions[node.id] not in (Condition.OFF, Condition.SILENT)
     ]
     connected = sum(node.connected for node in routers)
     parts = [f"{connected} of {len(routers)} routers connected"]

@@ -26,8 +26,7 @@ def legend_of(scene: Scene) -> list[LegendRow]:
     rows: list[LegendRow] = []
     for role in (Role.GATEWAY, Role.ROUTER):
         connected = sum(
-            drone.role is role and drone.condition is Condition.CONNECTED
-            for drone in scene.drones
+            drone.role is role and drone.condition is Condition.CONNECTED for drone in scene.drones
         )
         if connected:
             colour = LIGHT.of_node(role, Condition.CONNECTED)

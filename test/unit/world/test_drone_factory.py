@@ -57,9 +57,7 @@ def test_each_kind_of_drone_has_a_box_of_its_own_size():
     with BulletWorld() as world:
         gateway, router = DroneFactory(world, 1, 1, gridsize=1, spacing=1.0, debug=False).drones
         for drone, size in ((gateway, (0.2, 0.1, 0.2)), (router, (0.2, 0.2, 0.1))):
-            (shape,) = pybullet.getCollisionShapeData(
-                drone.box, -1, physicsClientId=world.client
-            )
+            (shape,) = pybullet.getCollisionShapeData(drone.box, -1, physicsClientId=world.client)
             assert shape[2] == pybullet.GEOM_BOX
             assert shape[3] == pytest.approx(size)
             low, high = pybullet.getAABB(drone.box, physicsClientId=world.client)

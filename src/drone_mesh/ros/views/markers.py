@@ -47,9 +47,7 @@ class MarkerMaker:
             lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
             colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
             self._add_lines(array, f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
-        self._add_lines(
-            array, "flight paths", _path_lines(nodes), _colour(DARK.path), PATH_WIDTH_M
-        )
+        self._add_lines(array, "flight paths", _path_lines(nodes), _colour(DARK.path), PATH_WIDTH_M)
         self._add_ids(array, nodes)
         for marker in array.markers:
             marker.header.stamp, marker.header.frame_id = state.header.stamp, names.MAP_FRAME
