@@ -46,21 +46,21 @@ Layout = Dict[int, Location]
 
 
 class UnknownCase(MeshError):
-    """There is no such layout. The message lists those there are: show it to whoever asked."""
+    """There is no such layout. The message lists the known ones."""
 
 
 class Order(NamedTuple):
-    """Send this drone there."""
+    """Sends this drone to this place."""
 
     node_id: int
     goal: Location
 
 
 class Layouts:
-    """All layouts that can be asked for, by case number."""
+    """All known layouts, by case number."""
 
     def __init__(self, cases: Mapping[int, Layout]) -> None:
-        """`cases` win over what is built in: 0, 1..17 and 100.
+        """`cases` override the built-in ones: 0, 1..17 and 100.
 
         1..17 move one drone to its place in case 0, whichever case 0 that is.
         """
@@ -84,14 +84,13 @@ class Layouts:
         return sorted(self._cases)
 
     def orders(self, case: int) -> list[Order]:
-        """Who goes where, from the highest id down: the far end first, so that relays leave last.
+        """The orders of a case from the highest id down: the far end first, so relays leave last.
 
-        All places of the layout are ordered, also those of drones that do not exist: the manager
-        cannot know who lives, and an order without a drone ends at the gateway, which logs that it
-        has no route. Raises UnknownCase, which lists the known ones.
+        It includes drones that do not exist: the manager cannot know which do, and the gateway
+        logs that it has no route for such an order. Raises UnknownCase, which lists the known ones.
         """
         if case not in self._cases:
-            raise UnknownCase(f"no case {case}; known are {_ranges(self.cases)}")
+            raise UnknownCase(f"unknown case {case}: use one of {_ranges(self.cases)}")
         return [Order(*item) for item in sorted(self._cases[case].items(), reverse=True)]
 
 
@@ -169,7 +168,7 @@ def _layout(file: YamlFile, case: int, places: Mapping[int, Sequence[float]]) ->
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Ascending numbers for people: 0..17, 100, 101."""
+    """Ascending numbers as ranges: 0..17, 100, 101."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:

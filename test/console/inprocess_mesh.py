@@ -84,7 +84,7 @@ class InProcessMesh:
             for node, goal in orders:
                 if node in self._network.nodes:
                     self._network.order(node, goal.longitude, goal.latitude, int(goal.height))
-        return f"layout {case} is ordered"
+        return f"ordered layout {case}"
 
     def speed(self, paused: bool, factor: float) -> str:
         self.paused, self.factor = paused, factor or self.factor

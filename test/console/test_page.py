@@ -141,7 +141,7 @@ def test_a_goal_that_cannot_be_flown_to_is_refused_beside_the_field(page, axis, 
 def test_a_layout_starts(page):
     page.page.select_option("#layout", "0")
     page.page.click("#layout-form button")
-    page.page.wait_for_selector("#toasts :text('layout 0 is ordered')")  # it goes by itself
+    page.page.wait_for_selector("#toasts :text('ordered layout 0')")  # it goes by itself
     page.wait_for(
         "many fly", lambda: page.page.locator("#nodes tr[data-condition=flying]").count() >= 10
     )
@@ -151,7 +151,7 @@ def test_an_unknown_layout_is_refused_in_words(page):
     page.page.select_option("#layout", "999")
     page.page.click("#layout-form button")
     page.page.wait_for_selector(".toast.bad")
-    assert "no case 999; known are 0..17, 100" in page.page.inner_text(".toast.bad")
+    assert "unknown case 999: use one of 0..17, 100" in page.page.inner_text(".toast.bad")
 
 
 def test_pause_stops_the_time_and_speed_changes_it(page):

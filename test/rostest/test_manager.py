@@ -83,12 +83,12 @@ class ManagerTest(unittest.TestCase):
             ((3, 5001, 1, 0), "latitude 5001 m is outside"),
             ((3, 1, 1, -1), "height -1 m is outside"),
             ((3, 1, 1, 501), "height 501 m is outside"),
-            ((254, 1, 1, 0), "drone 254: ids are 0..253"),
-            ((255, 1, 1, 0), "drone 255: ids are 0..253"),
+            ((254, 1, 1, 0), "invalid drone id 254: must be 0..253"),
+            ((255, 1, 1, 0), "invalid drone id 255: must be 0..253"),
         ):
             with self.assertRaisesRegex(rospy.ServiceException, why):
                 request(*arguments)
-        with self.assertRaisesRegex(rospy.ServiceException, r"no case 99; known are 0\.\.17, 100"):
+        with self.assertRaisesRegex(rospy.ServiceException, r"unknown case 99: use one of 0\.\.17, 100"):
             call("/DroneManager/SetToCasus", Casus, 99)
         self.assertEqual(request(9, 1, 1, 1), 1)
         wait_for("the good order did not arrive", 5, lambda: self.orders)

@@ -108,10 +108,10 @@ class MeshConsoleTest(unittest.TestCase):
         page = open_page()
         unknown = page.order(do="layout", case=77)
         self.assertFalse(unknown["done"])
-        self.assertIn("no case 77", unknown["text"])
+        self.assertIn("unknown case 77", unknown["text"])
         nobody = page.order(do="power", node=200, on=False)
         self.assertFalse(nobody["done"])
-        self.assertIn("nobody answers at /Nodes/200/powerSwitch", nobody["text"])
+        self.assertIn("no answer from /Nodes/200/powerSwitch", nobody["text"])
 
     def test_3_after_a_crash_of_the_console_a_page_finds_it_again(self) -> None:
         open_page()

@@ -98,7 +98,7 @@ def test_single_cases_follow_the_field_case_of_the_file(load):
 
 def test_an_unknown_case_is_refused_with_the_known_ones(shipped):
     with pytest.raises(
-        UnknownCase, match=r"^no case 18; known are 0..17, 100..102, 201, 202$"
+        UnknownCase, match=r"^unknown case 18: use one of 0..17, 100..102, 201, 202$"
     ) as refused:
         shipped.orders(18)
     assert isinstance(refused.value, MeshError)

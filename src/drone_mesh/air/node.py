@@ -1,4 +1,4 @@
-"""Node: what the simulated air knows of one antenna, and what it takes for one."""
+"""Node: one antenna in the simulated air, and checks of its values."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
 
 MAX_TOPIC_LENGTH = 200  # our choice; ROS itself sets no limit
-# wiki.ros.org/Names; relative and private names would mean something else in each node.
+# wiki.ros.org/Names; relative and private names have a different meaning in each node.
 _TOPIC = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
 
 Position = Tuple[float, float, float]  # longitude (x), latitude (y), height (z), metres
 
 
 class AirError(MeshError):
-    """What somebody told or asked the simulated air makes no sense. Drop it, or say so to them."""
+    """A message or request to the simulated air is invalid. Drop it, or answer with the text."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +31,17 @@ class Node:
 
 
 def check_node_id(node_id: int) -> None:
-    """Raise AirError unless a node can have this id."""
+    """Raise AirError for an invalid node id."""
     if not 0 <= node_id <= MAX_NODE_ID:
-        raise AirError(f"id {node_id}: node ids are 0..{MAX_NODE_ID}")
+        raise AirError(f"invalid node id {node_id}: must be 0..{MAX_NODE_ID}")
 
 
 def check_position(node_id: int, position: Sequence[float]) -> Position:
     """The position, or AirError if it is not three finite numbers."""
     if len(position) != 3 or not all(map(math.isfinite, position)):
-        raise AirError(f"node {node_id}: position {tuple(position)} is not three finite numbers")
+        raise AirError(
+            f"node {node_id}: invalid position {tuple(position)}: want three finite numbers"
+        )
     x, y, z = position
     return (float(x), float(y), float(z))
 
@@ -47,4 +49,4 @@ def check_position(node_id: int, position: Sequence[float]) -> Position:
 def check_topic(node_id: int, topic: str) -> None:
     """Raise AirError unless this is a global name of a ROS topic."""
     if len(topic) > MAX_TOPIC_LENGTH or not _TOPIC.fullmatch(topic):
-        raise AirError(f"node {node_id}: {topic[:60]!r} is not the name of a topic")
+        raise AirError(f"node {node_id}: invalid topic name {topic[:60]!r}")

@@ -1,4 +1,4 @@
-"""NodeTable: id -> position, listening topic, on or off; and who is in range of whom."""
+"""NodeTable: position, listening topic and power of each node, and which are in range."""
 
 from __future__ import annotations
 
@@ -35,16 +35,15 @@ class NodeTable:
         self._positions: dict[int, Position] = {}  # also of nodes that are not registered yet
         self._places: np.ndarray = np.zeros((MAX_NODE_ID + 1, 3))  # (id, xyz), metres
         self._hears: np.ndarray = np.zeros(MAX_NODE_ID + 1, dtype=bool)  # registered, and on
-        # The answers of in_range, for as long as nobody moves or is switched.
+        # The results of in_range, until a node moves or is switched.
         self._in_range: dict[int, tuple[int, ...]] = {}
 
-    # What DroneInfo tells --------------------------------------------------------------------
+    # DroneInfo -------------------------------------------------------------------------------
 
     def drone_info(self, node_id: int, position: Sequence[float], sub: str, on: bool) -> None:
-        """Take in one DroneInfo: `sub` set means an antenna speaks, else an engine (14.1).
+        """Apply one DroneInfo; with `sub` it comes from an antenna, otherwise from an engine.
 
-        Raises AirError, and changes nothing, for an id that no node has, a position that is
-        none or a topic that cannot be one.
+        Raises AirError, and changes nothing, for an invalid id, position or topic.
         """
         check_node_id(node_id)
         place = check_position(node_id, position)
@@ -79,20 +78,20 @@ class NodeTable:
         self._hears[node.node_id] = node.on
         self._in_range.clear()
 
-    # What is asked ---------------------------------------------------------------------------
+    # Requests --------------------------------------------------------------------------------
 
     def node(self, node_id: int) -> Node | None:
         """The node with this id, if it is registered."""
         return self._nodes.get(node_id)
 
     def position(self, node_id: int) -> Position | None:
-        """Where a node is, registered or not; metres."""
+        """The position of a node, registered or not; metres."""
         return self._positions.get(node_id)
 
     def link(self, sender: int, receiver: int) -> str | None:
-        """The topic that reaches `receiver` from `sender`; None if nothing does.
+        """The topic that reaches `receiver` from `sender`; None if none does.
 
-        Both have to be registered, on, and nearer to each other than the maximum distance.
+        Both must be registered, on, and nearer to each other than the maximum distance.
         """
         source, destination = self._nodes.get(sender), self._nodes.get(receiver)
         if source is None or destination is None or not (source.on and destination.on):
@@ -102,9 +101,9 @@ class NodeTable:
         return destination.topic if distance_m2 < self._reach_m2 else None
 
     def in_range(self, node_id: int) -> tuple[int, ...]:
-        """Ids of the nodes that could be sent to, ascending, without `node_id` itself.
+        """Ids of the nodes that a packet could reach, ascending, without `node_id` itself.
 
-        Raises AirError for a node that is not registered; a node that is off reaches nobody.
+        Raises AirError for a node that is not registered; a node that is off reaches none.
         """
         answer = self._in_range.get(node_id)
         if answer is None:

@@ -27,7 +27,7 @@ class OrderRefused(MeshError):
 
 
 class MeshControls(Protocol):
-    """Carries out orders. Each call may block for seconds and raises OrderRefused with a reason."""
+    """Executes orders. Each call may block for seconds and raises OrderRefused with a reason."""
 
     def power(self, node: int, on: bool) -> str: ...
 
@@ -90,7 +90,7 @@ class _Speed(PageOrder):
 
 
 class NeighbourWatch(_Request):
-    """The page wants to see one node's neighbours in detail; None: no longer."""
+    """The page requests details of one node's neighbours; None: no longer."""
 
     do: Literal["watch"]
     node: NodeOrNone

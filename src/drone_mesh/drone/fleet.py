@@ -13,7 +13,7 @@ GATEWAY_COLUMN_M = -1.0  # x of all gateways; they stand 1 m apart along y
 
 
 class StartPlace(NamedTuple):
-    """Who starts where."""
+    """Id, role and start place of one drone."""
 
     node_id: int
     role: Role
@@ -27,21 +27,21 @@ def plan_fleet(
     """Ids, roles and start places of a fleet, by id: gateways first, from 0.
 
     `gridsize` is the number of routers in a row along x, `spacing` their distance in metres.
-    Raises ConfigurationError, which names the parameter, for what cannot be flown.
+    Raises ConfigurationError, which names the parameter, for an invalid fleet.
     """
     if gateways < 0:
-        raise ConfigurationError(f"gateways: {gateways} is less than 0")
+        raise ConfigurationError(f"invalid gateways {gateways}: must be 0 or more")
     if routers < 0:
-        raise ConfigurationError(f"routers: {routers} is less than 0")
+        raise ConfigurationError(f"invalid routers {routers}: must be 0 or more")
     if gateways + routers > MAX_DRONES:
         raise ConfigurationError(
             f"gateways + routers: {gateways} + {routers} = {gateways + routers} drones, "
             f"but node ids allow at most {MAX_DRONES}"
         )
     if gridsize < 1:
-        raise ConfigurationError(f"gridsize: {gridsize} is less than 1 router in a row")
+        raise ConfigurationError(f"invalid gridsize {gridsize}: must be 1 or more")
     if not (math.isfinite(spacing) and spacing > 0):
-        raise ConfigurationError(f"spacing: {spacing} is not a distance above 0 m")
+        raise ConfigurationError(f"invalid spacing {spacing}: must be above 0 m")
     gateway_places = [
         StartPlace(i, Role.GATEWAY, GATEWAY_COLUMN_M, float(i)) for i in range(gateways)
     ]

@@ -11,7 +11,7 @@ _log = logging.getLogger(__name__)
 
 
 class GroundEngine(IDroneEngine):
-    """Stays where it was put, and says which goals it was given. Any thread may call it."""
+    """Stays where it is, and logs the goals that it gets. Any thread may call it."""
 
     def __init__(self, node_id: int, location: Location) -> None:
         self._node_id = node_id

@@ -13,7 +13,7 @@ class Role(enum.IntEnum):
 
     @property
     def word(self) -> str:
-        """The word that people see."""
+        """The role in lower case, for display."""
         return self.name.lower()
 
     @property

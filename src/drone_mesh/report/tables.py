@@ -20,11 +20,11 @@ EVENT_KINDS_LEFT_OUT = frozenset(
         MeshEventKind.NEIGHBOUR_LOST,
         MeshEventKind.NODE_MISSING,
     )
-)  # too many to be read on a page; the CSV file has them all
+)  # too many for a page; the CSV file has them all
 
 
 def key_numbers(story: RunStory) -> list[tuple[str, str]]:
-    """(name, value) of what one wants to know first."""
+    """(name, value) of the most important figures."""
     first, last = story.samples[0], story.samples[-1]
     seconds = max(last.stamp_s - first.stamp_s, 1e-9)
     lengths = [outage.seconds for outage in story.outages if outage.seconds is not None]

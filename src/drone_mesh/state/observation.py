@@ -16,7 +16,7 @@ OLDEST_AGE_S = 255  # the largest value of one byte
 def describe_component(
     status: NodeStatus, component: MeshnetworkComponent, on: bool, now_s: float
 ) -> None:
-    """Fill in what the mesh software knows of itself. May be called in any thread.
+    """Fill in the state of a component. May be called in any thread.
 
     `on` is whether its antenna has power. Position, path, route and report_age are left alone.
     """

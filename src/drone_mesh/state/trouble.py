@@ -39,7 +39,7 @@ class Summary:
 
 
 def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
-    """One entry for each node with trouble, by id."""
+    """One entry for each node with a problem, by id."""
     by_id = {node.id: node for node in nodes}
     troubles = []
     for node in nodes:

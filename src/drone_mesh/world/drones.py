@@ -10,7 +10,7 @@ from drone_mesh.world.interfaces import World
 
 
 class VirtualDrone:
-    """A box in a world that its engine flies. Only DroneFactory makes them: it alone gives ids."""
+    """A box in a world, flown by its engine. Only DroneFactory, which assigns ids, creates them."""
 
     ROLE: ClassVar[Role]
 

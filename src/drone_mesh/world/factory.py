@@ -24,7 +24,7 @@ class DroneFactory:
     ) -> None:
         """Call in the world's thread. Parameters and errors as for `plan_fleet`.
 
-        `debug`: whether the drones' nodes are to report on themselves.
+        `debug`: whether the nodes of the drones publish debug information.
         """
         self.debug = debug
         self.drones: tuple[VirtualDrone, ...] = tuple(

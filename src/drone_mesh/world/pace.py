@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-CATCH_UP_S = 0.5  # our choice: lost wall time up to this is made up for, more is gone
+CATCH_UP_S = 0.5  # our choice: lost wall time up to this is caught up, more is lost
 
 
 class Pace:
     """Keeps simulated time at a multiple of wall time. Belongs to the thread that steps."""
 
     def __init__(self, factor: float) -> None:
-        """`factor`: simulated seconds per wall second; 0: as fast as it goes."""
+        """`factor`: simulated seconds per wall second; 0: as fast as possible."""
         self._factor = factor
         self._simulated_s = self._wall_s = 0.0
         self._started = False
 
     @property
     def factor(self) -> float:
-        """Simulated seconds per wall second; 0: as fast as it goes."""
+        """Simulated seconds per wall second; 0: as fast as possible."""
         return self._factor
 
     def restart(self, factor: float) -> None:
-        """From now on go at this factor; the time that went by meanwhile is not made up for."""
+        """Continue at this factor from now; time that passed meanwhile is not caught up."""
         self._factor = factor
         self._started = False
 

@@ -1,4 +1,4 @@
-"""StillWorld: a world without physics, for tests that do not need any."""
+"""StillWorld: a world without physics, for tests."""
 
 from __future__ import annotations
 

@@ -120,16 +120,16 @@ def test_unknown_nodes_are_not_linked_and_cannot_request_the_nodes_in_range():
 @pytest.mark.parametrize(
     ("node_id", "position", "sub", "why"),
     [
-        (254, (1.0, 1.0, 1.0), "/Node/254", "id 254: node ids are 0..253"),
-        (255, (1.0, 1.0, 1.0), "", "id 255: node ids are 0..253"),
-        (3, (math.nan, 1.0, 1.0), "", "not three finite numbers"),
-        (3, (1.0, math.inf, 1.0), "/Node/3", "not three finite numbers"),
-        (3, (1.0, 1.0), "", "not three finite numbers"),
-        (3, NOWHERE, "/", "'/' is not the name of a topic"),
-        (3, NOWHERE, "a b", "is not the name of a topic"),
-        (3, NOWHERE, "~private", "is not the name of a topic"),
-        (3, NOWHERE, "/Node/3\n", "is not the name of a topic"),
-        (3, NOWHERE, "/" + "x" * 300, "is not the name of a topic"),
+        (254, (1.0, 1.0, 1.0), "/Node/254", "invalid node id 254: must be 0..253"),
+        (255, (1.0, 1.0, 1.0), "", "invalid node id 255: must be 0..253"),
+        (3, (math.nan, 1.0, 1.0), "", "want three finite numbers"),
+        (3, (1.0, math.inf, 1.0), "/Node/3", "want three finite numbers"),
+        (3, (1.0, 1.0), "", "want three finite numbers"),
+        (3, NOWHERE, "/", "invalid topic name '/'"),
+        (3, NOWHERE, "a b", "invalid topic name"),
+        (3, NOWHERE, "~private", "invalid topic name"),
+        (3, NOWHERE, "/Node/3\n", "invalid topic name"),
+        (3, NOWHERE, "/" + "x" * 300, "invalid topic name"),
     ],
 )
 def test_bad_information_is_refused_and_changes_nothing(node_id, position, sub, why):

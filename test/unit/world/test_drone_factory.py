@@ -85,17 +85,17 @@ def test_debug_is_handed_on():
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"gateways": -1}, "gateways: -1 is less than 0"),
-        ({"routers": -1}, "routers: -1 is less than 0"),
+        ({"gateways": -1}, "invalid gateways -1: must be 0 or more"),
+        ({"routers": -1}, "invalid routers -1: must be 0 or more"),
         (
             {"gateways": 1, "routers": 254},
             r"gateways \+ routers: 1 \+ 254 = 255 drones, .* at most 254",
         ),
-        ({"gridsize": 0}, "gridsize: 0"),
-        ({"spacing": 0.0}, "spacing: 0.0"),
-        ({"spacing": -1.0}, "spacing: -1.0"),
-        ({"spacing": math.nan}, "spacing: nan"),
-        ({"spacing": math.inf}, "spacing: inf"),
+        ({"gridsize": 0}, "invalid gridsize 0"),
+        ({"spacing": 0.0}, "invalid spacing 0.0"),
+        ({"spacing": -1.0}, "invalid spacing -1.0"),
+        ({"spacing": math.nan}, "invalid spacing nan"),
+        ({"spacing": math.inf}, "invalid spacing inf"),
     ],
 )
 def test_a_parameter_that_makes_no_fleet_is_named(changes, why):

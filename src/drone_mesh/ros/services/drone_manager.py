@@ -64,9 +64,9 @@ class DroneManager:
         except GoalRefused as error:
             raise rospy.ServiceException(str(error)) from None
         if request.ID > MAX_NODE_ID:
-            raise rospy.ServiceException(f"drone {request.ID}: ids are 0..{MAX_NODE_ID}")
+            raise rospy.ServiceException(f"invalid drone id {request.ID}: must be 0..{MAX_NODE_ID}")
         if not self._gateway_is_there():
-            _log.warning("drone %d is not sent anywhere: there is no gateway", request.ID)
+            _log.warning("drone %d: order dropped, there is no gateway", request.ID)
             return RequestDroneFlightResponse(status=0)
         self._order(request.ID, goal)
         return RequestDroneFlightResponse(status=1)
@@ -77,8 +77,8 @@ class DroneManager:
         except UnknownCase as error:
             raise rospy.ServiceException(str(error)) from None
         if not self._gateway_is_there():
-            raise rospy.ServiceException("there is no gateway to pass the orders on")
-        _log.info("case %d: %d drones are sent to their places", request.caseID, len(orders))
+            raise rospy.ServiceException("no gateway is running")
+        _log.info("case %d: ordering %d drones to their places", request.caseID, len(orders))
         for node_id, goal in orders:
             self._order(node_id, goal)
         return CasusResponse()
@@ -87,7 +87,7 @@ class DroneManager:
         self._gateways.publish(flight_order(node_id, goal))
 
     def _gateway_is_there(self) -> bool:
-        """Whether a gateway subscribes; waits a moment for one, since we may have just started."""
+        """Whether a gateway subscribes; waits for one, since it may be starting."""
         deadline_s = time.monotonic() + WAIT_FOR_GATEWAY_S
         while not rospy.is_shutdown():
             self._gateways.impl.check()  # a killed gateway leaves its connection behind
@@ -107,5 +107,5 @@ def main() -> None:
     path = or_stop(lambda: file_parameter("casus", "casus.yaml"))
     layouts = or_stop(lambda: Layouts.load(path))
     DroneManager(layouts)
-    _log.info("%d cases, from %s and built in", len(layouts.cases), path)
+    _log.info("%d layouts, built in and from %s", len(layouts.cases), path)
     rospy.spin()

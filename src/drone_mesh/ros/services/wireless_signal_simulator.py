@@ -40,26 +40,26 @@ from drone_mesh.srv import (
 )
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
-STUCK_RECEIVER_S = 0.2  # our choice: who does not empty its socket for so long is cut off
+STUCK_RECEIVER_S = 0.2  # our choice: a receiver that does not read for so long is disconnected
 
 _log = logging.getLogger(__name__)
 
 
 class _Listener(rospy.SubscribeListener):
-    """The topic of one antenna. `deliver` tells the truth about whether somebody is there."""
+    """The topic of one antenna. `deliver` reports whether a receiver is connected."""
 
     def __init__(self, topic: str) -> None:
         self.has_listened = False  # set by rospy's thread: the first receiver has connected
         with warnings.catch_warnings():
-            # Synchronous on purpose: a queue costs a thread and two switches per packet, and hides
-            # that the receiver is gone. What it protects from is seen to in peer_subscribe.
+            # No queue on purpose: it costs a thread and two switches per packet, and hides that a
+            # receiver has gone. peer_subscribe limits how long a stuck receiver can block.
             warnings.simplefilter("ignore", SyntaxWarning)
             self._publisher = rospy.Publisher(
                 topic, NRF24, subscriber_listener=self, tcp_nodelay=True, queue_size=None
             )
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
-        """A receiver that is stuck may hold up a sender for a moment only, then it is cut off."""
+        """Limit how long a stuck receiver can block a sender; then it is disconnected."""
         self.has_listened = True
         timeval = struct.pack("@ll", 0, int(STUCK_RECEIVER_S * 1e6))
         for connection in self._connections():
@@ -67,7 +67,7 @@ class _Listener(rospy.SubscribeListener):
                 connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
 
     def deliver(self, message: NRF24) -> bool:
-        """Publish; False if nobody is there to take it."""
+        """Publish; False if there is no receiver."""
         if not self.has_receiver():
             return False
         try:
@@ -77,11 +77,11 @@ class _Listener(rospy.SubscribeListener):
         return bool(self._connections())
 
     def has_receiver(self) -> bool:
-        """Whether somebody subscribes to the topic, and is still there."""
+        """Whether the topic has a subscriber that is still there."""
         implementation = self._publisher.impl  # None once it is closed
         if implementation is None or not implementation.has_connections():
             return False
-        # A killed process leaves its connection behind; rospy notices at the second write only.
+        # A killed process leaves its connection behind; rospy notices only at the second write.
         implementation.check()
         return bool(implementation.has_connections())
 
@@ -94,23 +94,23 @@ class _Listener(rospy.SubscribeListener):
 
 
 class WirelessSignalSimulator:
-    """Knows where each antenna is, and hands packets to those in range.
+    """Knows the position of each antenna, and delivers packets to those in range.
 
-    Parameters (private): ~max_distance (float, metres), ~config (the YAML file to take it from
+    Parameters (private): ~max_distance (float, metres), ~config (the YAML file that has it
                 otherwise; config/factory.yaml by default)
     Subscribes: /WirelessSignalSimulator (DroneInfo)
-    Publishes:  the topic that each antenna asked for, usually /Node/<id> (NRF24)
+    Publishes:  the topic that each antenna announced, usually /Node/<id> (NRF24)
     Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
                 (AreaScan), /SignalSimulator/messages (WirelessMessages),
                 /SignalSimulator/broadcast (Broadcast)
     Figures:    delivered, lost in range, on /diagnostics
 
-    The handlers run in the threads of rospy's connections. `_lock` guards the register and the
+    The handlers run in the threads of rospy's connections. `_lock` guards the node table and the
     counts, and is never held while something is sent; `_opening` guards the set of topics.
     """
 
     def __init__(self, max_distance_m: float) -> None:
-        """Raises AirError for a distance that is none."""
+        """Raises AirError for an invalid distance."""
         self._nodes = NodeTable(max_distance_m)
         self._lock = threading.Lock()
         self._opening = threading.Lock()
@@ -118,7 +118,7 @@ class WirelessSignalSimulator:
         self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
         self._complaints = ThrottledLog(_log)
         self._delivered = self._lost = 0
-        # The services first: who sees that we subscribe may call at once.
+        # The services first: an antenna that sees our subscription may call at once.
         rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
         rospy.Service(names.MESSAGES_SERVICE, WirelessMessages, self._messages)
         rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
@@ -150,19 +150,19 @@ class WirelessSignalSimulator:
         _log.debug("node %d listens on %s", node_id, topic)
 
     def _check_topic_type(self, info: DroneInfo) -> None:
-        """Nobody may have packets sent to a topic of another kind, such as /clock."""
+        """Raise AirError for a topic of another type, such as /clock."""
         if info.sub in self._listeners or info.sub == names.node_topic(info.nodeID):
             return
         for topic, kind in rospy.get_published_topics():
             if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
-                raise AirError(f"node {info.nodeID}: {info.sub[:60]} is a topic of {kind}")
+                raise AirError(f"node {info.nodeID}: topic {info.sub[:60]} has type {kind}")
 
     def _message(self, request: WirelessMessageRequest) -> WirelessMessageResponse:
         with self._lock:
             topic = self._nodes.link(request.from_, request.to)
         if topic is None:
             return WirelessMessageResponse(False)
-        if request.from_ == request.to:  # an antenna asks whether it is known yet
+        if request.from_ == request.to:  # the probe of an antenna: is it registered?
             listener = self._listeners.get(topic)
             return WirelessMessageResponse(
                 listener is not None and listener.deliver(request.message)
@@ -173,7 +173,7 @@ class WirelessSignalSimulator:
         joined = request.packets
         if len(joined) % PAYLOAD_BYTES:
             raise rospy.ServiceException(
-                f"packets: {len(joined)} bytes, want {PAYLOAD_BYTES} for each of them"
+                f"invalid length of packets {len(joined)}: must be a multiple of {PAYLOAD_BYTES}"
             )
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:
@@ -223,7 +223,7 @@ class WirelessSignalSimulator:
             if delivered:
                 self._delivered += 1
             elif listener is not None and listener.has_listened:
-                self._lost += 1  # before that it is on its way into the air, and misses nothing
+                self._lost += 1  # before that the node is still starting and loses nothing
         return delivered
 
     def _figures(self) -> dict[str, float]:
@@ -238,5 +238,5 @@ def main() -> None:
     max_distance_m = or_stop(lambda: factory_configuration("max_distance")).max_distance
     show_library_logs_on_rosout()
     WirelessSignalSimulator(max_distance_m)
-    _log.info("in range means nearer than %g m", max_distance_m)
+    _log.info("range of the radios: %g m", max_distance_m)
     rospy.spin()

@@ -1,1 +1,1 @@
-"""What shows the mesh to people, or watches it: console, rviz, status, report, bags."""
+"""Nodes and commands that show or observe the mesh: console, rviz, status, report, bags."""

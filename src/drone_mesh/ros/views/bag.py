@@ -1,4 +1,4 @@
-"""Reads what a rosbag tells about a mesh."""
+"""Reads states and events of a mesh from a rosbag."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 
 
 class BagUnusable(MeshError):
-    """A bag is missing, broken, or has nothing about a mesh in it; the message says which."""
+    """A bag is missing, broken, or contains no mesh; the message says which."""
 
 
 def read_states(path: Path) -> Iterator[MeshStatus]:
@@ -35,10 +35,10 @@ def _open(path: Path) -> rosbag.Bag:
     try:
         return rosbag.Bag(str(path))
     except FileNotFoundError as error:
-        raise BagUnusable(f"{path}: there is no such file") from error
+        raise BagUnusable(f"{path}: no such file") from error
     except rosbag.ROSBagUnindexedException as error:
         raise BagUnusable(
-            f"{path}: was not closed in the end; 'rosbag reindex {path}' repairs it"
+            f"{path}: the recording was not closed; 'rosbag reindex {path}' repairs it"
         ) from error
     except (rosbag.ROSBagException, OSError, ValueError) as error:  # of any bytes whatever
-        raise BagUnusable(f"{path}: is not a bag that can be read ({error})") from error
+        raise BagUnusable(f"{path}: not a readable bag ({error})") from error

@@ -1,4 +1,4 @@
-"""The benchmark's eyes: a ROS node that tells on standard output what it sees, line by line."""
+"""The benchmark's probe: a ROS node that writes its observations to standard output."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ _KINDS = (STARTED, CONNECTED, DISCONNECTED)
 class Probe:
     """Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent), /diagnostics (DiagnosticArray)
 
-    The state is watched only when asked for: making it five times a second is work, too. Runs on
-    wall time. Handlers are called by threads of rospy; `_lock` keeps their lines whole.
+    It watches the state only on request, since publishing it five times a second costs time. Runs
+    on wall time. Handlers are called by threads of rospy; `_lock` keeps their lines whole.
     """
 
     def __init__(self) -> None:

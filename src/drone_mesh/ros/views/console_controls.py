@@ -31,7 +31,7 @@ ORDER_TIMEOUT_S = 10  # wall time; longer than the DroneManager waits for a gate
 
 
 class RosControls:
-    """A MeshControls. Any thread; each call makes a connection of its own and closes it."""
+    """A MeshControls. Any thread; each call opens a connection of its own and closes it."""
 
     def power(self, node: int, on: bool) -> str:
         """Switch the antenna of a node."""
@@ -39,27 +39,31 @@ class RosControls:
         return f"node {node} is {'on' if on else 'off'}"
 
     def fly(self, node: int, x: float, y: float, z: float) -> str:
-        """Order a drone to a place, through the mesh as everybody's orders."""
+        """Order a drone to a place, through the mesh."""
         request = RequestDroneFlightRequest(ID=node, latitude=y, longitude=x, height=round(z))
         answer = _call(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request)
         if not answer.status:
-            raise OrderRefused("there is no gateway that could take the order")
-        return f"drone {node} is ordered to ({x:g}, {y:g}, {round(z)}) m"
+            raise OrderRefused("no gateway is running to take the order")
+        return f"ordered drone {node} to ({x:g}, {y:g}, {round(z)}) m"
 
     def layout(self, case: int) -> str:
         """Order all drones of a layout to their places."""
         _call(names.SET_TO_CASUS_SERVICE, Casus, CasusRequest(caseID=case))
-        return f"layout {case} is ordered"
+        return f"ordered layout {case}"
 
     def speed(self, paused: bool, factor: float) -> str:
-        """Pause, go on, or change how fast time runs."""
+        """Pause or resume simulated time, or change its speed."""
         request = SetSpeedRequest(paused=paused, real_time_factor=factor)
         answer = _call(names.SPEED_SERVICE, SetSpeed, request)
         if not answer.success:
             raise OrderRefused(answer.message)
         if paused:
             return "paused"
-        return f"time runs {factor:g} times as fast as on the wall" if factor else "time goes on"
+        return (
+            f"simulated time runs at {factor:g} times real time"
+            if factor
+            else "simulated time resumes"
+        )
 
 
 def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
@@ -68,8 +72,8 @@ def _call(name: str, service_class: ServiceClass[Request, Response], request: Re
         service.connect()
         return service.call(request)
     except ServiceGone as error:
-        log.warning("an order of the console was not carried out: %s", error)
-        raise OrderRefused(f"nobody answers at {name}: is the simulation running?") from error
+        log.warning("console: order failed: %s", error)
+        raise OrderRefused(f"no answer from {name}: is the simulation running?") from error
     except ServiceRefused as error:
         said = str(error).partition(" responded with an error: ")[2]
         raise OrderRefused(said or str(error)) from error

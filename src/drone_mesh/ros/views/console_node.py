@@ -27,20 +27,20 @@ from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.web.access import access_for, is_loopback
 
 LOOK_PERIOD_S = 1.0  # wall time between two looks at the master
-OLD_NEWS_S = 3.0  # wall time without a state after which the page says so
+OLD_NEWS_S = 3.0  # wall time without a state after which the page shows a warning
 TOKEN_BYTES = 18
-EVERYWHERE = ("0.0.0.0", "::")  # addresses that stand for all of this machine's
+EVERYWHERE = ("0.0.0.0", "::")  # addresses that mean all addresses of this machine
 
 log = logging.getLogger(__name__)
 
 
 class MeshFeed:
-    """Brings what the ROS graph tells into the store, whose owner is the runner's loop.
+    """Passes states and events from ROS to the store, which the runner's loop owns.
 
     Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent)
 
-    A master that was started anew does not know our subscriptions: they are made again. `_latest`
-    is handed from the subscriber's thread to the loop; a loop that lags behind skips states.
+    A restarted master does not know our subscriptions, so they are made again. `_latest` passes
+    from the subscriber's thread to the loop; a loop that lags behind skips states.
     """
 
     def __init__(self, store: FrameStore, runner: ConsoleRunner) -> None:
@@ -57,13 +57,13 @@ class MeshFeed:
             try:
                 run_id = rosgraph.Master(rospy.get_name()).getParam("/run_id")
             except (OSError, rosgraph.MasterException):
-                self._tell("no ROS master: waiting for the simulation to be started")
+                self._tell("no ROS master: waiting for the simulation to start")
                 continue
             if run_id != self._run_id:
                 self._run_id = run_id
                 self._subscribe()
             elif time.monotonic() - self._heard_s > OLD_NEWS_S:
-                self._tell("no news from the simulation")
+                self._tell("no data from the simulation")
 
     def _subscribe(self) -> None:
         for subscriber in self._subscribers:
@@ -103,11 +103,11 @@ def layout_names(layouts: Layouts) -> list[tuple[int, str]]:
 
 
 def main() -> None:
-    """The web console: the mesh on a page of the browser, to look at and to touch.
+    """The web console: shows and controls the mesh in a browser.
 
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
-    (str): who wants to use the console from elsewhere needs it; an address that others can reach
-    gets a random one if none is given; /DroneManager/casus (str): the file of the layouts.
+    (str): clients need it; an address that other machines can reach gets a random one if none is
+    given. /DroneManager/casus (str): the file of the layouts.
     """
     prepare_node(main.__doc__)
     run_tool("console", _run)
@@ -130,7 +130,7 @@ def _run() -> int:
     runner.start()
     name = socket.gethostname() if address in EVERYWHERE else address
     name = f"[{name}]" if ":" in name else name
-    # Not to the log: it is public on /rosout, and the token is not.
+    # Not to the log, which is public on /rosout: the token is secret.
     print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
     try:
         MeshFeed(store, runner).watch_master(stopped)
@@ -145,5 +145,5 @@ def _port(value: object) -> int:
     except ValueError:
         port = -1
     if not 0 <= port <= 65535:
-        raise ConfigurationError(f"port: {value!r} is not a whole number from 0 to 65535")
+        raise ConfigurationError(f"invalid port {value!r}: must be a whole number 0..65535")
     return port

@@ -1,4 +1,4 @@
-"""One look at a mesh, live or in a bag: for the command line tools."""
+"""The latest state of a mesh, live or from a bag, for the command line tools."""
 
 from __future__ import annotations
 
@@ -18,24 +18,26 @@ WAIT_S = 5.0  # wall time for a live state; it is latched, so it comes at once o
 
 
 class NoState(MeshError):
-    """A master is there, but nobody publishes the state of a mesh."""
+    """There is a master, but no node publishes the state of a mesh."""
 
     def __init__(self) -> None:
         super().__init__(
-            f"nobody publishes {names.STATE_TOPIC}: is a simulation running "
+            f"no state on {names.STATE_TOPIC}: is a simulation running "
             "(roslaunch drone_mesh factory.launch)?"
         )
 
 
 def parse_with_bag(parser: argparse.ArgumentParser) -> argparse.Namespace:
-    """The command line's options, with --bag and --at."""
-    parser.add_argument("--bag", type=Path, help="the state in a bag instead of the live one")
+    """An option parser with --bag and --at."""
+    parser.add_argument(
+        "--bag", type=Path, help="read the state from a bag instead of the live one"
+    )
     parser.add_argument(
         "--at", type=float, metavar="S", help="with --bag: at this simulated time (default: end)"
     )
     options = parser.parse_args(rospy.myargv()[1:])
     if options.at is not None and options.bag is None:
-        parser.error("--at is a time in a bag: name it with --bag")
+        parser.error("--at needs --bag")
     return options
 
 
@@ -56,5 +58,5 @@ def state_in_bag(path: Path, at_s: float | None) -> MeshStatus:
         found = mesh
     if found is None:
         when = "" if at_s is None else f" up to {at_s:g} s"
-        raise BagUnusable(f"{path}: has no {names.STATE_TOPIC} in it{when}")
+        raise BagUnusable(f"{path}: contains no {names.STATE_TOPIC}{when}")
     return found

@@ -1,4 +1,4 @@
-"""rosrun drone_mesh report: a page about a recorded run."""
+"""rosrun drone_mesh report: an HTML report of a recorded run."""
 
 from __future__ import annotations
 
@@ -29,17 +29,23 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh report",
-        description="Make one HTML file from a bag that launch/record.launch recorded: the "
-        "connected share over time, who was lost when and how the mesh repaired itself, messages "
+        description="Write an HTML report of a run that launch/record.launch recorded: the "
+        "connected share over time, the outages and their repairs, messages "
         "per node, the map before and after. Needs no running simulation.",
-        epilog="Exit code: 0 the page is written, 2 it is not.",
+        epilog="Exit code: 0 written, 2 failed.",
     )
     parser.add_argument("bag", type=Path, help="the recorded run")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="HTML", help="the page (default: beside the bag)"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="HTML",
+        help="file of the report (default: beside the bag)",
     )
-    parser.add_argument("--csv", type=Path, metavar="FOLDER", help="also write the numbers there")
-    parser.add_argument("--title", help="heading of the page (default: the bag's name)")
+    parser.add_argument(
+        "--csv", type=Path, metavar="FOLDER", help="also write the numbers to this folder, as CSV"
+    )
+    parser.add_argument("--title", help="heading of the report (default: name of the bag)")
     return parser
 
 

@@ -29,9 +29,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh snapshot",
         description="Draw the world with its drones, links and flights. Needs no screen.",
-        epilog="Exit code: 0 the picture is written, 2 it is not.",
+        epilog="Exit code: 0 written, 2 failed.",
     )
-    parser.add_argument("picture", type=Path, help="where to write it, a PNG file")
+    parser.add_argument("picture", type=Path, help="the PNG file to write")
     parser.add_argument(
         "--size",
         type=_size,
@@ -47,7 +47,7 @@ def _size(text: str) -> tuple[int, int]:
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if not all(SMALLEST <= pixels <= LARGEST for pixels in size):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: want WIDTHxHEIGHT, each {SMALLEST}..{LARGEST} pixels"
+            f"invalid size {text!r}: must be WIDTHxHEIGHT, each {SMALLEST}..{LARGEST} pixels"
         )
     return size
 

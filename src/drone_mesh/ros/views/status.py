@@ -20,7 +20,7 @@ from drone_mesh.state.trouble import all_connected, find_trouble
 from drone_mesh.view.table import mesh_table
 
 WATCH_PERIOD_S = 1.0
-OLD_NEWS_S = 3.0  # wall time without a state after which --watch says so
+OLD_NEWS_S = 3.0  # wall time without a state after which --watch shows a warning
 CLEAR_SCREEN = "\x1b[H\x1b[2J"
 
 
@@ -34,10 +34,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh status",
         description="Print the state of the mesh as a table.",
-        epilog="Exit code: 0 everybody who is switched on is connected, 1 somebody is not, "
-        "2 no answer to that (no master, no mesh, no such bag).",
+        epilog="Exit code: 0 all nodes that are on are connected, 1 some are not, "
+        "2 unknown (no master, no mesh, no such bag).",
     )
-    parser.add_argument("-w", "--watch", action="store_true", help="print it again each second")
+    parser.add_argument("-w", "--watch", action="store_true", help="repeat every second")
     parser.add_argument(
         "--colour",
         choices=("auto", "always", "never"),
@@ -83,7 +83,7 @@ def _watch(colours: bool) -> int:
             age_s = time.monotonic() - came_s
             if age_s > OLD_NEWS_S:
                 require_master()
-                text += f"\nno news for {age_s:.0f} s"
+                text += f"\nno state for {age_s:.0f} s"
             print(f"{CLEAR_SCREEN if colours else ''}{text}", flush=True)
             time.sleep(WATCH_PERIOD_S)
     except KeyboardInterrupt:

@@ -36,7 +36,7 @@ class WorldView:
 
 
 class MeshStatePublisher:
-    """Merges the hosts' reports with what the world sees.
+    """Merges the hosts' reports with the world's positions and flights.
 
     Subscribes: /mesh/reports (HostReport)
     Publishes:  /mesh/state (MeshState, latched), 5 Hz while watched, else 1 Hz, of wall time

@@ -21,15 +21,15 @@ MAX_LAG_S = 0.03  # our choice: timers may fire at most 50 ms of simulated time 
 HOST_TIMEOUT_S = 2.0  # wall seconds; a host that is silent for longer is not waited for
 _MEASURE_PERIOD_S = 1.0  # wall
 _TELL_PERIOD_S = 10.0  # wall
-_TOO_SLOW = 0.95  # of the factor that was asked for
-_NAP_S = 0.001  # wall; while the mesh works off what is due
+_TOO_SLOW = 0.95  # of the requested factor
+_NAP_S = 0.001  # wall; while the nodes do work that is due
 _PAUSE_NAP_S = 0.02
 
 _log = logging.getLogger(__name__)
 
 
 class PacedNodes(Protocol):
-    """Nodes that live by the time of the world."""
+    """Nodes that use the time of the world."""
 
     def lag_s(self, now_s: float) -> float:
         """For how many simulated seconds the oldest undone work has been waiting."""
@@ -39,17 +39,17 @@ class PacedNodes(Protocol):
 
 
 class _Hosts:
-    """How far the nodes have worked: those of this process, and of hosts in other ones."""
+    """The progress of the nodes, in this process and in the hosts of others."""
 
     def __init__(self, nodes: PacedNodes | None) -> None:
         self._nodes = nodes
-        # Host -> (simulated, monotonic) seconds of what it said last. Filled by rospy's threads.
+        # Host -> its last report: (simulated, monotonic) seconds. Filled by rospy's threads.
         self._progress: dict[str, tuple[float, float]] = {}
         rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._heard, tcp_nodelay=True)
 
     def _heard(self, progress: Header) -> None:
         before_s, _said_s = self._progress.get(progress.frame_id, (0.0, 0.0))
-        # Two threads of a host tell: a later one may know less.
+        # Two threads of a host report; a later report may be an older one.
         done_s = max(before_s, progress.stamp.to_sec())
         self._progress[progress.frame_id] = (done_s, time.monotonic())
 
@@ -58,7 +58,7 @@ class _Hosts:
         lag_s = 0.0 if self._nodes is None else self._nodes.lag_s(now_s)
         for host, (done_s, said_s) in list(self._progress.items()):
             if time.monotonic() - said_s > HOST_TIMEOUT_S:
-                _log.warning("host %s is silent, the world goes on without it", host)
+                _log.warning("host %s is silent; the world continues without it", host)
                 del self._progress[host]
             else:
                 lag_s = max(lag_s, now_s - done_s)
@@ -81,7 +81,7 @@ class WorldRunner:
     """
 
     def __init__(self, world: World, factor: float, nodes: PacedNodes | None) -> None:
-        """`nodes` are those of this process, if there are any."""
+        """`nodes` are those of this process, or None."""
         self._world = world
         self._hosts = _Hosts(nodes)
         self._paused = False
@@ -92,12 +92,12 @@ class WorldRunner:
 
     @property
     def wanted_factor(self) -> float:
-        """Simulated seconds per wall second, as asked for; 0: as fast as it goes. Any thread."""
+        """The requested simulated seconds per wall second; 0: as fast as possible. Any thread."""
         return self._wanted
 
     @property
     def paused(self) -> bool:
-        """Whether time stands still. Any thread."""
+        """Whether simulated time is paused. Any thread."""
         return self._paused
 
     def run(self, is_over: Callable[[], bool]) -> None:
@@ -140,14 +140,14 @@ class WorldRunner:
         if self._paused:
             return
         if self._wanted == 0.0:
-            _log.info("real-time factor %.1f reached", reached)
+            _log.info("real-time factor %.1f", reached)
         elif reached < _TOO_SLOW * self._wanted:
-            _log.warning("real-time factor %.2f reached, %g asked for", reached, self._wanted)
+            _log.warning("real-time factor %.2f, requested %g", reached, self._wanted)
 
     def _set_speed(self, request: SetSpeedRequest) -> SetSpeedResponse:
         factor = request.real_time_factor
         if not (math.isfinite(factor) and factor >= 0.0):
-            return SetSpeedResponse(False, f"{factor} is no factor; want a number above 0")
+            return SetSpeedResponse(False, f"invalid real_time_factor {factor}: must be above 0")
         self._paused = request.paused
         if factor > 0.0:
             self._wanted = factor
