@@ -88,7 +88,9 @@ class ManagerTest(unittest.TestCase):
         ):
             with self.assertRaisesRegex(rospy.ServiceException, why):
                 request(*arguments)
-        with self.assertRaisesRegex(rospy.ServiceException, r"unknown case 99: use one of 0\.\.17, 100"):
+        with self.assertRaisesRegex(
+            rospy.ServiceException, r"unknown case 99: use one of 0\.\.17, 100"
+        ):
             call("/DroneManager/SetToCasus", Casus, 99)
         self.assertEqual(request(9, 1, 1, 1), 1)
         wait_for("the good order did not arrive", 5, lambda: self.orders)
