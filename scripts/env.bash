@@ -1,4 +1,4 @@
-# For each terminal in which rosrun, roslaunch, rostopic, rosservice or Python shall know drone_mesh:
+# Makes drone_mesh known to rosrun, roslaunch, rostopic, rosservice and Python in this terminal:
 #
 #     source scripts/env.bash
 
@@ -11,14 +11,14 @@ if [ -e "$drone_mesh_root/build/devel/setup.bash" ]; then
     *":$drone_mesh_root/.venv/bin:"*) ;;
     *) PATH="$drone_mesh_root/.venv/bin:$PATH" ;;
   esac
-  export PYTHONUNBUFFERED=1  # a node's log lines come at once, into a pipe too
-  # ROS tells other nodes the name of this machine; one that cannot be looked up helps nobody.
+  export PYTHONUNBUFFERED=1  # log lines appear at once, also in a pipe
+  # ROS sends the name of this machine to other nodes; they must be able to look it up.
   if [ -z "$ROS_HOSTNAME$ROS_IP" ] && ! getent hosts "$(uname -n)" >/dev/null; then
     export ROS_HOSTNAME=localhost
   fi
   unset drone_mesh_root
 else
   unset drone_mesh_root
-  echo "drone_mesh is not built yet: start scripts/run or scripts/test once" >&2
+  echo "drone_mesh is not built yet: run scripts/run or scripts/test once" >&2
   return 1
 fi

@@ -33,7 +33,7 @@ fi
 say() { printf '== %s\n' "$*"; }
 fail() { printf 'scripts/%s: %s\n' "${0##*/}" "$*" >&2; exit 1; }
 
-# apt_install PACKAGE...: those that are missing, as root or through sudo.
+# apt_install PACKAGE...: installs those that are missing, as root or through sudo.
 apt_install() {
   local package missing=() as_root=() apt
   for package in "$@"; do
@@ -41,22 +41,22 @@ apt_install() {
       missing+=("$package")
   done
   [ ${#missing[@]} -eq 0 ] && return
-  command -v apt-get >/dev/null || fail "no apt-get here to install what is missing: ${missing[*]}"
+  command -v apt-get >/dev/null || fail "apt-get not found; install these packages yourself: ${missing[*]}"
   if [ "$(id -u)" -ne 0 ]; then
     as_root=(sudo)
     if ! command -v sudo >/dev/null || { [ ! -t 0 ] && ! sudo -n true 2>/dev/null; }; then
-      fail "neither root nor sudo; ask for: apt-get install --no-install-recommends ${missing[*]}"
+      fail "not root, and sudo is not available; ask for: apt-get install --no-install-recommends ${missing[*]}"
     fi
   fi
-  say "installing ${#missing[@]} system packages and what they need: ${missing[*]}"
+  say "installing ${#missing[@]} system packages and their dependencies: ${missing[*]}"
   apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive
     apt-get -q -y -o DPkg::Lock::Timeout=600 -o Dpkg::Use-Pty=0)
-  "${apt[@]}" update </dev/null || fail "apt-get update failed; is the network there?"
+  "${apt[@]}" update </dev/null || fail "apt-get update failed; check the network"
   "${apt[@]}" install --no-install-recommends "${missing[@]}" </dev/null ||
     fail "apt-get could not install: ${missing[*]}"
 }
 
-# make_venv: on the system's Python, since that is the one which sees ROS.
+# make_venv: with the system's Python, the one that can import ROS.
 make_venv() {
   "$venv/bin/python" -m pip --version >/dev/null 2>&1 && return
   /usr/bin/python3 -c 'import ensurepip, venv' 2>/dev/null || apt_install python3 python3-venv
@@ -64,7 +64,7 @@ make_venv() {
   /usr/bin/python3 -m venv --clear --system-site-packages "$venv" || fail "could not make .venv"
 }
 
-# pip_install [--no-deps] FILE...: requirement files, unless this very content is installed.
+# pip_install [--no-deps] FILE...: installs requirement files whose content has changed.
 pip_install() {
   local options=() file stamp
   [ "$1" = --no-deps ] && { options=(--no-deps); shift; }
@@ -90,19 +90,19 @@ npm_install() {
   cp "$javascript/package-lock.json" "$javascript/.installed"
 }
 
-# build_step WHAT COMMAND...: with its output in a log, of which the end is shown if it fails.
+# build_step WHAT COMMAND...: logs the output; prints the end of it on failure.
 build_step() {
   local log="$root/build/build.log"
   say "$1 in build/"
   "${@:2}" >"$log" 2>&1 || { tail -n 30 "$log" >&2; fail "$1 failed; see build/build.log"; }
 }
 
-# build: plain CMake; it finds out by itself what has changed since the last time.
+# build: plain CMake, which rebuilds only what has changed.
 build() {
   # shellcheck disable=SC1090
   [ -e "$noetic" ] && . "$noetic"
   if ! grep -qsx "PYTHON_EXECUTABLE:[A-Z]*=$venv/bin/python" "$root/build/CMakeCache.txt"; then
-    # Nothing there, or of a checkout that has been moved: CMake keeps absolute paths.
+    # Nothing is built, or the checkout has been moved: CMake stores absolute paths.
     find "$root/build" -mindepth 1 -maxdepth 1 ! -name .lock -exec rm -rf {} +
   fi
   [ -e "$root/build/Makefile" ] ||
@@ -111,7 +111,7 @@ build() {
   build_step building cmake --build "$root/build" -j "$(nproc)"
 }
 
-# alone COMMAND...: only one at a time installs or builds in this checkout.
+# alone COMMAND...: waits until no other script installs or builds in this checkout.
 alone() {
   mkdir -p "$root/build"
   (

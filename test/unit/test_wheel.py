@@ -1,0 +1,66 @@
+"""The wheel works in an environment that has nothing else."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = ("LICENSE", "README.md", "package.xml", "pyproject.toml", "setup.cfg", "setup.py")
+LIMIT_S = 100
+
+
+def run(*command: object, cwd: Path) -> str:
+    """What the command prints; fails with what it says if it fails."""
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "PIP_"))}
+    done = subprocess.run(
+        [str(word) for word in command],
+        cwd=str(cwd),
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=LIMIT_S,
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+@pytest.fixture
+def installed(tmp_path):
+    """The folder of a new virtual environment in which only the wheel is installed."""
+    checkout, venv = tmp_path / "checkout", tmp_path / "venv"
+    checkout.mkdir()  # building leaves files in the checkout that it builds from
+    for name in FILES:
+        shutil.copy(ROOT / name, checkout / name)
+    for name in ("requirements", "src"):
+        ignored = shutil.ignore_patterns("*.egg-info", "__pycache__")
+        shutil.copytree(ROOT / name, checkout / name, ignore=ignored)
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    no_network = ("--no-deps", "--no-build-isolation", "--no-index")
+    run(*pip, "wheel", *no_network, "--wheel-dir", checkout / "dist", checkout, cwd=checkout)
+    (wheel,) = (checkout / "dist").glob("drone_mesh-*-py3-none-any.whl")
+    run(sys.executable, "-m", "venv", venv, cwd=tmp_path)
+    run(venv / "bin/pip", "install", "--no-deps", "--no-index", wheel, cwd=venv)
+    return venv
+
+
+@pytest.mark.slow
+def test_in_an_empty_environment_the_programs_of_a_pi_start_and_all_files_are_there(installed):
+    for program in ("raspberry_router", "raspberry_gateway"):
+        assert f"usage: {program}" in run(installed / "bin" / program, "--help", cwd=installed)
+    mesh_and_radio = "import drone_mesh.communication.assembly, drone_mesh.nrf24.high_level"
+    run(installed / "bin/python", "-c", mesh_and_radio, cwd=installed)
+    (package,) = installed.glob("lib/python3*/site-packages/drone_mesh")
+    for name in ("py.typed", "console/static/index.html", "nrf24/emulator/nrf24_range.csv"):
+        assert (package / name).is_file(), name
+    assert (installed / "share/drone_mesh/systemd/raspberry_router.service").is_file()
+    (metadata,) = package.parent.glob("drone_mesh-*.dist-info/METADATA")
+    extras = re.findall(r"^Provides-Extra: (\w+)$", metadata.read_text(), flags=re.MULTILINE)
+    assert {"raspberry", "simulation", "console", "http", "report"} <= set(extras)
