@@ -1,4 +1,4 @@
-"""What can be wrong with a radio; its messages say what to do about it."""
+"""Errors of a radio; their messages name the remedy."""
 
 from __future__ import annotations
 

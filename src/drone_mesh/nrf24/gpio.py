@@ -24,17 +24,17 @@ class CePin(Protocol):
     value: bool
 
     def close(self) -> None:
-        """Give the pin back."""
+        """Release the pin."""
 
 
 class IrqPin(Protocol):
-    """Interrupt request, an input, low while the chip wants something. One thread waits for it."""
+    """Interrupt request, an input, low while a flag of the chip is set. One thread waits for it."""
 
     def wait_low(self, timeout_s: float) -> bool:
-        """Wait until it is low; False if it is still high when the time is over."""
+        """Wait until it is low; False if it is still high after the time-out."""
 
     def close(self) -> None:
-        """Give the pin back."""
+        """Release the pin."""
 
 
 def _gpiod() -> ModuleType:
@@ -42,13 +42,13 @@ def _gpiod() -> ModuleType:
         import gpiod
     except ImportError as error:
         raise HardwareUnavailable(
-            "the Python package gpiod is missing, which switches the CE pin: pip install 'gpiod>=2'"
+            "the Python package gpiod is missing (for the CE pin): pip install 'gpiod>=2'"
         ) from error
     module: ModuleType = gpiod
     if not hasattr(module, "request_lines"):
         raise HardwareUnavailable(
-            "the installed gpiod is older than version 2, another interface under the same name "
-            "(python3-libgpiod of Debian 12 is): pip install 'gpiod>=2' in a virtual environment"
+            "the installed gpiod is older than version 2, which has another interface "
+            "(as in Debian 12): pip install 'gpiod>=2' in a virtual environment"
         )
     return module
 
@@ -88,7 +88,7 @@ def _request(gpio: int, settings: Any) -> Any:
     except OSError as error:
         raise HardwareUnavailable(
             f"cannot use GPIO{gpio} of {path}: {error.strerror or error} "
-            "(another program that uses it must be stopped)"
+            "(is another program using it?)"
         ) from error
 
 
@@ -118,7 +118,7 @@ class GpiodCe:
         self._value = high
 
     def close(self) -> None:
-        """Low, then given back."""
+        """Set it low and release it."""
         self.value = False
         self._lines.release()
 
@@ -150,5 +150,5 @@ class GpiodIrq:
         return True
 
     def close(self) -> None:
-        """Given back."""
+        """Release the pin."""
         self._lines.release()

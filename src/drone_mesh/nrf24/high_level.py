@@ -28,7 +28,7 @@ from drone_mesh.nrf24.transceiver import Received
 
 logger = logging.getLogger(__name__)
 
-RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices that it shall end
+RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices its end
 DUPLICATE_S = 0.5  # our choice: the same bytes again within this time are a duplicate
 
 Submit = Callable[[Callable[[float], None]], None]
@@ -75,11 +75,11 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         return self._sender.patience
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Set the radio up and listen; RadioError if there is none."""
+        """Set the radio up and listen; RadioError without a working chip."""
         if mesh.get_node_id() != self._radio.node_id:
             raise ConfigurationError(
                 f"the radio is set up as node {self._radio.node_id}, "
-                f"but the mesh is node {mesh.get_node_id()}"
+                f"but the mesh component is node {mesh.get_node_id()}"
             )
         if self._receiving is not None:
             return
@@ -102,9 +102,9 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._mesh = None
 
     def switch_power(self, on: bool) -> None:
-        """Switch the antenna of a running node off or on, and tell the mesh.
+        """Switch the antenna of a running node off or on, and inform the mesh.
 
-        RadioError if it is switched on and the chip is gone.
+        RadioError if it is switched on and the chip does not answer.
         """
         mesh = self._mesh
         if mesh is None or on == self._powered:
@@ -120,7 +120,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
     def fall_silent(self) -> None:
         """Send nothing more; every send fails at once from now on. Any thread.
 
-        For an end that comes soon: on a busy channel a node may have seconds of sends before it.
+        For a quick shutdown: on a busy channel a node may have seconds of sends queued.
         """
         self._silent = True
         self._sender.clear()
@@ -144,7 +144,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
 
     @property
     def debug_info(self) -> IMeshDebugInfo | None:
-        """What debugging_mode wants to be shown, or None."""
+        """The information for debugging, or None."""
         return self._info
 
     def on(self) -> bool:
@@ -177,7 +177,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
 
     def _note(self, payload: bytes) -> None:
-        """Count repetitions; they are handed on, for the same packet again is normal."""
+        """Count duplicates; they are still delivered, since a repeated packet is normal."""
         now_s = self._runtime.now_s()
         before, then_s = self._seen.get(sender(payload), (b"", now_s))
         if before == payload and now_s - then_s < DUPLICATE_S:

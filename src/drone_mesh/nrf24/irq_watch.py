@@ -1,12 +1,12 @@
-"""Whether the IRQ pin can be believed, or the chip must be polled."""
+"""Decides whether the IRQ pin can be trusted, or the chip must be polled."""
 
 from __future__ import annotations
 
-_PATIENCE = 3  # contradictions; a single one may be a race between the pin and the look
+_PATIENCE = 3  # contradictions; a single one may be a race
 
 
 class IrqWatch:
-    """Compares what the pin says with what is found in the chip. For the receiving thread."""
+    """Compares the pin with the contents of the chip. For the receiving thread."""
 
     def __init__(self) -> None:
         self.trusted = True
@@ -18,7 +18,7 @@ class IrqWatch:
         self._said = low
 
     def looked(self, found: bool, low_for_nothing: bool) -> bool:
-        """What the look after it found; True if that ends the trust in the pin.
+        """The chip was read after the wait; True if that ends the trust in the pin.
 
         `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all
         flags are clear, and still the pin is low.

@@ -1,4 +1,4 @@
-"""Words to and from the chip: SPI commands as functions, the registers by their names."""
+"""SPI commands of the chip as functions, registers by their names."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Command, Register
 from drone_mesh.nrf24.spi import SpiDevice
 
-_NOBODY = (0x00, 0xFF)  # STATUS as it reads when nothing drives MISO, or nothing is connected
+_NO_CHIP = (0x00, 0xFF)  # STATUS as it reads when nothing drives MISO, or nothing is connected
 
 
 class ChipLink:
-    """One chip on one SPI device; the caller sees to it that one thread at a time uses it."""
+    """One chip on one SPI device; the caller lets one thread at a time use it."""
 
     def __init__(self, spi: SpiDevice) -> None:
         self._spi = spi
         self.status = 0  # as of the last command, before it acted
 
     def command(self, command: int, data: bytes = b"") -> bytes:
-        """One transfer; what came in after STATUS. RadioError if nobody is there."""
+        """One transfer; returns the bytes after STATUS. RadioError if no chip answers."""
         try:
             answer = self._spi.xfer2([command, *data])
         except OSError as error:
             raise RadioError(f"SPI does not work: {error.strerror or error}") from error
         self.status = answer[0]
-        if self.status in _NOBODY:
+        if self.status in _NO_CHIP:
             raise RadioError(
                 f"no nRF24L01+ answers on SPI (STATUS reads 0x{self.status:02X}): "
                 "check the wiring, CSN and the 3.3 V supply"
@@ -49,7 +49,7 @@ class ChipLink:
         self.command(Command.W_REGISTER | register, bytes((value,)))
 
     def write_and_verify(self, values: Mapping[Register, bytes]) -> None:
-        """Write registers, and see that each reads back; RadioError names the one that does not."""
+        """Write registers and read each back; RadioError names the one that differs."""
         for register, value in values.items():
             self.write(register, value)
         wrong = self.first_difference(values)

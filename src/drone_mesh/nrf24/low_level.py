@@ -28,20 +28,19 @@ logger = logging.getLogger(__name__)
 
 POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
 VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed by a listener
-RESTART_PERIOD_S = 1.0  # our choice: a chip that is gone is looked for no more often
+RESTART_PERIOD_S = 1.0  # our choice: shortest time between two attempts to find a lost chip
 
 
 class NRF24LowLevelInterface:
     """One radio: sends with and without acknowledgement, and receives.
 
-    `spi`, `ce` and `irq` are handed in, so anything that behaves like a chip can stand below;
-    without `irq` it is polled. One thread may send and one may call `receive`; a lock, held for one
-    try at most, makes each sequence of SPI transfers one whole. While it sends, a node is deaf: for
-    1.9 ms at 250 kbit/s if all goes well, and for twice to four times as long if no node answers.
+    `spi`, `ce` and `irq` are passed in, so anything that behaves like a chip will do; without
+    `irq` it is polled. One thread may send and one may call `receive`; a lock, held for one try at
+    most, makes each sequence of SPI transfers atomic. While it sends, a node is deaf: for 1.9 ms at
+    250 kbit/s if all goes well, and for twice to four times as long without an answer.
 
-    Use it as a context manager, or call `begin` and `close`. Everything but `begin` puts up with
-    a chip that fails: it is set up anew, at most once a second, and until then nothing can be
-    sent.
+    Use it as a context manager, or call `begin` and `close`. Every function except `begin`
+    tolerates a failing chip: it is set up again, at most once a second; until then sends fail.
     """
 
     def __init__(
@@ -79,13 +78,13 @@ class NRF24LowLevelInterface:
         self.close()
 
     def begin(self) -> None:
-        """Set the chip up and listen; RadioError says what is wrong if there is none."""
+        """Set the chip up and listen. Raises RadioError without a working chip."""
         with self._lock:
             self._set_up()
             self._powered = True
 
     def power_down(self) -> None:
-        """Neither send nor receive until `begin`. Nothing happens if the chip is gone."""
+        """Neither send nor receive until `begin`. Ignores a missing chip."""
         with self._lock:
             self._powered = self._working = False
             try:
@@ -94,7 +93,7 @@ class NRF24LowLevelInterface:
                 logger.debug("node %d: power down: %s", self.node_id, error)
 
     def close(self) -> None:
-        """Power the chip down, and give pins and SPI back."""
+        """Power the chip down and release pins and SPI."""
         self.power_down()
         self._ce.close()
         if self._irq is not None:
@@ -107,7 +106,7 @@ class NRF24LowLevelInterface:
 
     @property
     def working(self) -> bool:
-        """Whether the chip answered, and held its settings, when it was needed last."""
+        """Whether the chip answered and held its settings when it was last used."""
         return self._working
 
     def send(self, node_id: int, payload: bytes) -> bool:
@@ -166,7 +165,7 @@ class NRF24LowLevelInterface:
                 self._failed(error)
 
     def broadcast(self, payload: bytes) -> bool:
-        """Send 32 bytes to all that hear them; True if they were sent, whoever heard them."""
+        """Send 32 bytes to every node in range; True if they were sent."""
         _check(payload)
         with self._lock:
             if not self._ready():
@@ -179,7 +178,7 @@ class NRF24LowLevelInterface:
             return True
 
     def receive(self, timeout_s: float) -> list[Received]:
-        """What has arrived, oldest first; waits so long for the first. For one thread."""
+        """Received payloads, oldest first; waits up to `timeout_s` for one. For one thread."""
         until_s = self._runtime.now_s() + timeout_s
         inbox = self._chip.inbox
         while True:
@@ -196,7 +195,7 @@ class NRF24LowLevelInterface:
                 self._irq_watch.woken(self._irq.wait_low(left_s))
 
     def _pause(self, duration_s: float) -> None:
-        """Wait, and keep taking what arrives."""
+        """Wait, and keep receiving."""
         until_s = self._runtime.now_s() + duration_s
         while True:
             left_s = until_s - self._runtime.now_s()
@@ -207,7 +206,7 @@ class NRF24LowLevelInterface:
                 self._look()
 
     def _look(self) -> None:
-        """Take what is in the FIFO, and see now and then that the chip still holds its settings."""
+        """Empty the FIFO, and check periodically that the chip still holds its settings."""
         if not self._powered or (not self._working and not self._ready()):
             return
         chip = self._chip
@@ -233,7 +232,7 @@ class NRF24LowLevelInterface:
         self._next_verify_s = self._runtime.now_s() + VERIFY_PERIOD_S
 
     def _ready(self) -> bool:
-        """Whether the chip can be used; one that lost its settings is set up anew."""
+        """Whether the chip can be used; sets it up again if it lost its settings."""
         if not self._powered:
             return False
         if self._working:
@@ -251,11 +250,11 @@ class NRF24LowLevelInterface:
         except RadioError as error:
             self._failed(error)
             return False
-        logger.warning("node %d: the radio was set up anew, and works", self.node_id)
+        logger.warning("node %d: the radio works again", self.node_id)
         return True
 
     def _failed(self, error: RadioError) -> None:
-        """Note that the chip must be set up anew before it is used."""
+        """Note that the chip must be set up again before use."""
         if self._working:
             self._statistics.restarts += 1
             logger.warning("node %d: %s", self.node_id, error)
@@ -265,4 +264,4 @@ class NRF24LowLevelInterface:
 
 def _check(payload: bytes) -> None:
     if len(payload) != PAYLOAD_BYTES:
-        raise ValueError(f"a payload has {PAYLOAD_BYTES} bytes, this one {len(payload)}")
+        raise ValueError(f"invalid payload of {len(payload)} bytes: must have {PAYLOAD_BYTES}")

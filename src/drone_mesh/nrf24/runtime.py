@@ -1,4 +1,4 @@
-"""Time and threads as the driver sees them, so that it runs unchanged under emulated time."""
+"""Time and threads of the driver, replaceable so that it runs under emulated time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Callable, ContextManager
 
 
 class Task(abc.ABC):
-    """Something that runs beside its creator."""
+    """A task that runs beside its creator."""
 
     @abc.abstractmethod
     def join(self) -> None:
@@ -32,7 +32,7 @@ class Signal(abc.ABC):
 
 
 class Runtime(abc.ABC):
-    """What the driver needs to wait, and to be used by several threads."""
+    """The time, locks and tasks that the driver uses."""
 
     @abc.abstractmethod
     def now_s(self) -> float:
@@ -40,7 +40,7 @@ class Runtime(abc.ABC):
 
     @abc.abstractmethod
     def sleep(self, duration_s: float) -> None:
-        """Let that much time pass, at least."""
+        """Wait for at least this time."""
 
     @abc.abstractmethod
     def lock(self) -> ContextManager[object]:
@@ -52,7 +52,7 @@ class Runtime(abc.ABC):
 
     @abc.abstractmethod
     def start(self, run: Callable[[], None], name: str) -> Task:
-        """Run something beside the caller."""
+        """Run `run` beside the caller."""
 
 
 class _ThreadTask(Task):

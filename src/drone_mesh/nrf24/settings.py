@@ -1,4 +1,4 @@
-"""How the radios of a mesh are set: the same for all of them, or they do not hear each other."""
+"""Settings of the radios of a mesh; all radios need the same ones."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ class TxPower(enum.Enum):
 class BroadcastMode(enum.Enum):
     """How a broadcast is sent."""
 
-    NO_ACK = "no_ack"  # an ordinary frame that asks for no acknowledgement
-    SHOCKBURST = "shockburst"  # a plain frame: clones and chips without "+" understand it, too
+    NO_ACK = "no_ack"  # an ordinary frame that requests no acknowledgement
+    SHOCKBURST = "shockburst"  # a plain frame, which clones and chips without "+" understand
 
 
 @dataclass(frozen=True)

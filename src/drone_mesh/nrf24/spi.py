@@ -13,14 +13,14 @@ class SpiDevice(Protocol):
     """The part of spidev.SpiDev that the driver uses."""
 
     def xfer2(self, data: Sequence[int]) -> list[int]:
-        """Clock out `data` with CSN low all the time; return what came in."""
+        """Clock out `data` with CSN low throughout; return the bytes received."""
 
     def close(self) -> None:
-        """Give the device back."""
+        """Release the device."""
 
 
 def open_spi(bus: int = 0, device: int = 0) -> SpiDevice:
-    """Open /dev/spidev<bus>.<device>; HardwareUnavailable says what is missing and what to do."""
+    """Open /dev/spidev<bus>.<device>; HardwareUnavailable names what is missing and the remedy."""
     path = f"/dev/spidev{bus}.{device}"
     try:
         import spidev

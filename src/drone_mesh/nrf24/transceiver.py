@@ -1,4 +1,4 @@
-"""The sequences of SPI transfers that the driver is made of; no threads, no second tries."""
+"""The SPI sequences of the driver, without threads and without further tries."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Received(NamedTuple):
 
 
 class Transceiver:
-    """One chip. Everything raises RadioError when it does not answer as it should.
+    """One chip. Every function raises RadioError when the chip does not answer as expected.
 
     Belongs to the thread that holds the driver's lock, except that `inbox` may be emptied by
     another one.
@@ -80,7 +80,7 @@ class Transceiver:
         self._last_sent: dict[bytes, tuple[int, bytes]] = {}  # address -> PID and payload
 
     def set_up(self) -> None:
-        """Write every register that matters, for nothing but power resets the chip; then listen."""
+        """Write every register that matters, since only power resets the chip; then listen."""
         settings = self._settings
         self._ce.value = False
         self._retries = (settings.retransmit_delay, settings.retransmits)
@@ -101,24 +101,24 @@ class Transceiver:
         self._link.write_byte(Register.CONFIG, self._settings.config_power_down)
 
     def disable(self) -> None:
-        """CE low: whatever is wrong with the chip, it shall not be on the air."""
+        """CE low, so that a failing chip does not send."""
         self._ce.value = False
 
     def check_config(self) -> None:
-        """RadioError unless the chip listens; one whose supply failed is in power down."""
+        """Raise RadioError unless the chip listens; after a supply failure it is in power down."""
         config = self._link.read_byte(Register.CONFIG)
         if config != self._settings.config_listening:
             raise RadioError(f"CONFIG reads 0x{config:02X}: was the supply interrupted?")
 
     def check_registers(self) -> None:
-        """RadioError unless all registers hold what they were set to."""
+        """Raise RadioError unless all registers hold their settings."""
         self.check_config()
         wrong = self._link.first_difference(self._registers)
         if wrong is not None:
-            raise RadioError(f"{wrong[0].name} has changed by itself to {wrong[1].hex()}")
+            raise RadioError(f"{wrong[0].name} changed unexpectedly to {wrong[1].hex()}")
 
     def listen(self) -> None:
-        """Receive on the broadcast pipe and the own one; pipe 0 is closed."""
+        """Receive on the broadcast pipe and the node's own; pipe 0 is closed."""
         self._ce.value = False
         self.set_retries(self._settings.retransmit_delay, self._settings.retransmits)
         self._link.write_byte(Register.EN_RXADDR, self._settings.listening_pipes)
@@ -126,7 +126,7 @@ class Transceiver:
         self._raise_ce()
 
     def become_transmitter(self, address: bytes) -> None:
-        """Standby, with pipe 0 open for the answer; what had arrived is taken first."""
+        """Go to standby with pipe 0 open for the answer, after emptying the FIFO."""
         self._ce.value = False
         # An acknowledgement that the chip is sending must not be cut off.
         self._runtime.sleep(TX_DELAY_S[self._settings.data_rate])
@@ -175,7 +175,7 @@ class Transceiver:
         return retransmits
 
     def transmit_to_all(self, payload: bytes) -> None:
-        """Broadcast, and listen again; nobody acknowledges."""
+        """Broadcast without acknowledgement, and listen again."""
         settings = self._settings
         plain = settings.broadcast_mode is BroadcastMode.SHOCKBURST
         self.become_transmitter(settings.broadcast_address)
@@ -241,7 +241,7 @@ class Transceiver:
         self._runtime.sleep(CE_TO_CSN_S)
 
     def _pulse(self, expected_s: float) -> int:
-        """Have the payload sent; TX_DS or MAX_RT. RadioError if the chip says neither in time."""
+        """Send the payload; returns TX_DS or MAX_RT. RadioError if neither comes in time."""
         self._ce.value = True
         self._runtime.sleep(CE_PULSE_S)
         self._ce.value = False
@@ -253,6 +253,6 @@ class Transceiver:
             if flags:
                 return flags
             if self._runtime.now_s() > deadline_s:
-                raise RadioError("the chip said neither sent nor failed within 95 ms")
+                raise RadioError("the chip reported neither success nor failure within 95 ms")
             # The next attempt of the chip cannot be over any sooner.
             self._runtime.sleep(ard_s(self._retries[0]))

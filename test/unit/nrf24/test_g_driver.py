@@ -225,7 +225,7 @@ def test_closing_powers_the_chip_down(lab):
 
 def test_a_payload_of_another_length_is_refused(lab):
     driver = lab.driver(5)
-    with pytest.raises(ValueError, match="32 bytes, this one 31"):
+    with pytest.raises(ValueError, match="payload of 31 bytes: must have 32"):
         driver.send(10, bytes(31))
 
 

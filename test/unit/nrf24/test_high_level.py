@@ -183,5 +183,5 @@ def test_a_radio_that_is_missing_stops_the_start_with_a_reason():
 
 def test_a_radio_for_another_node_is_refused():
     node = Node(Lab(), 1, 0.0)
-    with pytest.raises(ConfigurationError, match="node 1, but the mesh is node 2"):
+    with pytest.raises(ConfigurationError, match="node 1, but the mesh component is node 2"):
         node.antenna.start_antenna(Mesh(2))

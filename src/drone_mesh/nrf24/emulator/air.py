@@ -1,7 +1,7 @@
 """The air: frames on their way from one chip to the others.
 
-A frame is heard by chips that listened on its channel and at its rate since before it began,
-until it ended. Two frames that overlap on one channel destroy each other at a receiver, unless
+A frame is received by chips that listened on its channel and rate from before its start to its
+end. Two frames that overlap on one channel destroy each other at a receiver, unless
 one is stronger by the capture ratio. Neighbouring channels do not disturb each other, and the
 speed of light is infinite.
 """
@@ -70,7 +70,7 @@ FlightObserver = Callable[[Flight], None]
 
 
 class Air:
-    """One shared medium. Its state belongs to whoever has access to the clock."""
+    """One shared medium. Its state belongs to the holder of the clock's access."""
 
     def __init__(self, clock: EmulatorClock, links: LinkModel, rng: random.Random) -> None:
         self.clock = clock
@@ -81,19 +81,19 @@ class Air:
         self._distances: dict[tuple[Antenna, Antenna], float] = {}
         self._observers: list[FlightObserver] = []
         self.frames = 0  # that have been on the air
-        self.collisions = 0  # frames that a receiver would have heard, had there not been another
+        self.collisions = 0  # frames that a receiver lost because of another frame
 
     def observe(self, observer: FlightObserver) -> None:
-        """Have it called with each frame when that has ended."""
+        """Call `observer` with each frame at its end."""
         self._observers.append(observer)
 
     def replace_links(self, links: LinkModel) -> None:
-        """Have another model of the space from now on."""
+        """Use another link model from now on."""
         with self.clock.access():
             self._links = links
 
     def moved(self) -> None:
-        """An antenna has another place now."""
+        """An antenna has moved."""
         self._distances.clear()
 
     def listen(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:
@@ -102,7 +102,7 @@ class Air:
         self._listening.setdefault((channel, bits_per_s), {})[antenna] = None
 
     def stop_listening(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:
-        """It hears nothing more, nor the frame that is on the air now."""
+        """The antenna hears no more frames, nor the one on the air now."""
         antenna.listening_since_ns = None
         self._listening[channel, bits_per_s].pop(antenna, None)
 
@@ -123,7 +123,7 @@ class Air:
         return flight
 
     def abort(self, flight: Flight) -> None:
-        """The sender lost its power in mid-frame: nobody can make sense of what was sent."""
+        """The sender lost its power in mid-frame: no receiver can decode it."""
         flight.aborted = True
         flight.end_ns = self.clock.now_ns
         self._on_channel[flight.channel].remove(flight)

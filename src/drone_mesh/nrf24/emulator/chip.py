@@ -1,7 +1,8 @@
 """An nRF24L01+ in software: power states, CE and IRQ, and what its two engines share.
 
-The transmitter (PTX) and the receiver (PRX) are modules of their own, the SPI commands too. Whoever
-has access to the clock may touch the chip. Misuse is never refused, only remembered in `warnings`.
+The transmitter (PTX), the receiver (PRX) and the SPI commands have modules of their own. Only the
+holder of the clock's access may touch the chip. Misuse is never refused, only recorded in
+`warnings`.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class EmulatedChip:
         self._listening_to = (0, 0)  # channel and rate
         self.flight: Flight | None = None  # the own frame that is on the air
         self._ce_rose_ns = -SETTLING_NS
-        self._epoch = 0  # timers of an earlier one have been overtaken by events
+        self._epoch = 0  # timers of an earlier epoch are void
         self._rpd_latched = False
         self.ce = EmulatedCe(self.clock, self._ce_changed)
         self.irq = EmulatedIrq(self.clock)
@@ -89,7 +90,7 @@ class EmulatedChip:
             self.update_irq()
 
     def warn(self, text: str) -> None:
-        """Remember a misuse, once."""
+        """Record a misuse, once."""
         if text not in self._warned:
             self._warned.add(text)
             self.warnings.append(text)
@@ -135,7 +136,7 @@ class EmulatedChip:
     # -- timers and states ---------------------------------------------------------------------
 
     def after(self, delay_ns: int, step: Callable[[], None]) -> None:
-        """Have the next step of what is under way done then, unless something overtakes it."""
+        """Schedule the next step of the current activity, unless it is overtaken."""
         self.clock.call_at(self.clock.now_ns + delay_ns, self._step, self._epoch, step)
 
     def _step(self, epoch: int, step: Callable[[], None]) -> None:
@@ -143,11 +144,11 @@ class EmulatedChip:
             step()
 
     def overtake(self) -> None:
-        """Whatever was waited for no longer matters."""
+        """Void all pending steps."""
         self._epoch += 1
 
     def settle(self) -> None:
-        """Begin what CONFIG and CE ask for, now that nothing is under way."""
+        """Start what CONFIG and CE request, now that the chip is idle."""
         self.overtake()
         self.stop_listening()
         if self.registers.receiver:
@@ -226,7 +227,7 @@ class EmulatedChip:
             self.air.stop_listening(self, *self._listening_to)
 
     def retune(self) -> None:
-        """Channel or rate were changed: what is on the air now is not heard to its end."""
+        """Channel or rate changed: frames on the air now are lost."""
         if self.listening_since_ns is not None:
             self.stop_listening()
             self.listen(self.state)

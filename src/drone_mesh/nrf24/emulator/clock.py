@@ -1,7 +1,7 @@
-"""The two clocks an emulated air can live by: virtual time and the time of the wall.
+"""The two clocks of an emulated air: virtual time and wall time.
 
 Events of the air (a frame ends, a chip has settled) happen at exact integer nanoseconds in both.
-Under the virtual clock nothing takes time except what says so: an SPI transfer, a sleep, a wait.
+Under the virtual clock only SPI transfers, sleeps and waits take time.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ class EmulatorClock(abc.ABC):
     @property
     @abc.abstractmethod
     def runtime(self) -> Runtime:
-        """What drivers on this air take time and threads from."""
+        """The source of time and threads for drivers on this air."""
 
     @abc.abstractmethod
     def call_at(self, time_ns: int, event: Callable[..., None], *arguments: object) -> None:
-        """Have `event` called at that time. Events of one time run in the order of the calls."""
+        """Call `event` at that time. Events of the same time run in the order of these calls."""
 
     @abc.abstractmethod
     def access(self) -> ContextManager[object]:
-        """Held while something from outside touches a chip: nothing else happens meanwhile."""
+        """Held while code outside the air touches a chip; no event runs meanwhile."""
 
     @abc.abstractmethod
     def elapse(self, duration_ns: int) -> None:

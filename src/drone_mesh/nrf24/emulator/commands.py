@@ -33,7 +33,7 @@ _ACTIVE = SENDING | ANSWERING | {State.RX_SETTLING, State.RX}
 
 
 class CommandDecoder:
-    """Carries out what came over SPI, when CSN rises."""
+    """Executes an SPI command when CSN rises."""
 
     def __init__(self, chip: EmulatedChip) -> None:
         self._chip = chip
@@ -136,7 +136,7 @@ class CommandDecoder:
         chip = self._chip
         register = _REGISTERS.get(address)
         if register is None or not data:
-            chip.warn(f"a write to register 0x{address:02X}, which does not exist or is for tests")
+            chip.warn(f"a write to register 0x{address:02X}, which does not exist or is reserved")
             return
         if register is Register.STATUS:
             chip.clear_flags(data[0] & STATUS_FLAGS)

@@ -10,18 +10,18 @@ from drone_mesh.nrf24.registers import FIFO_DEPTH
 
 @dataclass(eq=False)
 class Outgoing:
-    """A payload in the TX FIFO; the object itself is what tells one packet from the next."""
+    """A payload in the TX FIFO; packets are distinguished by the object itself."""
 
     payload: bytes
     pid: int = 0
     no_ack: bool = False
     ack_pipe: int | None = None  # rides on an acknowledgement of that pipe
-    was_sent: bool = False  # an ack payload that was on the air, perhaps in vain
+    was_sent: bool = False  # an ack payload that was sent, perhaps without success
     _frame: Frame | None = None
     _made_for: object = None
 
     def frame(self, address: bytes, form: FrameFormat, no_ack_bit: int) -> Frame:
-        """Its frame, made anew only when something about it changed since the last attempt."""
+        """Its frame, encoded again only if something has changed since the last attempt."""
         key = (address, form, self.pid, no_ack_bit)
         if self._frame is None or self._made_for != key:
             self._frame = Frame.encode(address, self.payload, form, self.pid, no_ack_bit)
@@ -58,7 +58,7 @@ class RxFifo:
         return self._payloads[0] if self._payloads else None
 
     def push(self, incoming: Incoming) -> None:
-        """The caller has looked whether it is full."""
+        """The caller must check that it is not full."""
         self._payloads.append(incoming)
 
     def flush(self) -> None:

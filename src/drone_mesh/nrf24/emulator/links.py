@@ -31,11 +31,11 @@ class Hop(NamedTuple):
 
 
 class LinkModel(abc.ABC):
-    """What the space between two antennas does to frames."""
+    """The effect of the space between two antennas on frames."""
 
     @abc.abstractmethod
     def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
-        """Power at the receiver; decides who survives when frames overlap, and RPD."""
+        """Power at the receiver; decides which of overlapping frames survives, and RPD."""
 
     @abc.abstractmethod
     def bit_errors(self, hop: Hop) -> int | None:
@@ -54,7 +54,7 @@ def free_space_dbm(distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
 
 
 class IdealDisc(LinkModel):
-    """Everything arrives within a range, nothing beyond."""
+    """All frames arrive within a range, none beyond."""
 
     def __init__(self, range_m: float = math.inf) -> None:
         self._range_m = range_m
@@ -124,7 +124,7 @@ class LogDistance(LinkModel):
 
 
 class ScriptedLoss(LinkModel):
-    """Another model, but some frames get lost by decision: for tests and for what-ifs."""
+    """Another model, with some frames lost on demand, for tests and experiments."""
 
     def __init__(self, model: LinkModel, loses: Callable[[Hop], bool]) -> None:
         self._model = model
@@ -167,7 +167,7 @@ class LossCurve(LinkModel):
 
     @property
     def range_m(self) -> float:
-        """Nothing arrives beyond."""
+        """The range; no frame arrives beyond."""
         return self._points[-1][0] / self._scale
 
     def loss(self, distance_m: float) -> float | None:

@@ -1,6 +1,6 @@
 """Just enough of pcapng to write packets with comments (IETF draft-ietf-opsawg-pcapng).
 
-Written here because it is 40 lines; the libraries for it mainly read.
+Our own because it is short and the libraries mainly read (docs/decisions/own-code.md).
 """
 
 from __future__ import annotations

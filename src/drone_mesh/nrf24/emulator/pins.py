@@ -28,11 +28,11 @@ class EmulatedCe:
                 self._changed(self._value)
 
     def switch_to_output(self, value: bool = False) -> None:
-        """CircuitPython's way to begin."""
+        """Called by CircuitPython drivers at the start."""
         self.value = value
 
     def close(self) -> None:
-        """Nothing to give back; the level stays as it is."""
+        """Nothing to release; the level stays."""
 
 
 class EmulatedIrq:
@@ -50,7 +50,7 @@ class EmulatedIrq:
         return self._value
 
     def wait_low(self, timeout_s: float) -> bool:
-        """Wait until the pin is low; False if it is still high when the time is over."""
+        """Wait until the pin is low; False if it is still high after the time-out."""
         return self._signal.wait_for(lambda: not self._value, timeout_s)
 
     def set(self, high: bool) -> None:
@@ -62,4 +62,4 @@ class EmulatedIrq:
                 self._signal.notify()
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""

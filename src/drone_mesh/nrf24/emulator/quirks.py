@@ -1,4 +1,4 @@
-"""What differs between chips, and what can be wrong with one."""
+"""Variants and faults of chips."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_mesh.nrf24.airtime import POWER_UP_NS
 class ChipVariant:
     """Properties of a piece of silicon. The defaults are those of a genuine nRF24L01+.
 
-    Where no source settles how the chip behaves, there is a switch here, too.
+    Where no source settles a behaviour, there is a switch.
     """
 
     plus: bool = True  # False: FEATURE and DYNPD must be unlocked by ACTIVATE 0x73
@@ -23,7 +23,7 @@ class ChipVariant:
 
 @dataclass
 class Faults:
-    """What is wrong now; may be changed at any time."""
+    """The present faults; may be changed at any time."""
 
     miso_stuck_at: int | None = None  # 0x00 or 0xFF: nothing answers, or nothing is connected
     irq_stuck_at: bool | None = None  # level of the pin

@@ -28,7 +28,7 @@ class Receiver:
         self._chip.listen(State.RX)
 
     def frame_arrived(self, frame: Frame) -> bool:
-        """A frame with the address of an open pipe; True if it was good for that pipe."""
+        """A frame with the address of an open pipe; True if it was valid there."""
         chip, registers = self._chip, self._chip.registers
         pipe = registers.pipe_of_address[frame.address(registers.address_bytes)]
         form = registers.formats[pipe]

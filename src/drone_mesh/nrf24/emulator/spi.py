@@ -17,10 +17,10 @@ class SpiTarget(Protocol):
         """CSN falls; the STATUS that goes out as the first byte."""
 
     def chip_deselected(self, mosi: bytes) -> bytes:
-        """CSN rises, the command takes effect; what went out after STATUS."""
+        """CSN rises and the command takes effect; returns the bytes after STATUS."""
 
     def warn(self, text: str) -> None:
-        """The host did something that the datasheet forbids."""
+        """The host violated the datasheet."""
 
 
 class EmulatedSpiDev:
@@ -36,13 +36,13 @@ class EmulatedSpiDev:
         self.transfers = 0
 
     def open(self, bus: int, device: int) -> None:
-        """There is but one chip behind this device, wherever it is said to be."""
+        """Any bus and device lead to the one chip behind this object."""
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""
 
     def xfer2(self, data: Sequence[int], speed_hz: int = 0) -> list[int]:
-        """Clock out `data`, and return what came in meanwhile: STATUS, then the answer."""
+        """Clock out `data` and return the bytes received: STATUS, then the answer."""
         clock, target = self._clock, self._target
         speed_hz = speed_hz or self.max_speed_hz
         with clock.access():

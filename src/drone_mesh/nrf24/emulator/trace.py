@@ -22,7 +22,7 @@ class TracedFrame(NamedTuple):
     bits_per_s: int
     is_answer: bool  # an acknowledgement
     is_aborted: bool
-    listeners: tuple[str, ...]  # who listened on the channel when it began
+    listeners: tuple[str, ...]  # the chips that listened on the channel when it began
     frame: Frame
 
     def __str__(self) -> str:

@@ -13,7 +13,7 @@ from drone_mesh.nrf24.registers import MAX_RT, RX_DR, TX_DS
 if TYPE_CHECKING:
     from drone_mesh.nrf24.emulator.chip import EmulatedChip
 
-_COUNTER_MAX = 15  # PLOS_CNT stops there
+_COUNTER_MAX = 15  # PLOS_CNT saturates there
 _LONGEST_TX_NS = 4_000_000  # [DS 6.1.5]
 _ANSWER_WINDOW_NS = {250_000: 500_000, 1_000_000: 250_000, 2_000_000: 250_000}  # [DS 7.4.2]
 
@@ -90,7 +90,7 @@ class Transmitter:
         chip.transmit(packet.frame(registers.tx_address, form, no_ack_bit), packet)
 
     def frame_left(self) -> None:
-        """The frame has ended; what next depends on whether an answer is wanted."""
+        """The frame has ended; wait for the acknowledgement if one is expected."""
         chip, packet = self._chip, self._current
         if packet is None or packet is not chip.tx_fifo.oldest:
             chip.settle()
@@ -133,14 +133,14 @@ class Transmitter:
             chip.after(SETTLING_NS, self._send_frame)
         else:
             self.packets_lost = min(self.packets_lost + 1, _COUNTER_MAX)
-            # Back in standby whatever CE says; another rise of CE is needed to go on.
+            # Back in standby whatever the level of CE; continuing needs another rise of CE.
             chip.state = State.STANDBY_I
             chip.set_flags(MAX_RT.mask)
             if chip.registers.receiver:
                 chip.settle()
 
     def answer_arrived(self, frame: Frame) -> bool:
-        """A frame with the address of pipe 0, while one waits for it; True if it was good."""
+        """A frame with the address of pipe 0, while waiting for it; True if it was valid."""
         chip = self._chip
         answer = frame.decode(chip.registers.ack_formats[0])
         if answer is None:

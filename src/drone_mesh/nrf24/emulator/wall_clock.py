@@ -1,7 +1,7 @@
-"""An air in the time of the wall: for trying things out, and for a simulation that people watch.
+"""An air on the wall clock: for interactive use and for simulations in real time.
 
-One thread works off the events when their time has come. Whoever touches a chip first works off
-what is overdue, so that a chip never answers from the past. Events carry the time for which they
+One thread processes events at their time. Every access to a chip first processes overdue events,
+so that a chip never answers from the past. Events carry the time for which they
 were meant: chips acknowledge and repeat in time, however late the machine is.
 
 The lock guards the air, its chips and the queue; every access and every event holds it.
@@ -35,7 +35,7 @@ class WallClock(EmulatorClock):
         self._earlier = threading.Condition(self._lock)
         self._closed = False
         self._runtime = SystemRuntime()
-        self.latest_ns = 0  # the most that an event was ever late: how well the machine keeps up
+        self.latest_ns = 0  # the longest delay of an event so far
         self._thread = threading.Thread(target=self._run, name="emulated air", daemon=True)
         self._thread.start()
 
@@ -68,7 +68,7 @@ class WallClock(EmulatorClock):
             yield
 
     def elapse(self, duration_ns: int) -> None:
-        """An emulated transfer takes the time it takes: the host is slower than SPI anyway."""
+        """No extra delay: the host is slower than SPI anyway."""
 
     def signal(self) -> Signal:
         return ThreadSignal()
