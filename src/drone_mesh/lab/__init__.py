@@ -1,0 +1,1 @@
+"""The tester's lab: an experiment is one file, a thousand seeded runs, one report. No ROS."""

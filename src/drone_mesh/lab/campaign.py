@@ -1,0 +1,133 @@
+"""Runs what an experiment still lacks, until it is complete."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from pathlib import Path
+from typing import Sequence, TextIO
+
+from drone_mesh.lab.engine import run_all
+from drone_mesh.lab.experiment import LoadedExperiment
+from drone_mesh.lab.plan import Plan, PlannedRun
+from drone_mesh.lab.progress import Progress
+from drone_mesh.lab.provenance import describe_session
+from drone_mesh.lab.store import Store, read_rows
+
+
+class Campaign:
+    """One experiment and its results folder."""
+
+    def __init__(self, loaded: LoadedExperiment, folder: Path, command: Sequence[str]) -> None:
+        """`command`: how this was called, for provenance and for going on later."""
+        self.loaded = loaded
+        self.folder = folder
+        self._command = list(command)
+        self.failures = 0  # of the runs of this session
+        self.completed = 0
+
+    def run(
+        self,
+        workers: int,
+        cluster: str | None,
+        shard: tuple[int, int] | None = None,
+        retry_failed: bool = False,
+        stream: TextIO = sys.stderr,
+    ) -> None:
+        """Run what is missing; add seeds where the experiment says so.
+
+        Raises StoreError or EngineError; what had been done until then is kept, and in order.
+        """
+        plan = Plan(self.loaded)
+        store = Store(self.folder, plan)
+        try:
+            if retry_failed:
+                store.forget_failures()
+            name = cluster or ("in this process" if workers == 0 else f"{workers} local")
+            store.describe(
+                describe_session(
+                    self._command, self.loaded.overrides, self.loaded.digest, name
+                )
+            )
+            while True:
+                self._run_plan(plan, store, workers, cluster, shard, stream)
+                more = self._more_seeds(plan, store)
+                if more is None:
+                    break
+                plan = Plan(self.loaded, more)
+                store.use(plan)
+        finally:
+            store.put_in_order()
+            store.close()
+
+    def _run_plan(
+        self,
+        plan: Plan,
+        store: Store,
+        workers: int,
+        cluster: str | None,
+        shard: tuple[int, int] | None,
+        stream: TextIO,
+    ) -> None:
+        missing = [
+            planned
+            for place, planned in enumerate(plan)
+            if planned.spec.run not in store.done and planned.spec.run not in store.failed
+            if shard is None or place % shard[1] == shard[0]
+        ]
+        if not missing:
+            return
+        planned_of: dict[str, PlannedRun] = {planned.spec.run: planned for planned in missing}
+        progress = Progress(len(planned_of), stream)
+        outcomes = run_all(
+            (planned.spec for planned in planned_of.values()),
+            min(workers, len(planned_of)),
+            cluster,
+        )
+        try:
+            for outcome in outcomes:
+                planned = planned_of[outcome.spec.run]
+                label = plan.cells[planned.cell].label
+                store.add(outcome, label, self.show_command(outcome.spec.run))
+                progress.count(bool(outcome.failure))
+                self.completed += 1
+                self.failures += bool(outcome.failure)
+        finally:
+            outcomes.close()  # type: ignore[attr-defined]
+            progress.close()
+
+    def show_command(self, run: str) -> str:
+        """The command that repeats one run."""
+        return f"python3 -m drone_mesh.lab show {shlex.quote(str(self.folder))} {run}"
+
+    def _more_seeds(self, plan: Plan, store: Store) -> int | None:
+        """How many seeds each cell shall have next; None: enough."""
+        stop = self.loaded.experiment.stop
+        if stop is None or plan.seeds >= stop.max_seeds:
+            return None
+        cell_of = {planned.spec.run: planned.cell for planned in plan}
+        values: dict[int, list[float]] = {cell: [] for cell in range(len(plan.cells))}
+        column = stop.metric.rpartition(":")[2]
+        for row in read_rows(store.runs.path):
+            if row["run"] in cell_of and row[column]:
+                values[cell_of[row["run"]]].append(float(row[column]))
+        for found in values.values():
+            if not _is_narrow(found, stop.half_width, stop.relative_half_width):
+                return min(stop.max_seeds, plan.seeds + self.loaded.experiment.seeds)
+        return None
+
+
+def _is_narrow(
+    values: Sequence[float], half_width: float | None, relative_half_width: float | None
+) -> bool:
+    """Whether the normal 95 % interval of the mean is narrow enough."""
+    if len(values) < 2:
+        return False
+    mean = sum(values) / len(values)
+    variance = sum((value - mean) ** 2 for value in values) / (len(values) - 1)
+    half = 1.96 * math.sqrt(variance / len(values))
+    if half_width is not None:
+        return half <= half_width
+    assert relative_half_width is not None
+    return half <= relative_half_width * abs(mean)

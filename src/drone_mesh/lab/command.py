@@ -1,0 +1,241 @@
+"""The command line of the lab."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import Callable, Sequence
+
+from drone_mesh.errors import MeshError
+from drone_mesh.lab.campaign import Campaign
+from drone_mesh.lab.estimate import estimate
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.merge import merge
+from drone_mesh.lab.plan import Plan
+from drone_mesh.lab.progress import as_duration
+from drone_mesh.lab.status import describe_folder
+from drone_mesh.lab.template import write_template
+
+PROGRAM = "lab"
+CELLS_SHOWN = 30  # by `lab plan`
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Returns the exit status: 0 done, 1 some runs failed or an error, 2 usage, 130 Ctrl-C."""
+    given = list(sys.argv[1:] if argv is None else argv)
+    parser = _parser()
+    options, after_options = parser.parse_known_args(given)
+    if after_options:  # overrides behind an option: argparse takes those before it only
+        if not hasattr(options, "overrides") or any(w.startswith("-") for w in after_options):
+            parser.error(f"unrecognized arguments: {' '.join(after_options)}")
+        options.overrides += after_options
+    options.command_line = given
+    run: Callable[[argparse.Namespace], int] = options.run
+    try:
+        return run(options)
+    except MeshError as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # `lab plan | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description="Experiments with the mesh: one file describes thousands of seeded runs, one "
+        "command runs them on all cores or a cluster, one report shows what came of them.",
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    new = commands.add_parser("new", help="write a commented experiment to start from")
+    new.add_argument("name", help="of the experiment and its file")
+    new.set_defaults(run=_new)
+
+    plan = commands.add_parser("plan", help="show cells, runs and estimated time; store nothing")
+    _add_experiment(plan)
+    plan.add_argument("--no-estimate", action="store_true", help="skip the trial runs")
+    _add_workers(plan)
+    plan.set_defaults(run=_plan)
+
+    run = commands.add_parser("run", help="run what is missing in the results folder")
+    _add_experiment(run)
+    _add_workers(run)
+    run.add_argument(
+        "--cluster", metavar="ADDRESS", help="a dask scheduler (tcp://host:8786), or slurm"
+    )
+    run.add_argument("--shard", type=_shard, metavar="I/N", help="each N-th run, from the I-th on")
+    run.add_argument("--out", type=Path, help="results folder (default: results/NAME)")
+    run.add_argument("--retry-failed", action="store_true", help="run failed runs again")
+    run.set_defaults(run=_run)
+
+    status = commands.add_parser("status", help="show how far a results folder is")
+    status.add_argument("results", type=Path)
+    status.set_defaults(run=_status)
+
+    merging = commands.add_parser("merge", help="put shards together")
+    merging.add_argument("into", type=Path, help="results folder to make or to extend")
+    merging.add_argument("shards", type=Path, nargs="+", help="results folders of the shards")
+    merging.set_defaults(run=_merge)
+
+    _add_analysis(commands)
+    return parser
+
+
+def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    report = commands.add_parser("report", help="write tables and figures as one HTML file")
+    report.add_argument("results", type=Path)
+    report.add_argument("--out", type=Path, help="the page (default: RESULTS/report.html)")
+    report.add_argument(
+        "--export", metavar="FORMAT", action="append", default=[],
+        choices=("png", "pdf", "svg", "csv", "latex"),
+        help="also write each figure or table as a file: png, pdf, svg, csv or latex; repeatable",
+    )  # fmt: skip
+    report.set_defaults(run=_report)
+
+    show = commands.add_parser("show", help="repeat one run, with all its events")
+    show.add_argument("results", type=Path)
+    show.add_argument("run_id", metavar="RUN", help="its id, or the beginning of it")
+    show.add_argument("--page", type=Path, metavar="FILE", help="write a report page about it")
+    show.add_argument("--console", action="store_true", help="serve it with a time line")
+    show.add_argument("--port", type=int, default=9081, help="of --console (default 9081)")
+    show.add_argument("--rviz", action="store_true", help="publish it for rviz; needs ROS")
+    show.set_defaults(run=_show)
+
+    compare = commands.add_parser("compare", help="paired difference of two cells, per seed")
+    compare.add_argument("results", type=Path)
+    compare.add_argument("a", metavar="A", help="a cell: axis=value[,axis=value...]")
+    compare.add_argument("b", metavar="B", help="the other cell")
+    compare.add_argument("--metric", action="append", default=[], help="default: the experiment's")
+    compare.set_defaults(run=_compare)
+
+    metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
+    metrics.set_defaults(run=_metrics)
+
+
+def _add_experiment(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, help="the experiment")
+    parser.add_argument(
+        "overrides", nargs="*", metavar="a.b=c", help="overrule a value of the file"
+    )
+
+
+def _add_workers(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--workers", type=_count, default=len(os.sched_getaffinity(0)), metavar="N",
+        help="processes; 0: in this one, for a debugger (default: one per core, %(default)s)",
+    )  # fmt: skip
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 0:
+        raise argparse.ArgumentTypeError("must be 0 or more")
+    return number
+
+
+def _shard(text: str) -> tuple[int, int]:
+    part, slash, of = text.partition("/")
+    if not (slash and part.isdigit() and of.isdigit() and 0 <= int(part) < int(of)):
+        raise argparse.ArgumentTypeError(f"expected I/N with 0 <= I < N, not {text}")
+    return int(part), int(of)
+
+
+def _new(options: argparse.Namespace) -> int:
+    path = write_template(options.name)
+    print(f"wrote {path}; next: {PROGRAM} plan {path}")
+    return 0
+
+
+def _plan(options: argparse.Namespace) -> int:
+    loaded = load_experiment(options.file, options.overrides)
+    plan = Plan(loaded)
+    for cell in plan.cells[:CELLS_SHOWN]:
+        print(cell.label or "(one cell)")
+    if len(plan.cells) > CELLS_SHOWN:
+        print(f"... and {len(plan.cells) - CELLS_SHOWN} more")
+    cells = len(plan.cells)
+    print(f"{cells} cell{'s' * (cells != 1)} x {plan.seeds} seeds = {len(plan)} runs")
+    stop = loaded.experiment.stop
+    if stop is not None:
+        print(f"more seeds, up to {stop.max_seeds}, until {stop.metric} is known closely enough")
+    if not options.no_estimate:
+        guess = estimate(plan, max(1, options.workers))
+        print(
+            f"about {as_duration(guess.wall_s)} on {max(1, options.workers)} workers, "
+            f"{guess.run_s * 1000:.0f} ms per run "
+            f"(from {guess.trials} trial runs; nothing was written)"
+        )
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    loaded = load_experiment(options.file, options.overrides)
+    folder = options.out or Path("results") / loaded.experiment.name
+    if options.out is None and options.shard is not None:
+        folder = folder.with_name(f"{folder.name}-shard-{options.shard[0]}-of-{options.shard[1]}")
+    again = f"{PROGRAM} {shlex.join(options.command_line)}"
+    campaign = Campaign(loaded, folder, [PROGRAM, *options.command_line])
+    try:
+        campaign.run(options.workers, options.cluster, options.shard, options.retry_failed)
+    except KeyboardInterrupt:
+        print(f"interrupted; {campaign.completed} runs were added to {folder}", file=sys.stderr)
+        print(f"continue with: {again}", file=sys.stderr)
+        return 130
+    except MeshError as error:
+        raise MeshError(f"{error}\ncontinue with: {again}") from error
+    print(describe_folder(folder))
+    if campaign.failures:
+        print(f"failed runs: {folder / 'failures.csv'} has the command that repeats each of them")
+        return 1
+    return 0
+
+
+def _status(options: argparse.Namespace) -> int:
+    print(describe_folder(options.results))
+    return 0
+
+
+def _merge(options: argparse.Namespace) -> int:
+    count = merge(options.into, options.shards)
+    print(f"{count} runs from {len(options.shards)} shards added")
+    print(describe_folder(options.into))
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    # Here and below: only the analysis needs scipy, matplotlib and jinja2.
+    from drone_mesh.lab.report import write_report
+
+    for path in write_report(options.results, options.out, options.export):
+        print(f"wrote {path}")
+    return 0
+
+
+def _show(options: argparse.Namespace) -> int:
+    from drone_mesh.lab.show import show_run
+
+    return show_run(options)
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from drone_mesh.lab.comparison import print_comparison
+
+    print_comparison(options.results, options.a, options.b, options.metric)
+    return 0
+
+
+def _metrics(_options: argparse.Namespace) -> int:
+    from drone_mesh.lab.metrics import METRICS
+
+    width = max(map(len, METRICS))
+    for name, metric in METRICS.items():
+        print(f"{name:{width}}  {metric.unit:10}  {metric.definition}")
+    return 0

@@ -1,0 +1,141 @@
+"""Runs a batch, in this process or on workers, and yields what came of each run.
+
+The store owns what is done; nothing here remembers anything. dask.distributed moves the work off
+dead workers, from a laptop (LocalCluster) to a laboratory's cluster, with one API.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import statistics
+from collections import deque
+from typing import TYPE_CHECKING, Iterable, Iterator
+
+from drone_mesh.errors import MeshError
+from drone_mesh.lab.plan import RunSpec
+from drone_mesh.lab.worker import Outcome, execute, execute_batch
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+BATCH_S = 0.5  # work that goes to a worker at a time: the scheduler's milliseconds do not count
+LARGEST_BATCH = 64
+TASKS_PER_WORKER = 2  # one at work, one waiting
+DEATHS_ALLOWED = 2  # a run whose worker dies once more is a failure
+SLURM = "slurm"
+
+
+class EngineError(MeshError):
+    """There are no workers to be had, or they are gone. Nothing that was yielded is lost."""
+
+
+def run_all(specs: Iterable[RunSpec], workers: int, cluster: str | None) -> Iterator[Outcome]:
+    """The outcome of each of these runs, in the order in which they end.
+
+    `workers`: 0 is this very process; otherwise so many local processes, or jobs of a SLURM
+    cluster. `cluster`: the address of a dask scheduler, or "slurm". Raises EngineError.
+    """
+    if workers == 0 and cluster is None:
+        for spec in specs:
+            yield execute(spec)
+        return
+    with _client(workers, cluster) as client:
+        yield from _run_on(client, deque(specs))
+
+
+@contextlib.contextmanager
+def _client(workers: int, cluster: str | None) -> Iterator[Client]:
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise EngineError(
+            f"{error}: pip install 'drone_mesh[lab]' has it; --workers 0 works without"
+        ) from error
+    dask.config.set(
+        {
+            "distributed.scheduler.allowed-failures": DEATHS_ALLOWED,
+            "distributed.comm.timeouts.connect": "10s",
+        }
+    )
+    with contextlib.ExitStack() as stack:
+        try:
+            if cluster is None:
+                local = LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=None,
+                    memory_limit=None,
+                    silence_logs=logging.CRITICAL,
+                )
+                address = stack.enter_context(local)
+            elif cluster == SLURM:
+                address = stack.enter_context(_slurm(workers))
+            else:
+                address = cluster
+            client = stack.enter_context(Client(address, set_as_default=False))
+        except (OSError, ValueError, RuntimeError) as error:
+            raise EngineError(f"no dask scheduler at {cluster or 'localhost'}: {error}") from error
+        yield client
+
+
+def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
+    try:
+        from dask_jobqueue import SLURMCluster
+    except ImportError as error:
+        raise EngineError("--cluster slurm needs dask-jobqueue: pip install dask-jobqueue") from error
+    cluster = SLURMCluster()  # configured in ~/.config/dask/jobqueue.yaml
+    cluster.scale(jobs=max(1, workers))
+    return cluster  # type: ignore[no-any-return]
+
+
+def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
+    from distributed import CancelledError, KilledWorker, as_completed
+    from distributed.comm import CommClosedError
+
+    under_way: dict[Future, list[RunSpec]] = {}
+    done = as_completed(loop=client.loop)
+    lengths_s: deque[float] = deque(maxlen=50)
+    alone: deque[RunSpec] = deque()  # of batches whose worker died: now one by one
+
+    def submit() -> None:
+        size = 1
+        if lengths_s:
+            size = int(BATCH_S / max(statistics.mean(lengths_s), 1e-6))
+            size = max(1, min(LARGEST_BATCH, size))
+        while alone or waiting:
+            if len(under_way) >= TASKS_PER_WORKER * max(1, len(client.nthreads())):
+                return
+            source, most = (alone, 1) if alone else (waiting, size)
+            batch = [source.popleft() for _ in range(min(most, len(source)))]
+            future = client.submit(execute_batch, batch, pure=False)
+            under_way[future] = batch
+            done.add(future)
+
+    submit()
+    try:
+        for future in done:
+            batch = under_way.pop(future)
+            try:
+                outcomes = future.result()
+            except KilledWorker as error:
+                outcomes = []
+                if len(batch) > 1:
+                    alone.extend(batch)
+                else:
+                    outcomes = [_died(batch[0], str(error))]
+            except (CancelledError, CommClosedError) as error:
+                raise EngineError(f"the dask scheduler is gone ({type(error).__name__})") from error
+            future.release()
+            lengths_s.extend(outcome.wall_s for outcome in outcomes)
+            yield from outcomes
+            submit()
+    except (OSError, RuntimeError, TimeoutError) as error:
+        raise EngineError(f"the dask scheduler is gone: {error}") from error
+
+
+def _died(spec: RunSpec, message: str) -> Outcome:
+    words = f"killed its worker {DEATHS_ALLOWED + 1} times"
+    return Outcome(spec, 0.0, "", {}, "", (), "worker died", words, message)

@@ -1,0 +1,359 @@
+"""An experiment file: read, overridden from the command line, checked, and expanded into cells."""
+
+import difflib
+import hashlib
+import itertools
+import json
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from typing_extensions import Annotated, Literal, get_args
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab import extensions
+from drone_mesh.lab.expression import ExpressionError, Where
+from drone_mesh.lab.marked_yaml import Lines, Place, nearest_line, read_marked
+from drone_mesh.lab.scenario import Fault, Part, Scenario
+
+NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # it becomes a folder
+
+
+class Stop(Part):
+    """Add seeds until the confidence interval of a metric is narrow enough in every cell."""
+
+    metric: str
+    half_width: Optional[Annotated[float, Field(gt=0)]] = None
+    relative_half_width: Optional[Annotated[float, Field(gt=0)]] = None
+    max_seeds: Annotated[int, Field(ge=1)] = 400
+
+
+class Compare(Part):
+    """The paired comparison of the report: each value of an axis against its baseline."""
+
+    over: str  # an axis of the sweep
+    baseline: Any
+
+
+class Experiment(BaseModel):
+    """The whole file, before its cells are made."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    name: Annotated[str, Field(pattern=NAME_PATTERN)]
+    title: str = ""  # of the report
+    seed: Annotated[int, Field(ge=0)] = 1  # of everything random in the experiment
+    seeds: Annotated[int, Field(ge=1, le=1_000_000)] = 10  # repetitions of each cell
+    base: Dict[str, Any] = {}  # a Scenario; checked once per cell
+    sweep: Dict[str, List[Any]] = {}
+    zip: List[Dict[str, List[Any]]] = []
+    where: Optional[str] = None
+    stop: Optional[Stop] = None
+    metrics: List[str] = []
+    compare: Optional[Compare] = None
+    timeout_s: Annotated[float, Field(gt=0)] = 600.0  # wall time of one run
+    output: Literal["runs", "runs_and_outages"] = "runs_and_outages"
+
+
+class Cell(NamedTuple):
+    """One point of the sweep."""
+
+    values: Mapping[str, Any]  # axis -> value
+    scenario: Scenario
+
+    @property
+    def label(self) -> str:
+        """For people and tables; empty without a sweep."""
+        return " ".join(f"{axis}={as_text(value)}" for axis, value in self.values.items())
+
+
+class LoadedExperiment(NamedTuple):
+    """An experiment that can be run."""
+
+    experiment: Experiment
+    cells: Sequence[Cell]
+    path: Path
+    overrides: Tuple[str, ...]
+
+    @property
+    def axes(self) -> List[str]:
+        """The names of all swept parameters, in the order of the file."""
+        return list(self.cells[0].values) if self.cells else []
+
+    @property
+    def digest(self) -> str:
+        """A hash of all that the file says, independent of its comments and order of keys."""
+        content = self.experiment.model_dump(mode="json")
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def load_experiment(path: Path, overrides: Sequence[str] = ()) -> LoadedExperiment:
+    """Read and check all of it. Raises ConfigurationError: file, line, key and what is wrong."""
+    content, lines = read_marked(path)
+    source = _Source(path, lines)
+    for override in overrides:
+        _override(content, override, source)
+    extensions.search_in(path.parent)
+    try:
+        experiment = Experiment.model_validate(content)
+    except ValidationError as error:
+        raise source.error_of(error, (), Experiment) from None
+    _check_metrics(experiment, source)
+    cells = list(_cells(experiment, source))
+    if not cells:
+        raise source.error(("where",), "where excludes every cell of the sweep")
+    _check_compare(experiment, cells, source)
+    return LoadedExperiment(experiment, cells, path, tuple(overrides))
+
+
+def as_text(value: Any) -> str:
+    """A swept value as a word for tables and file names."""
+    if isinstance(value, (str, int, float, bool)) or value is None:
+        return str(value)
+    return json.dumps(value, sort_keys=True, separators=(",", ":"))
+
+
+class _Source:
+    """Makes errors that point into the file, or at the argument that overruled it."""
+
+    def __init__(self, path: Path, lines: Lines) -> None:
+        self.path = path
+        self.lines = lines
+        self.overrides: Dict[Place, str] = {}
+
+    def error(self, place: Place, message: str) -> ConfigurationError:
+        for end in range(len(place), 0, -1):
+            if place[:end] in self.overrides:
+                return ConfigurationError(f"argument {self.overrides[place[:end]]}: {message}")
+        line = nearest_line(self.lines, place)
+        where = f"{self.path}, line {line}" if line else f"{self.path}"
+        return ConfigurationError(f"{where}: {message}")
+
+    def error_of(
+        self, error: ValidationError, before: Place, model: Any, shown: Place = ()
+    ) -> ConfigurationError:
+        """The first thing that pydantic found, as one line. `shown`: where to point instead."""
+        first = error.errors()[0]
+        inside: Place = tuple(first["loc"])
+        key = ".".join(map(str, (*before, *inside))) or "the file"
+        kind = first["type"]
+        if kind == "extra_forbidden":
+            name, known = str(inside[-1]), _keys_at(model, inside[:-1])
+            message = f"unknown key {key}; {_nearest(name, known)}"
+        elif kind == "missing":
+            message = f"missing key {key}"
+        else:
+            words = str(first["msg"]).replace("Value error, ", "")
+            value = first.get("input")
+            tail = f", not {value!r}" if isinstance(value, (str, int, float, bool)) else ""
+            message = f"{key}: {words[:1].lower()}{words[1:]}{tail}"
+        return self.error(shown or (*before, *inside), message)
+
+
+def _nearest(name: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
+
+
+def _keys_at(model: Any, place: Place) -> List[str]:
+    """The keys that a model has at this place."""
+    for step in place:
+        if isinstance(step, int):
+            continue
+        fields = getattr(model, "model_fields", {})
+        model = _model_in(fields[step].annotation) if step in fields else None
+    return list(getattr(model, "model_fields", {}))
+
+
+def _model_in(annotation: Any) -> Any:
+    """The model class inside Optional[...] or List[...]."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(_model_in, get_args(annotation))), None)
+
+
+def _override(content: Dict[str, Any], override: str, source: _Source) -> None:
+    """Put the value of `a.b=c` into the content."""
+    path, equals, text = override.partition("=")
+    if not equals or not path:
+        raise ConfigurationError(f"argument {override}: expected key=value, such as base.range_m=12")
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ConfigurationError(f"argument {override}: the value is not valid YAML") from None
+    head, _, rest = path.partition(".")
+    if head not in Experiment.model_fields:
+        hint = _nearest(head, list(Experiment.model_fields))
+        raise ConfigurationError(f"argument {override}: unknown key {head}; {hint}")
+    if head == "sweep" and rest:
+        content.setdefault("sweep", {})[rest] = value
+        source.overrides[("sweep", rest)] = override
+        return
+    if head == "base" and rest in content.get("sweep", {}):
+        raise ConfigurationError(
+            f"argument {override}: {rest} is swept; use sweep.{rest}=[{text}] instead"
+        )
+    try:
+        place = _put(content, path, value)
+    except _NoSuchPlace as error:
+        raise ConfigurationError(f"argument {override}: {error}") from None
+    source.overrides[place] = override
+
+
+class _NoSuchPlace(Exception):
+    """A dotted path that leads nowhere."""
+
+
+def _put(content: Any, path: str, value: Any) -> Place:
+    """Set the value at a dotted path. A step into the faults is an index or the action's name."""
+    place: List[Union[str, int]] = []
+    steps = path.split(".")
+    for index, step in enumerate(steps):
+        last = index == len(steps) - 1
+        key: Union[str, int] = step
+        if isinstance(content, list):
+            try:
+                key = _index_of(content, step)
+            except _NoSuchPlace:
+                raise _NoSuchPlace(f"{'.'.join(steps[:index])} has no entry {step}") from None
+            if not step.isdigit():  # the action's name leads into the fault and into the action
+                place.append(key)
+                content, key = content[int(key)], step
+        elif not isinstance(content, dict):
+            raise _NoSuchPlace(f"{'.'.join(steps[:index])} is a value and has no key {step}")
+        place.append(key)
+        if last:
+            content[key] = value
+        elif isinstance(content, dict):
+            content = content.setdefault(str(key), {})
+        else:
+            content = content[int(key)]
+    return tuple(place)
+
+
+def _index_of(entries: Sequence[Any], step: str) -> int:
+    if step.isdigit():
+        if int(step) >= len(entries):
+            raise _NoSuchPlace
+        return int(step)
+    for index, entry in enumerate(entries):
+        if isinstance(entry, dict) and step in entry:
+            return index
+    raise _NoSuchPlace
+
+
+def _cells(experiment: Experiment, source: _Source) -> Iterator[Cell]:
+    axes: List[List[Dict[str, Any]]] = []
+    named: Dict[str, Place] = {}
+    for axis, values in experiment.sweep.items():
+        named[axis] = ("sweep", axis)
+        if not values:
+            raise source.error(("sweep", axis), f"sweep.{axis}: no values")
+        axes.append([{axis: value} for value in values])
+    for number, group in enumerate(experiment.zip):
+        lengths = {axis: len(values) for axis, values in group.items()}
+        if len(set(lengths.values())) != 1 or 0 in lengths.values():
+            raise source.error(
+                ("zip", number), f"zip: the lists must have the same length, not {lengths}"
+            )
+        for axis in group:
+            if axis in named:
+                raise source.error(("zip", number, axis), f"{axis} is swept twice")
+            named[axis] = ("zip", number, axis)
+        axes.append([dict(zip(group, row)) for row in zip(*group.values())])
+    where = _where(experiment, list(named), source)
+    for combination in itertools.product(*axes):
+        values = {axis: value for part in combination for axis, value in part.items()}
+        if where is None or where.holds(values):
+            yield Cell(values, _scenario(experiment, values, named, source))
+
+
+def _where(experiment: Experiment, axes: Sequence[str], source: _Source) -> Optional[Where]:
+    if experiment.where is None:
+        return None
+    try:
+        return Where(experiment.where, axes)
+    except ExpressionError as error:
+        raise source.error(("where",), f"where: {error}") from None
+
+
+def _scenario(
+    experiment: Experiment, values: Mapping[str, Any], named: Mapping[str, Place], source: _Source
+) -> Scenario:
+    content = json.loads(json.dumps(experiment.base))
+    placed: Dict[Place, str] = {}
+    for axis, value in values.items():
+        try:
+            placed[_put(content, axis, value)] = axis
+        except _NoSuchPlace as error:
+            raise source.error(named[axis], f"axis {axis}: {error}") from None
+    try:
+        scenario = Scenario.model_validate(content)
+    except ValidationError as error:
+        inside = tuple(error.errors()[0]["loc"])
+        for place, axis in placed.items():
+            if inside[: len(place)] == place or place[: len(inside)] == inside:
+                raise source.error_of(error, (), Scenario, shown=named[axis]) from None
+        raise source.error_of(error, ("base",), Scenario) from None
+    for key in ("routing", "repair"):
+        try:
+            extensions.check_technique(key, getattr(scenario, key))
+        except ConfigurationError as error:
+            raise source.error(named.get(key, ("base", key)), f"{key}: {error}") from None
+    _check_ids(scenario, source)
+    return scenario
+
+
+def _check_ids(scenario: Scenario, source: _Source) -> None:
+    if scenario.layout.kind in ("casus", "file"):
+        return
+    for index, fault in enumerate(scenario.faults):
+        for node in _ids_of(fault):
+            if node >= scenario.layout.drones:
+                raise source.error(
+                    ("base", "faults", index, fault.action),
+                    f"faults.{index}.{fault.action}: no drone {node}; the layout has "
+                    f"0..{scenario.layout.drones - 1}",
+                )
+
+
+def _ids_of(fault: Fault) -> List[int]:
+    what = fault.what
+    one = getattr(what, "id", None)
+    return [
+        *(getattr(what, "ids", None) or ()),
+        *(getattr(what, "between", None) or ()),
+        *(() if one is None else (one,)),
+    ]
+
+
+def _check_metrics(experiment: Experiment, source: _Source) -> None:
+    wanted = [(("metrics", index), name) for index, name in enumerate(experiment.metrics)]
+    if experiment.stop is not None:
+        wanted.append((("stop", "metric"), experiment.stop.metric))
+    for place, name in wanted:
+        try:
+            extensions.check_metric(name)
+        except ConfigurationError as error:
+            raise source.error(place, str(error)) from None
+    if experiment.stop is not None and (
+        (experiment.stop.half_width is None) == (experiment.stop.relative_half_width is None)
+    ):
+        raise source.error(("stop",), "stop: give either half_width or relative_half_width")
+
+
+def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: _Source) -> None:
+    compare = experiment.compare
+    if compare is None:
+        return
+    axes = list(cells[0].values)
+    if compare.over not in axes:
+        raise source.error(
+            ("compare", "over"), f"compare.over: no axis {compare.over}; {_nearest(compare.over, axes)}"
+        )
+    if all(cell.values[compare.over] != compare.baseline for cell in cells):
+        raise source.error(
+            ("compare", "baseline"),
+            f"compare.baseline: {compare.baseline!r} is not a value of {compare.over}",
+        )

@@ -1,0 +1,70 @@
+"""The user's own parts of an experiment: techniques and metrics by `package.module:Name`."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import inspect
+import sys
+from pathlib import Path
+from typing import Callable, cast
+
+from drone_mesh.communication.routing import create_routing_technique
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.inprocess import Network
+from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.record import RunRecord
+
+OwnMetric = Callable[[RunRecord], float]
+
+
+def search_in(folder: Path) -> None:
+    """Let `module:Name` find modules that lie beside the experiment file."""
+    search_in_text(str(folder.resolve()))
+
+
+def search_in_text(folder: str) -> None:
+    """The same for an absolute path; nothing where the folder is there already."""
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+
+
+def check_technique(kind: str, name: str) -> None:
+    """Raises ConfigurationError if there is no such routing or repair technique."""
+    if kind == "routing":
+        create_routing_technique(name)
+    elif "repair" in inspect.signature(Network).parameters:
+        Network(repair=name)  # type: ignore[call-arg]
+    elif name != "thesis":
+        raise ConfigurationError(f"repair technique {name!r} is not known: use thesis")
+
+
+def check_metric(name: str) -> None:
+    """Raises ConfigurationError for a name that is neither a metric nor a function of the user."""
+    if ":" in name:
+        own_metric(name)
+    elif name not in METRICS:
+        close = difflib.get_close_matches(name, METRICS, n=1)
+        hint = f"did you mean {close[0]}?" if close else "`lab metrics` lists them"
+        raise ConfigurationError(f"unknown metric {name}; {hint}")
+
+
+def own_metric(name: str) -> OwnMetric:
+    """The function behind `package.module:function`. Raises ConfigurationError if there is none."""
+    module_name, _, function_name = name.partition(":")
+    try:
+        function = getattr(importlib.import_module(module_name), function_name)
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise ConfigurationError(f"metric {name} cannot be loaded: {error}") from error
+    if not callable(function):
+        raise ConfigurationError(f"metric {name} is not a function")
+    try:
+        inspect.signature(function).bind(None)
+    except TypeError as error:
+        raise ConfigurationError(f"metric {name} must take one argument, the run's record") from error
+    return cast(OwnMetric, function)
+
+
+def own_column(name: str) -> str:
+    """The column of runs.csv that holds a user's metric."""
+    return name.partition(":")[2]

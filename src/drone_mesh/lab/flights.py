@@ -1,0 +1,121 @@
+"""Who flew when, and how far; wind and batteries act here."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Callable
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.inprocess import Network
+from drone_mesh.lab.look import gateways_of, physical_graph
+
+EVENTS_BACK = 20  # a flight's event is among the last ones when it begins
+
+
+@dataclass
+class Leg:
+    """One straight piece of a flight, until it is over or another goal replaces it."""
+
+    node: int
+    path: FlightPath
+    is_start: bool  # the drone stood before
+    had_path: bool  # it left to find a gateway although a path to one existed
+    replaced_s: float | None = None
+
+    @property
+    def end_s(self) -> float:
+        """When it ended, or would end."""
+        planned_s = self.path.start_s + self.path.duration_s
+        return planned_s if self.replaced_s is None else min(planned_s, self.replaced_s)
+
+    def metres_until(self, now_s: float) -> float:
+        """Distance flown over ground."""
+        end = self.path.position_at(min(now_s, self.end_s))
+        return math.dist(self.path.start[:2], end[:2])
+
+
+class Flights:
+    """Watches the goals of all drones of a network."""
+
+    def __init__(self, network: Network) -> None:
+        self.legs: list[Leg] = []
+        self.refused = 0  # flights that an obstacle did not allow
+        self._network = network
+        self._current: dict[int, Leg] = {}
+        self._flown_m: dict[int, float] = {}  # on legs that are over
+        self._may_fly_m: dict[int, float] = {}
+        self._on_empty: Callable[[int], None] = lambda node: None
+        for node_id, node in network.nodes.items():
+            drone = node.drone
+            drone.set_goal = functools.partial(  # type: ignore[method-assign]
+                self._set_goal, node_id, drone.set_goal
+            )
+
+    @property
+    def in_the_air(self) -> list[int]:
+        """Drones that fly now."""
+        nodes = self._network.nodes
+        return [node for node in self._current if nodes[node].drone.path is not None]
+
+    def flown_m(self, node: int) -> float:
+        """Metres over ground until now."""
+        leg = self._current.get(node)
+        now = 0.0 if leg is None else leg.metres_until(self._network.clock.now_s)
+        return self._flown_m.get(node, 0.0) + now
+
+    def limit(self, nodes: list[int], metres: float, on_empty: Callable[[int], None]) -> None:
+        """From now on these drones can fly so far; then `on_empty(node)` is called."""
+        self._on_empty = on_empty
+        for node in nodes:
+            self._may_fly_m[node] = self.flown_m(node) + metres
+            if node in self._current:
+                self._plan_end_of_battery(self._current[node])
+
+    def _set_goal(
+        self, node: int, fly: Callable[[float, float, float], None], *goal: float
+    ) -> None:
+        drone = self._network.nodes[node].drone
+        before = drone.path
+        had_path = before is None and self._has_path(node)
+        fly(*goal)
+        path = drone.path
+        if path is None or path is before:
+            return
+        last = self._current.get(node)
+        if last is not None:
+            if before is not None:
+                last.replaced_s = path.start_s
+            self._flown_m[node] = self._flown_m.get(node, 0.0) + last.metres_until(path.start_s)
+        is_false = self._decided_by_itself(node) and had_path
+        leg = Leg(node, path, before is None, is_false)
+        self._current[node] = leg
+        self.legs.append(leg)
+        self._plan_end_of_battery(leg)
+
+    def _plan_end_of_battery(self, leg: Leg) -> None:
+        if leg.node not in self._may_fly_m:
+            return
+        left_m = self._may_fly_m[leg.node] - self._flown_m.get(leg.node, 0.0)
+        way_m = math.dist(leg.path.start[:2], leg.path.goal[:2])
+        if left_m < way_m:
+            clock = self._network.clock
+            at_s = leg.path.start_s + leg.path.duration_s * max(0.0, left_m) / way_m
+            clock.call_at(max(clock.now_s, at_s), self._battery_is_empty, leg)
+
+    def _battery_is_empty(self, leg: Leg) -> None:
+        if leg is self._current.get(leg.node) and leg.replaced_s is None:
+            self._on_empty(leg.node)
+
+    def _has_path(self, node: int) -> bool:
+        graph = physical_graph(self._network)
+        return node in graph.hops_from(gateways_of(self._network))
+
+    def _decided_by_itself(self, node: int) -> bool:
+        """Whether this flight is a repair and not an order: the node has just said so."""
+        for event in reversed(self._network.events[-EVENTS_BACK:]):
+            if event.node == node and event.kind is MeshEventKind.FLIGHT_DECIDED:
+                return event.now_s == self._network.clock.now_s
+        return False

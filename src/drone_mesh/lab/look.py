@@ -1,0 +1,92 @@
+"""Looks at a network from outside: who could, and who really can, reach a gateway."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.inprocess import Network
+from drone_mesh.lab.graph import Graph
+
+
+@dataclass(frozen=True)
+class Look:
+    """The network at one moment."""
+
+    now_s: float
+    alive: frozenset[int]  # routers whose antenna has power
+    served: frozenset[int]  # of these, the ones that are connected over a path that works
+
+    @property
+    def share(self) -> float:
+        """Served, of all that are alive; 1 when none is."""
+        return len(self.served) / len(self.alive) if self.alive else 1.0
+
+
+def look_at(network: Network) -> Look:
+    """A router is served while it believes to be connected and the next hops, from one to the
+    other, lead to a gateway over links that exist now: a stale route does not count."""
+    nodes = network.nodes
+    leads = {n: node.antenna.powered for n, node in nodes.items() if node.is_gateway}
+    alive = []
+    served = []
+    for node_id, node in nodes.items():
+        if node_id in leads and node.is_gateway:
+            continue
+        if node.antenna.powered:
+            alive.append(node_id)
+            if node.component.get_connected_to_gateway() and _leads(network, node_id, leads):
+                served.append(node_id)
+    return Look(network.clock.now_s, frozenset(alive), frozenset(served))
+
+
+def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:
+    """Whether the next hops from here lead to a gateway; notes it for each node on the way."""
+    nodes = network.nodes
+    chain = []
+    node_id = start
+    while node_id not in leads:
+        leads[node_id] = False  # a loop ends here
+        chain.append(node_id)
+        step = nodes[node_id].component.get_route_to_gateway()
+        if step == NO_ROUTE or step not in nodes or not nodes[step].antenna.powered:
+            return False
+        if step not in network.air.in_range(node_id):
+            return False
+        node_id = step
+    result = leads[node_id]
+    for passed in chain:
+        leads[passed] = result
+    return result
+
+
+def route_hops(network: Network, served: frozenset[int]) -> dict[int, int]:
+    """Hops of the route in use, of each served router."""
+    hops: dict[int, int] = {}
+    for start in served:
+        chain: list[int] = []
+        node_id = start
+        while node_id not in hops and not network.nodes[node_id].is_gateway:
+            chain.append(node_id)
+            node_id = network.nodes[node_id].component.get_route_to_gateway()
+        below = hops.get(node_id, 0)
+        for distance, passed in enumerate(reversed(chain), start=1):
+            hops[passed] = below + distance
+    return {node: hops[node] for node in served}
+
+
+def physical_graph(network: Network) -> Graph:
+    """Who could hear whom now, of all nodes with power, whatever they know."""
+    powered = [node_id for node_id, node in network.nodes.items() if node.antenna.powered]
+    alive = set(powered)
+    return Graph(
+        {
+            node_id: [other for other in network.air.in_range(node_id) if other in alive]
+            for node_id in powered
+        }
+    )
+
+
+def gateways_of(network: Network) -> list[int]:
+    """All gateways, on or off."""
+    return [node_id for node_id, node in network.nodes.items() if node.is_gateway]

@@ -1,0 +1,86 @@
+"""What a run adds to the in-process radio: counts, losses per link, jammed circles."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass, field
+from typing import Callable
+
+from drone_mesh.communication.messages import CREATOR, FROM, TO, TYPE
+from drone_mesh.inprocess import Network
+
+
+@dataclass
+class Traffic:
+    """Packets of one type that were handed to the radio, broadcasts once per receiver."""
+
+    own: int = 0
+    forwarded: int = 0
+
+
+@dataclass
+class Jamming:
+    """Noise in a circle."""
+
+    center: tuple[float, float]
+    radius_m: float
+    loss: float
+
+
+@dataclass
+class Medium:
+    """Stands before `air.send`, through which all packets pass.
+
+    The n-th packet from one drone to another meets the same fate in every cell of an experiment,
+    whatever is sent elsewhere: each link has a random stream of its own.
+    """
+
+    network: Network
+    stream: Callable[[str], random.Random]
+    loss: float
+    traffic: dict[int, Traffic] = field(default_factory=dict)  # by type
+    lost: int = 0
+    jams: list[Jamming] = field(default_factory=list)
+    sent_by: dict[int, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._send = self.network.air.send
+        self._links: dict[tuple[int, int], random.Random] = {}
+        self.network.air.send = self.send  # type: ignore[method-assign]
+
+    def send(self, payload: bytes) -> bool:
+        """As the air's."""
+        counted = self.traffic.get(payload[TYPE])
+        if counted is None:
+            counted = self.traffic[payload[TYPE]] = Traffic()
+        sender = payload[FROM]
+        if payload[CREATOR] == sender:
+            counted.own += 1
+        else:
+            counted.forwarded += 1
+            self.sent_by[sender] = self.sent_by.get(sender, 0) + 1
+        if (self.loss or self.jams) and self._is_lost(sender, payload[TO]):
+            self.lost += 1
+            return False
+        return self._send(payload)
+
+    def _is_lost(self, sender: int, to: int) -> bool:
+        loss = self.loss
+        for jam in self.jams:
+            if self._is_inside(jam, sender) or self._is_inside(jam, to):
+                loss = 1.0 - (1.0 - loss) * (1.0 - jam.loss)
+        if not loss:
+            return False
+        link = (sender, to)
+        rng = self._links.get(link)
+        if rng is None:
+            rng = self._links[link] = self.stream(f"loss {sender} {to}")
+        return rng.random() < loss
+
+    def _is_inside(self, jam: Jamming, node_id: int) -> bool:
+        node = self.network.nodes.get(node_id)
+        if node is None:
+            return False
+        place = node.drone.get_location()
+        return math.dist((place.longitude, place.latitude), jam.center) < jam.radius_m

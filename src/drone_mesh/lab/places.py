@@ -1,0 +1,178 @@
+"""Start places of a run's drones, drawn from a layout."""
+
+from __future__ import annotations
+
+import csv
+import math
+import random
+from pathlib import Path
+from typing import Callable, NamedTuple
+
+from drone_mesh.drone.fleet import MAX_DRONES, plan_fleet
+from drone_mesh.drone.roles import Role
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.graph import Graph, within
+from drone_mesh.lab.scenario import Layout
+from drone_mesh.layouts import Layouts, UnknownCase
+
+MEAN_DEGREE = 8.0  # the published layouts have 7.3..8.8
+MOST_DRAWS = 2000  # of a random layout that has to be connected
+PLACES_HEADER = ["id", "x", "y", "role"]
+
+
+class StartPlace(NamedTuple):
+    """Where one drone starts, in metres."""
+
+    node_id: int
+    x: float
+    y: float
+    gateway: bool
+
+
+def draw_places(layout: Layout, range_m: float, rng: random.Random) -> list[StartPlace]:
+    """All drones by id. Raises ConfigurationError for a layout that cannot be had."""
+    if layout.kind == "file":
+        return read_places(Path(str(layout.path)))
+    if layout.kind == "casus":
+        return _casus(layout)
+    if layout.kind in ("grid", "line"):
+        places = _grid(layout)
+    else:
+        points = _connected_points(layout, range_m, rng)
+        places = _with_gateways(layout, points, rng)
+    return _shuffled(places, rng) if layout.ids == "shuffled" else places
+
+
+def read_places(path: Path) -> list[StartPlace]:
+    """A CSV file with the header id,x,y,role; role is gateway or router."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"layout file {path}: {error}") from error
+    if not rows or [name.strip() for name in rows[0]] != PLACES_HEADER:
+        raise ConfigurationError(f"layout file {path}, line 1: expected {','.join(PLACES_HEADER)}")
+    places: dict[int, StartPlace] = {}
+    for number, row in enumerate(rows[1:], start=2):
+        if not row:
+            continue
+        where = f"layout file {path}, line {number}"
+        try:
+            node_id, x, y, role = int(row[0]), float(row[1]), float(row[2]), row[3].strip()
+        except (ValueError, IndexError) as error:
+            raise ConfigurationError(f"{where}: expected id,x,y,role") from error
+        if not 0 <= node_id < MAX_DRONES or node_id in places:
+            raise ConfigurationError(f"{where}: id {node_id} is out of range or a duplicate")
+        if role not in ("gateway", "router") or not (math.isfinite(x) and math.isfinite(y)):
+            raise ConfigurationError(f"{where}: expected finite x, y and role gateway or router")
+        places[node_id] = StartPlace(node_id, x, y, role == "gateway")
+    if not any(place.gateway for place in places.values()):
+        raise ConfigurationError(f"layout file {path}: no gateway")
+    return [places[node_id] for node_id in sorted(places)]
+
+
+def _casus(layout: Layout) -> list[StartPlace]:
+    """The drones of a DroneManager layout at their places, and its gateway."""
+    file = Path(__file__).resolve().parents[3] / "config" / "casus.yaml"
+    layouts = Layouts.load(file) if file.exists() else Layouts({})
+    try:
+        orders = layouts.orders(layout.case)
+    except UnknownCase as error:
+        raise ConfigurationError(f"layout casus: {error}") from error
+    fleet = plan_fleet(layout.gateways, 0, 1, 1.0)
+    places = [StartPlace(g.node_id, g.longitude, g.latitude, True) for g in fleet]
+    taken = {place.node_id for place in places}
+    places += [
+        StartPlace(order.node_id, order.goal.longitude, order.goal.latitude, False)
+        for order in orders
+        if order.node_id not in taken
+    ]
+    return sorted(places)
+
+
+def _grid(layout: Layout) -> list[StartPlace]:
+    routers = layout.drones - layout.gateways
+    columns = layout.columns or max(1, math.ceil(math.sqrt(routers)))
+    if layout.kind == "line":
+        columns = routers
+    fleet = plan_fleet(layout.gateways, routers, columns, layout.spacing_m)
+    return [StartPlace(p.node_id, p.longitude, p.latitude, p.role is Role.GATEWAY) for p in fleet]
+
+
+def _connected_points(
+    layout: Layout, range_m: float, rng: random.Random
+) -> list[tuple[float, float]]:
+    draw = _clusters if layout.kind == "clusters" else _uniform
+    for _ in range(MOST_DRAWS):
+        points = draw(layout, range_m, rng.random)
+        if layout.require == "nothing" or Graph(within(points, range_m)).is_connected():
+            return points
+    raise ConfigurationError(
+        f"layout {layout.kind}: none of {MOST_DRAWS} draws was connected; use fewer metres, a "
+        "higher mean_degree or require: nothing"
+    )
+
+
+def width_for(drones: int, mean_degree: float, range_m: float) -> float:
+    """Side of a square in which uniform drones have so many neighbours each on average.
+
+    A neighbour circle reaches over the edge: the expected share of pairs within a distance d in a
+    unit square is pi d^2 - 8/3 d^3 + d^4/2 for d <= 1 (square line picking).
+    """
+    low, high = range_m, range_m * math.sqrt(math.pi * drones)
+    wanted = min(1.0, mean_degree / (drones - 1))
+    for _ in range(60):
+        middle = (low + high) / 2
+        d = range_m / middle
+        share = math.pi * d**2 - 8 / 3 * d**3 + d**4 / 2
+        low, high = (middle, high) if share > wanted else (low, middle)
+    return (low + high) / 2
+
+
+def _uniform(
+    layout: Layout, range_m: float, draw: Callable[[], float]
+) -> list[tuple[float, float]]:
+    width_m = layout.width_m or width_for(
+        layout.drones, layout.mean_degree or MEAN_DEGREE, range_m
+    )
+    return [(draw() * width_m, draw() * width_m) for _ in range(layout.drones)]
+
+
+def _clusters(
+    layout: Layout, range_m: float, draw: Callable[[], float]
+) -> list[tuple[float, float]]:
+    """Centres uniform in the square, drones uniform in a disc about them, in turn."""
+    width_m = layout.width_m or 2 * layout.cluster_radius_m * math.sqrt(layout.clusters)
+    centres = [(draw() * width_m, draw() * width_m) for _ in range(layout.clusters)]
+    points = []
+    for index in range(layout.drones):
+        x, y = centres[index % len(centres)]
+        radius = layout.cluster_radius_m * math.sqrt(draw())
+        angle = 2 * math.pi * draw()
+        points.append((x + radius * math.cos(angle), y + radius * math.sin(angle)))
+    return points
+
+
+def _with_gateways(
+    layout: Layout, points: list[tuple[float, float]], rng: random.Random
+) -> list[StartPlace]:
+    """Gateways are the drones nearest to where they are wanted, and get the lowest ids."""
+    if layout.gateway_at == "random":
+        order = rng.sample(range(len(points)), len(points))
+    else:
+        xs, ys = [p[0] for p in points], [p[1] for p in points]
+        at = (min(xs), min(ys))
+        if layout.gateway_at == "middle":
+            at = ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2)
+        order = sorted(range(len(points)), key=lambda i: math.dist(points[i], at))
+    chosen = order[: layout.gateways]
+    rest = [index for index in range(len(points)) if index not in set(chosen)]
+    return [
+        StartPlace(node_id, *points[index], node_id < layout.gateways)
+        for node_id, index in enumerate(chosen + rest)
+    ]
+
+
+def _shuffled(places: list[StartPlace], rng: random.Random) -> list[StartPlace]:
+    ids = rng.sample(range(len(places)), len(places))
+    return sorted(place._replace(node_id=ids[place.node_id]) for place in places)

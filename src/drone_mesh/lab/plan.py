@@ -1,0 +1,91 @@
+"""The plan of an experiment: every run with its id, in the order of the results."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any, Iterator, List, NamedTuple, Sequence
+
+from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text
+from drone_mesh.lab.scenario import Scenario
+
+SCHEMA = 1  # of runs.csv; another number makes every run a new one
+
+
+class RunSpec(NamedTuple):
+    """One run, in a form that travels to a worker."""
+
+    run: str  # id
+    scenario: str  # JSON
+    seed: int  # of the experiment
+    repetition: int
+    own_metrics: tuple[str, ...]
+    search_path: str  # folder of the user's modules; empty: none
+    timeout_s: float
+
+
+class PlannedRun(NamedTuple):
+    """One run and the cell that it belongs to."""
+
+    spec: RunSpec
+    cell: int
+
+
+class Plan:
+    """All runs of an experiment: every cell with one seed, then every cell with the next one."""
+
+    def __init__(self, loaded: LoadedExperiment, seeds: int | None = None) -> None:
+        self.loaded = loaded
+        self.cells: Sequence[Cell] = loaded.cells
+        self.seeds = loaded.experiment.seeds if seeds is None else seeds
+        self.own_metrics = tuple(name for name in loaded.experiment.metrics if ":" in name)
+        self._texts = [canonical(cell.scenario) for cell in self.cells]
+
+    def __len__(self) -> int:
+        return len(self.cells) * self.seeds
+
+    def __iter__(self) -> Iterator[PlannedRun]:
+        experiment = self.loaded.experiment
+        folder = str(self.loaded.path.parent.resolve())
+        for repetition in range(self.seeds):
+            for cell, text in enumerate(self._texts):
+                run = run_id(text, experiment.seed, repetition, self.own_metrics)
+                spec = RunSpec(
+                    run, text, experiment.seed, repetition, self.own_metrics, folder,
+                    experiment.timeout_s,
+                )  # fmt: skip
+                yield PlannedRun(spec, cell)
+
+    @property
+    def parameter_columns(self) -> List[str]:
+        """All parameters that any cell has, flattened, in the order of their first appearance."""
+        columns: dict[str, None] = {}
+        for text in self._texts:
+            columns.update(dict.fromkeys(flatten(json.loads(text))))
+        return list(columns)
+
+
+def canonical(scenario: Scenario) -> str:
+    """The scenario with all its defaults, as one JSON text that is equal for equal scenarios."""
+    return json.dumps(scenario.model_dump(mode="json", exclude_none=True), separators=(",", ":"))
+
+
+def run_id(scenario: str, seed: int, repetition: int, own_metrics: Sequence[str]) -> str:
+    """Names a run by what it is: its parameters, seed and what is measured, not by its time."""
+    what = json.dumps([SCHEMA, json.loads(scenario), seed, repetition, list(own_metrics)],
+                      sort_keys=True)  # fmt: skip
+    return hashlib.sha256(what.encode()).hexdigest()[:16]
+
+
+def flatten(content: Any, before: str = "") -> dict[str, str]:
+    """Every leaf of nested mappings by its dotted path; the list of faults by index."""
+    if isinstance(content, dict) and content:
+        items = [(str(key), value) for key, value in content.items()]
+    elif isinstance(content, list) and content and all(isinstance(v, dict) for v in content):
+        items = [(str(index), value) for index, value in enumerate(content)]
+    else:
+        return {before: as_text(content)}
+    flat: dict[str, str] = {}
+    for key, value in items:
+        flat.update(flatten(value, f"{before}.{key}" if before else key))
+    return flat

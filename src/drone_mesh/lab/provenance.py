@@ -1,0 +1,60 @@
+"""Which code, on which machine, made a row of results."""
+
+from __future__ import annotations
+
+import datetime
+import functools
+import importlib.metadata
+import platform
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Sequence
+
+_HERE = Path(__file__).resolve().parent
+_PACKAGES = ("drone_mesh", "numpy", "pydantic", "scipy", "dask", "distributed", "matplotlib")
+
+
+@functools.lru_cache(maxsize=None)
+def code_version() -> str:
+    """The commit of this checkout, with "+dirty" after it where files differ; or the version."""
+    commit = _git("rev-parse", "--short=12", "HEAD")
+    if commit is None:
+        return _version("drone_mesh") or "unknown"
+    changed = _git("status", "--porcelain", "--untracked-files=no", "--", str(_HERE.parent))
+    return commit + ("+dirty" if changed else "")
+
+
+def describe_session(
+    command: list[str], overrides: Sequence[str], digest: str, workers: str
+) -> dict[str, Any]:
+    """One entry of provenance.json."""
+    return {
+        "started": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "command": command,
+        "overrides": list(overrides),
+        "experiment_hash": digest,
+        "code": code_version(),
+        "workers": workers,
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "processor": platform.machine(),
+        "packages": {name: _version(name) for name in _PACKAGES if _version(name)},
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _git(*arguments: str) -> str | None:
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(_HERE), *arguments], capture_output=True, text=True, timeout=10
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None

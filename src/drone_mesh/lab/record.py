@@ -1,0 +1,103 @@
+"""What one run leaves behind, ready to be measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Mapping, Sequence, Tuple
+
+from drone_mesh.lab.flights import Leg
+from drone_mesh.lab.graph import Graph
+from drone_mesh.lab.look import Look
+from drone_mesh.lab.medium import Traffic
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.timeline import Happened, OrderSent
+from drone_mesh.state.model import EventRecord
+
+Place = Tuple[float, float, float]  # x, y, z in metres
+HOLD_S = 5.0  # our choice: served again means for so long without a break
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The network's shape at one moment."""
+
+    graph: Graph  # of all nodes with power
+    route_hops: Mapping[int, int]  # of each served router
+    places: Mapping[int, Place]  # of all drones
+
+
+@dataclass(frozen=True)
+class ServiceGap:
+    """A router's time without a working path to a gateway, as seen from outside."""
+
+    node: int
+    lost_s: float
+    restored_s: float | None  # None: not until the end
+
+    def seconds(self, end_s: float) -> float:
+        """Its length; up to the end of the run where it lasts."""
+        return (end_s if self.restored_s is None else self.restored_s) - self.lost_s
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """A finished run. Times are simulated seconds."""
+
+    scenario: Scenario
+    gateways: frozenset[int]
+    start: Scene
+    before: Scene | None  # right before the first fault that has to be healed
+    after_fault: Graph | None  # right after it
+    end: Scene
+    fault_s: float | None  # when it was
+    looks: Sequence[Look]
+    happened: Sequence[Happened]
+    events: Sequence[EventRecord]
+    legs: Sequence[Leg]
+    traffic: Mapping[int, Traffic]  # by message type
+    orders: Sequence[OrderSent]
+    collisions: int
+    min_distance_m: float  # of two drones that were not that near at the start; inf: never measured
+    end_s: float
+    refused_flights: int = 0
+
+    @property
+    def healed_at_s(self) -> float | None:
+        """The first moment after the fault from which all live routers are served for HOLD_S.
+
+        None: not before the end. A run without such a fault is healed from its start.
+        """
+        since_s: float | None = None
+        for look in self.looks:
+            if self.fault_s is not None and look.now_s < self.fault_s:
+                continue
+            if len(look.served) < len(look.alive):
+                since_s = None
+            else:
+                if since_s is None:
+                    since_s = look.now_s
+                if look.now_s - since_s >= HOLD_S:
+                    return since_s
+        return None
+
+    def gaps(self) -> list[ServiceGap]:
+        """Each router's times without service since the fault, or since all were served first."""
+        begin_s = self.fault_s
+        if begin_s is None:
+            begin_s = next((look.now_s for look in self.looks if look.share == 1.0), None)
+        if begin_s is None:
+            return []
+        open_since: dict[int, float] = {}
+        gaps = []
+        for look in self.looks:
+            if look.now_s < begin_s:
+                continue
+            for node in sorted(open_since.keys() & look.served):
+                gaps.append(ServiceGap(node, open_since.pop(node), look.now_s))
+            for node in list(open_since):
+                if node not in look.alive:
+                    del open_since[node]  # it died: nothing left to repair
+            for node in sorted(look.alive - look.served):
+                open_since.setdefault(node, look.now_s)
+        gaps += [ServiceGap(node, since_s, None) for node, since_s in open_since.items()]
+        return sorted(gaps, key=lambda gap: (gap.lost_s, gap.node))

@@ -1,0 +1,290 @@
+"""What one run is: layout, radio, techniques and faults, as an experiment file describes them."""
+
+# Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
+from typing import Any, ClassVar, Dict, FrozenSet, List, Optional, Tuple
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_serializer, model_validator
+from typing_extensions import Annotated, Literal
+
+from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.lab.conditions import parse_condition
+
+Share = Annotated[float, Field(ge=0, le=1)]
+Above0 = Annotated[float, Field(gt=0, le=1e6)]
+AtLeast0 = Annotated[float, Field(ge=0, le=1e6)]
+NodeId = Annotated[int, Field(ge=0, lt=MAX_DRONES)]
+Point = Annotated[List[float], Field(min_length=2, max_length=2)]
+
+
+class Part(BaseModel):
+    """A part of an experiment file: unknown keys are errors, and no value changes its type."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Layout(Part):
+    """Where the drones stand at the start."""
+
+    KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
+        "uniform": frozenset({"drones", "mean_degree", "width_m", "require", "gateway_at"}),
+        "clusters": frozenset(
+            {"drones", "clusters", "cluster_radius_m", "width_m", "require", "gateway_at"}
+        ),
+        "grid": frozenset({"drones", "columns", "spacing_m"}),
+        "line": frozenset({"drones", "spacing_m"}),
+        "casus": frozenset({"case"}),
+        "file": frozenset({"path"}),
+    }
+
+    kind: Literal["uniform", "clusters", "grid", "line", "casus", "file"] = "uniform"
+    drones: Annotated[int, Field(ge=2, le=MAX_DRONES)] = 25  # gateways included
+    gateways: Annotated[int, Field(ge=1, le=MAX_DRONES)] = 1
+    ids: Literal["in_order", "shuffled"] = "in_order"
+    mean_degree: Optional[Annotated[float, Field(gt=0, le=253)]] = None  # uniform; default: 8
+    width_m: Optional[Above0] = None  # of the square; uniform: instead of mean_degree
+    require: Literal["connected", "nothing"] = "connected"
+    gateway_at: Literal["middle", "corner", "random"] = "middle"
+    clusters: Annotated[int, Field(ge=1, le=64)] = 4
+    cluster_radius_m: Above0 = 9.0
+    columns: Optional[Annotated[int, Field(ge=1, le=MAX_DRONES)]] = None  # default: a square
+    spacing_m: Above0 = 6.0
+    case: int = 0  # of config/casus.yaml
+    path: Optional[str] = None  # of a file of places
+
+    @model_validator(mode="after")
+    def _only_what_its_kind_uses(self) -> "Layout":
+        allowed = self.KEYS[self.kind] | {"kind", "gateways", "ids"}
+        extra = sorted(self.model_fields_set - allowed)
+        if extra:
+            words = ", ".join(sorted(allowed))
+            raise ValueError(f"layout {self.kind} has no {extra[0]}: it has {words}")
+        if self.mean_degree is not None and self.width_m is not None:
+            raise ValueError("mean_degree and width_m exclude each other: give one")
+        if self.kind == "file" and self.path is None:
+            raise ValueError("layout file needs path")
+        if self.kind != "file" and self.gateways >= self.drones and self.kind != "casus":
+            raise ValueError(f"{self.gateways} gateways leave no router of {self.drones} drones")
+        return self
+
+
+    @model_serializer(mode="wrap")
+    def _what_its_kind_uses(self, dump: Any) -> Dict[str, Any]:
+        kept = self.KEYS[self.kind] | {"kind", "gateways", "ids"}
+        return {key: value for key, value in dump(self).items() if key in kept}
+
+
+class Radio(Part):
+    """The medium."""
+
+    kind: Literal["disc", "shared"] = "disc"
+    rate: Optional[Literal["250k", "1M", "2M"]] = None  # shared: of the air; default: 250k
+    loss: Share = 0.0  # of the packets on each link
+    delay_s: AtLeast0 = 0.002
+    jitter_s: AtLeast0 = 0.0
+
+    @model_validator(mode="after")
+    def _only_what_its_kind_uses(self) -> "Radio":
+        if self.kind == "disc" and self.rate is not None:
+            raise ValueError("rate is for the shared radio; the disc has delay_s")
+        if self.kind == "shared" and self.model_fields_set & {"delay_s", "jitter_s"}:
+            raise ValueError("delay_s and jitter_s are for the disc; the shared radio has rate")
+        return self
+
+
+    @model_serializer(mode="wrap")
+    def _what_its_kind_uses(self, dump: Any) -> Dict[str, Any]:
+        left_out = {"rate"} if self.kind == "disc" else {"delay_s", "jitter_s"}
+        return {key: value for key, value in dump(self).items() if key not in left_out}
+
+
+class Timing(Part):
+    """The adjustable times of the protocol, as MeshTiming has them."""
+
+    check_period_s: Above0 = 10.0
+    connection_lost_after_s: Above0 = 30.0
+    send_attempts: Annotated[int, Field(ge=1, le=20)] = 3
+
+
+class Box(Part):
+    """An obstacle: an axis-aligned box, optionally turned about its vertical axis."""
+
+    center: Annotated[List[float], Field(min_length=3, max_length=3)]  # m
+    size: Annotated[List[Above0], Field(min_length=3, max_length=3)]  # m along x, y, z
+    yaw_deg: float = 0.0
+    material: str = "brick"
+
+
+class Pick(Part):
+    """Which drones: exactly so many (share, number) by some rule, or these (ids)."""
+
+    share: Optional[Share] = None  # of all drones of the layout that are not spared
+    number: Optional[Annotated[int, Field(ge=0, le=MAX_DRONES)]] = None
+    ids: Optional[List[NodeId]] = None
+    pick: Literal["random", "cut_vertex", "next_to_gateway", "circle", "busiest"] = "random"
+    center: Optional[Point] = None  # circle; default: a random drone
+    radius_m: Optional[Above0] = None  # circle: everything within it
+    spare: Literal["gateways", "nothing"] = "gateways"
+
+    @model_validator(mode="after")
+    def _says_how_many(self) -> "Pick":
+        given = [key for key in ("share", "number", "ids") if getattr(self, key) is not None]
+        if self.pick == "circle" and self.radius_m is None:
+            raise ValueError("pick circle needs radius_m")
+        if self.pick == "circle" and not given:
+            return self
+        if len(given) != 1:
+            raise ValueError("give exactly one of share, number and ids")
+        return self
+
+
+class Link(Part):
+    """One link between two drones, or a number of random ones."""
+
+    between: Optional[Annotated[List[NodeId], Field(min_length=2, max_length=2)]] = None
+    number: Annotated[int, Field(ge=1, le=10_000)] = 1
+    for_s: Optional[Above0] = None  # default: to the end
+
+
+class Jam(Part):
+    """Noise in a circle: packets from or to a drone within it are lost."""
+
+    center: Point
+    radius_m: Above0
+    for_s: Optional[Above0] = None
+    loss: Share = 1.0
+
+
+class GatewayOff(Part):
+    """A gateway that is off for a while."""
+
+    id: NodeId = 0
+    for_s: Optional[Above0] = None
+
+
+class Loss(Part):
+    """Packet loss on all links, in place of radio.loss."""
+
+    share: Share
+    for_s: Optional[Above0] = None
+
+
+class Battery(Part):
+    """Drones that die after so much flight, or so much time."""
+
+    share: Share = 1.0
+    fly_m: Optional[Above0] = None
+    live_min: Optional[Above0] = None
+
+    @model_validator(mode="after")
+    def _ends_somehow(self) -> "Battery":
+        if self.fly_m is None and self.live_min is None:
+            raise ValueError("battery needs fly_m or live_min")
+        return self
+
+
+class Churn(Part):
+    """Deaths and returns at random times."""
+
+    deaths_per_min: AtLeast0 = 0.0
+    births_per_min: AtLeast0 = 0.0
+    for_s: Optional[Above0] = None
+
+
+class Order(Part):
+    """Flight orders through a gateway: one drone to one place, or random short ones."""
+
+    id: Optional[NodeId] = None
+    to: Optional[Annotated[List[float], Field(min_length=2, max_length=3)]] = None
+    every_s: Optional[Above0] = None  # random drones, again and again
+    within_m: Above0 = 1.0  # of where the random drone stands
+    for_s: Optional[Above0] = None
+
+    @model_validator(mode="after")
+    def _says_which(self) -> "Order":
+        if (self.id is None) != (self.to is None) or (self.id is None) == (self.every_s is None):
+            raise ValueError("order needs id and to, or every_s")
+        return self
+
+
+class Wind(Part):
+    """Flights are slower."""
+
+    speed_factor: Annotated[float, Field(gt=0, le=1)]
+    for_s: Optional[Above0] = None
+
+
+class Fault(Part):
+    """One thing that happens to the network, at a time or when a condition holds."""
+
+    ACTIONS: ClassVar[Tuple[str, ...]] = (
+        "kill", "revive", "cut_link", "jam", "gateway_off", "loss", "battery", "churn", "order",
+        "wind",
+    )  # fmt: skip
+
+    at_s: Optional[AtLeast0] = None
+    when: Optional[str] = None
+    kill: Optional[Pick] = None
+    revive: Optional[Pick] = None
+    cut_link: Optional[Link] = None
+    jam: Optional[Jam] = None
+    gateway_off: Optional[GatewayOff] = None
+    loss: Optional[Loss] = None
+    battery: Optional[Battery] = None
+    churn: Optional[Churn] = None
+    order: Optional[Order] = None
+    wind: Optional[Wind] = None
+
+    @field_validator("when")
+    @classmethod
+    def _is_a_condition(cls, text: Optional[str]) -> Optional[str]:
+        if text is not None:
+            parse_condition(text)
+        return text
+
+    @model_validator(mode="after")
+    def _is_one_thing_at_one_time(self) -> "Fault":
+        actions = [name for name in self.ACTIONS if getattr(self, name) is not None]
+        if len(actions) != 1:
+            raise ValueError(f"a fault is exactly one of {', '.join(self.ACTIONS)}")
+        if (self.at_s is None) == (self.when is None):
+            raise ValueError("a fault needs at_s or when, and not both")
+        return self
+
+    @property
+    def action(self) -> str:
+        """Which of ACTIONS it is."""
+        return next(name for name in self.ACTIONS if getattr(self, name) is not None)
+
+    @property
+    def what(self) -> Any:
+        """The action's own part."""
+        return getattr(self, self.action)
+
+
+class Obstacles(Part):
+    """Boxes that block or damp the radio, and block flight."""
+
+    boxes: List[Box] = []
+    radio: Literal["block", "wall"] = "block"
+    cut_db: AtLeast0 = 9.0  # wall: per wall crossed (Sommer et al., WONS 2011, as in Veins)
+    metre_db: AtLeast0 = 0.4  # wall: per metre inside, the same source
+    exponent: Annotated[float, Field(ge=1, le=6)] = 2.0  # of the path loss
+    fading: Literal["none", "rayleigh", "rician"] = "none"
+    rician_k_db: float = 10.0
+
+
+class Scenario(Part):
+    """Everything that makes a run, but for its seed."""
+
+    model: Literal["mesh", "ideal"] = "mesh"
+    layout: Layout = Layout()
+    range_m: Above0 = 9.0
+    radio: Radio = Radio()
+    routing: str = "child_table_tree"
+    repair: str = "thesis"
+    timing: Timing = Timing()
+    obstacles: Obstacles = Obstacles()
+    faults: List[Fault] = []
+    duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
+    sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # how often the network is looked at
+    speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights, reference section 11

@@ -1,0 +1,172 @@
+"""One run: a network under a virtual clock, its faults, and what came of them."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import Any, Callable
+
+import numpy as np
+
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.inprocess import Network
+from drone_mesh.lab.flights import Flights
+from drone_mesh.lab.graph import Graph
+from drone_mesh.lab.look import Look, gateways_of, look_at, physical_graph, route_hops
+from drone_mesh.lab.medium import Medium
+from drone_mesh.lab.metrics import STACKED_M
+from drone_mesh.lab.places import draw_places
+from drone_mesh.lab.record import RunRecord, Scene
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.timeline import Timeline
+from drone_mesh.state.model import MeshStatus
+
+FLIGHT_LOOK_S = 0.25  # how closely distances are watched while somebody flies: 0.5 m at 2 m/s
+
+OnStatus = Callable[[MeshStatus], None]
+
+
+class Simulation:
+    """A run of a mesh over packets. Build it, `run()` it once, and read its record."""
+
+    def __init__(self, scenario: Scenario, streams: Streams) -> None:
+        """Raises ConfigurationError for a layout that cannot be drawn."""
+        self.scenario = scenario
+        self.network = _network(scenario, streams)
+        self.medium = Medium(self.network, streams.of, scenario.radio.loss)
+        self.flights = Flights(self.network)
+        self.timeline = Timeline(
+            scenario, self.network, self.medium, self.flights, streams, self
+        )
+        self._looks: list[Look] = []
+        self._start = self._scene(None)
+        self._before: Scene | None = None
+        self._after_fault: Graph | None = None
+        self._pairs: set[tuple[int, int]] = set()
+        self._min_distance_m = math.inf
+
+    def run(self, on_status: OnStatus | None = None) -> RunRecord:
+        """Let all of it happen. `on_status` gets the state after each sample, for pictures."""
+        network, scenario = self.network, self.scenario
+        end_s = scenario.duration_s
+        step = 0
+        while network.clock.now_s < end_s:
+            step += 1
+            self._pass_time(min(end_s, step * scenario.sample_s))
+            look = self._look()
+            self.timeline.check(look)
+            if on_status is not None:
+                on_status(network.status())
+        return RunRecord(
+            scenario=scenario,
+            gateways=frozenset(gateways_of(network)),
+            start=self._start,
+            before=self._before,
+            after_fault=self._after_fault,
+            end=self._scene(self._looks[-1]),
+            fault_s=self.timeline.first_disruption_s,
+            looks=self._looks,
+            happened=self.timeline.happened,
+            events=network.event_records(),
+            legs=self.flights.legs,
+            traffic=self.medium.traffic,
+            orders=self.timeline.orders,
+            collisions=len(self._pairs),
+            min_distance_m=self._min_distance_m,
+            end_s=end_s,
+            refused_flights=self.flights.refused,
+        )
+
+    def event_hash(self) -> str:
+        """A hash of everything that the mesh software reported: the same run has the same one."""
+        digest = hashlib.sha256()
+        for event in self.network.events:
+            line = f"{event.now_s:.6f} {event.node} {event.kind.value} {event.peer} {event.detail}\n"
+            digest.update(line.encode())
+        return digest.hexdigest()[:16]
+
+    def _pass_time(self, until_s: float) -> None:
+        clock = self.network.clock
+        while clock.now_s < until_s:
+            if self.flights.in_the_air:
+                clock.run_until(min(until_s, clock.now_s + FLIGHT_LOOK_S))
+                self._watch_distances()
+            else:
+                clock.run_until(until_s)
+
+    def _look(self) -> Look:
+        look = look_at(self.network)
+        self._looks.append(look)
+        return look
+
+    def before_disruption(self) -> None:
+        """A fault is about to happen that has to be healed."""
+        if self._before is None:
+            self._before = self._scene(look_at(self.network))
+
+    def after_disruption(self) -> None:
+        """It has happened."""
+        if self._after_fault is None:
+            self._after_fault = physical_graph(self.network)
+        self._look()
+
+    def _places(self) -> dict[int, tuple[float, float, float]]:
+        return {
+            node_id: (place.longitude, place.latitude, place.height)
+            for node_id, place in ((n, self.network.location(n)) for n in self.network.nodes)
+        }
+
+    def _scene(self, look: Look | None) -> Scene:
+        hops = {} if look is None else route_hops(self.network, look.served)
+        return Scene(physical_graph(self.network), hops, self._places())
+
+    def _watch_distances(self) -> None:
+        nodes = self.network.nodes
+        live = [n for n, node in nodes.items() if node.antenna.powered]
+        flying = [n for n in self.flights.in_the_air if nodes[n].antenna.powered]
+        if not flying or len(live) < 2:
+            return
+        places = self._places()
+        points = np.array([places[n] for n in live])
+        for node in flying:
+            distances = np.linalg.norm(points - places[node], axis=1)
+            distances[live.index(node)] = math.inf
+            self._min_distance_m = min(self._min_distance_m, float(distances.min()))
+            for index in np.flatnonzero(distances < STACKED_M):
+                other = live[index]
+                self._pairs.add((min(node, other), max(node, other)))
+
+
+def _network(scenario: Scenario, streams: Streams) -> Network:
+    timing = MeshTiming(
+        check_period_s=scenario.timing.check_period_s,
+        connection_lost_after_s=scenario.timing.connection_lost_after_s,
+        send_attempts=scenario.timing.send_attempts,
+    )
+    network = Network(
+        seed=streams.number("mesh"),
+        timing=timing,
+        routing=scenario.routing,
+        max_distance_m=scenario.range_m,
+        **_options(scenario),
+    )
+    for place in draw_places(scenario.layout, scenario.range_m, streams.of("layout")):
+        add = network.add_gateway if place.gateway else network.add_router
+        add(place.node_id, place.x, place.y)
+    return network
+
+
+def _options(scenario: Scenario) -> dict[str, Any]:
+    """What is not left as the network has it by default."""
+    options: dict[str, Any] = {}
+    if scenario.repair != "thesis":
+        options["repair"] = scenario.repair
+    if scenario.radio.kind == "disc":
+        options["delay_s"] = scenario.radio.delay_s
+        options["jitter_s"] = scenario.radio.jitter_s
+    else:
+        options["radio"] = scenario.radio.kind
+        if scenario.radio.rate is not None:
+            options["rate"] = scenario.radio.rate
+    return options

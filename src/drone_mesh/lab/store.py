@@ -1,0 +1,271 @@
+"""The results folder: what is done is what stands in it; nothing in it is lost or written twice."""
+
+from __future__ import annotations
+
+import csv
+import fcntl
+import io
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any, Iterable, Mapping, Sequence
+
+from drone_mesh.errors import MeshError
+from drone_mesh.lab.experiment import as_text
+from drone_mesh.lab.plan import Plan, flatten
+from drone_mesh.lab.worker import Outcome, as_cell, metric_columns
+
+FIRST_COLUMNS = ("run", "seed", "repetition")
+LAST_COLUMNS = ("event_hash", "code", "wall_s")
+OUTAGE_COLUMNS = ("run", "repetition", "node", "lost_s", "restored_s")
+FAILURE_COLUMNS = ("run", "repetition", "cell", "kind", "message", "command", "traceback")
+RUNS, OUTAGES, FAILURES = "runs.csv", "outages.csv", "failures.csv"
+PLAN, PROVENANCE, EXPERIMENT, LOGS = "plan.csv", "provenance.json", "experiment.yaml", "logs"
+
+
+class StoreError(MeshError):
+    """The results folder cannot be used. The message says why and what to do."""
+
+
+class Table:
+    """A CSV file that only grows: rows are whole or not there."""
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        """Repairs what a killed writer left: an unfinished last line goes."""
+        self.path = path
+        self.columns = list(columns)
+        self.rows = read_rows(path)
+        there = list(self.rows[0]) if self.rows else []
+        self.columns += [name for name in there if name not in self.columns]
+        self.rewrite(self.rows)
+
+    def append(self, rows: Iterable[Mapping[str, str]]) -> None:
+        """Write these rows, all or none. Raises StoreError when the disk does not take them."""
+        text = io.StringIO()
+        writer = csv.DictWriter(text, self.columns, lineterminator="\n", restval="")
+        writer.writerows(rows)
+        data = text.getvalue().encode()
+        end = os.fstat(self._file).st_size
+        try:
+            view = memoryview(data)
+            while view:
+                view = view[os.write(self._file, view) :]
+        except OSError as error:
+            os.ftruncate(self._file, end)
+            raise _cannot("write", self.path, error) from error
+
+    def rewrite(self, rows: Iterable[Mapping[str, str]]) -> None:
+        """Replace the file by these rows at once, and go on behind them."""
+        new = self.path.with_suffix(".new")
+        try:
+            with new.open("w", encoding="utf-8", newline="") as file:
+                writer = csv.DictWriter(file, self.columns, lineterminator="\n", restval="")
+                writer.writeheader()
+                writer.writerows(rows)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(new, self.path)
+            self.close()
+            self._file = os.open(self.path, os.O_WRONLY | os.O_APPEND)
+        except OSError as error:
+            raise _cannot("write", self.path, error) from error
+
+    def close(self) -> None:
+        """Let go of the file."""
+        if hasattr(self, "_file"):
+            os.close(self._file)
+            del self._file
+
+
+class Store:
+    """One results folder, open for writing by this process alone."""
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        """Raises StoreError: unwritable, or another `lab run` is writing there."""
+        self.folder = folder
+        self._plan = plan
+        try:
+            (folder / LOGS).mkdir(parents=True, exist_ok=True)
+            self._lock = (folder / ".lock").open("a+", encoding="utf-8")
+        except OSError as error:
+            raise _cannot("use", folder, error) from error
+        self._take_lock()
+        own = plan.own_metrics
+        columns = [*FIRST_COLUMNS, *plan.parameter_columns, *metric_columns(own), *LAST_COLUMNS]
+        self.runs = Table(folder / RUNS, columns)
+        self.outages = Table(folder / OUTAGES, OUTAGE_COLUMNS)
+        self.failures = Table(folder / FAILURES, FAILURE_COLUMNS)
+        self.done = {row["run"] for row in self.runs.rows}
+        self.failed = {row["run"] for row in self.failures.rows}
+        self._drop_orphans()
+
+    def _take_lock(self) -> None:
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._lock.seek(0)
+            holder = self._lock.read().strip() or "another process"
+            self._lock.close()
+            raise StoreError(
+                f"{self.folder}: {holder} is writing there; wait for it, or choose another --out"
+            ) from None
+        self._lock.truncate(0)
+        self._lock.write(f"lab run, process {os.getpid()} on {os.uname().nodename},")
+        self._lock.flush()
+
+    def _drop_orphans(self) -> None:
+        """Outages of runs that are not in runs.csv: a writer was killed between the two."""
+        kept = [row for row in self.outages.rows if row["run"] in self.done]
+        if len(kept) != len(self.outages.rows):
+            self.outages.rewrite(kept)
+            self.outages.rows = kept
+
+    def use(self, plan: Plan) -> None:
+        """Go on with another plan of the same experiment, one with more seeds."""
+        self._plan = plan
+        self._write_plan()
+
+    def describe(self, session: Mapping[str, Any]) -> None:
+        """Write down what is run here: the file as given, the plan, and this session."""
+        loaded = self._plan.loaded
+        sessions = read_provenance(self.folder)
+        try:
+            if loaded.path.resolve() != (self.folder / EXPERIMENT).resolve():
+                shutil.copyfile(loaded.path, self.folder / EXPERIMENT)
+            text = json.dumps([*sessions, dict(session)], indent=2) + "\n"
+            (self.folder / PROVENANCE).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise _cannot("write", self.folder, error) from error
+        self._write_plan()
+
+    def _write_plan(self) -> None:
+        path = self.folder / PLAN
+        try:
+            with path.open("w", encoding="utf-8", newline="") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow(["run", "repetition", *self._plan.loaded.axes])
+                for planned in self._plan:
+                    values = self._plan.cells[planned.cell].values.values()
+                    cells = [planned.spec.run, planned.spec.repetition, *map(as_text, values)]
+                    writer.writerow(cells)
+        except OSError as error:
+            raise _cannot("write", path, error) from error
+
+    def add(self, outcome: Outcome, cell: str, command: str) -> None:
+        """Keep what came of a run: its row and its outages, or its failure."""
+        spec = outcome.spec
+        if outcome.failure:
+            self._add_failure(outcome, cell, command)
+            return
+        if spec.run in self.done:  # a worker that was thought dead had finished it
+            return
+        if self._plan.loaded.experiment.output == "runs_and_outages":
+            self.outages.append(
+                {
+                    "run": spec.run,
+                    "repetition": str(spec.repetition),
+                    "node": str(outage.node),
+                    "lost_s": as_cell(outage.lost_s),
+                    "restored_s": "" if outage.restored_s is None else as_cell(outage.restored_s),
+                }
+                for outage in outcome.outages
+            )
+        row = {
+            "run": spec.run,
+            "seed": str(spec.seed),
+            "repetition": str(spec.repetition),
+            **flatten(json.loads(spec.scenario)),
+            **{name: as_cell(value) for name, value in outcome.values.items()},
+            "event_hash": outcome.event_hash,
+            "code": outcome.code,
+            "wall_s": f"{outcome.wall_s:.4f}",
+        }
+        self.runs.append([row])
+        self.done.add(spec.run)
+
+    def take_from(self, other: Path) -> int:
+        """Copy what another results folder has and this one lacks; returns how many runs."""
+        rows = [row for row in read_rows(other / RUNS) if row["run"] not in self.done]
+        new = {row["run"] for row in rows}
+        self.outages.append(row for row in read_rows(other / OUTAGES) if row["run"] in new)
+        self.runs.append(rows)
+        self.done |= new
+        failures = read_rows(other / FAILURES)
+        self.failures.append(row for row in failures if row["run"] not in self.failed | self.done)
+        return len(new)
+
+    def _add_failure(self, outcome: Outcome, cell: str, command: str) -> None:
+        spec = outcome.spec
+        row = {
+            "run": spec.run,
+            "repetition": str(spec.repetition),
+            "cell": cell,
+            "kind": outcome.failure,
+            "message": outcome.message,
+            "command": command,
+            "traceback": outcome.traceback,
+        }
+        self.failures.append([row])
+        self.failed.add(spec.run)
+        try:
+            (self.folder / LOGS / f"{spec.run}.txt").write_text(
+                f"{command}\n{outcome.message}\n\n{outcome.traceback}", encoding="utf-8"
+            )
+        except OSError as error:
+            raise _cannot("write", self.folder / LOGS, error) from error
+
+    def forget_failures(self) -> None:
+        """Let failed runs be missing again."""
+        self.failures.rewrite([])
+        self.failures.rows = []
+        self.failed = set()
+
+    def put_in_order(self) -> None:
+        """Sort all tables as the plan is sorted: the same runs give the same bytes."""
+        order = {planned.spec.run: place for place, planned in enumerate(self._plan)}
+        last = len(order)
+        for table in (self.runs, self.outages, self.failures):
+            rows = read_rows(table.path)
+            rows.sort(key=lambda row: (order.get(row["run"], last), row["run"] not in order))
+            table.rewrite(rows)
+
+    def close(self) -> None:
+        """Let others write here."""
+        for table in (self.runs, self.outages, self.failures):
+            table.close()
+        self._lock.truncate(0)
+        self._lock.close()
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """The whole rows of a CSV file; none if it does not exist. An unfinished last one is left out.
+
+    Raises StoreError for a file that cannot be read.
+    """
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise _cannot("read", path, error) from error
+    text = data[: data.rfind(b"\n") + 1].decode("utf-8", "replace")
+    rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    while rows and None in rows[-1].values():
+        rows.pop()  # cut off inside a quoted traceback
+    return rows
+
+
+def read_provenance(folder: Path) -> list[dict[str, Any]]:
+    """All sessions that wrote into this folder, oldest first."""
+    try:
+        sessions = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    return sessions if isinstance(sessions, list) else []
+
+
+def _cannot(do: str, path: Path, error: OSError) -> StoreError:
+    return StoreError(
+        f"cannot {do} {path}: {error.strerror or error}; what was written before is kept"
+    )

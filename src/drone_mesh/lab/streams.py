@@ -1,0 +1,24 @@
+"""Random numbers by purpose: what one part draws does not shift what another part gets."""
+
+from __future__ import annotations
+
+import random
+
+
+class Streams:
+    """The random generators of one run.
+
+    The r-th repetition has the same streams in every cell of an experiment (common random numbers):
+    the same layout, victims and losses, whatever the technique under test draws.
+    """
+
+    def __init__(self, seed: int, repetition: int) -> None:
+        self._root = f"{seed}/{repetition}"
+
+    def of(self, purpose: str) -> random.Random:
+        """A generator for this purpose; the same one for the same seed, repetition and purpose."""
+        return random.Random(f"{self._root}/{purpose}")  # seeded by SHA-512, alike on each Python
+
+    def number(self, purpose: str) -> int:
+        """A 32-bit seed for a part that wants a number."""
+        return self.of(purpose).getrandbits(32)

@@ -1,0 +1,278 @@
+"""Makes the faults of a scenario happen in a running network."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import random
+from dataclasses import dataclass
+from typing import Callable, Iterator, NamedTuple, Protocol
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.inprocess import Network
+from drone_mesh.lab.conditions import Condition, parse_condition
+from drone_mesh.lab.flights import Flights
+from drone_mesh.lab.look import Look, gateways_of
+from drone_mesh.lab.medium import Jamming, Medium
+from drone_mesh.lab.picking import pick_drones
+from drone_mesh.lab.scenario import Fault, Scenario
+from drone_mesh.lab.streams import Streams
+
+HEALING_STARTS_WITH = frozenset({"kill", "cut_link", "jam", "gateway_off"})
+"""Faults from which the time to heal is measured."""
+
+
+class Happened(NamedTuple):
+    """One fault, as it happened."""
+
+    at_s: float
+    action: str
+    nodes: tuple[int, ...]
+
+
+@dataclass
+class OrderSent:
+    """One flight order: when it left, and whether a next hop took it."""
+
+    at_s: float
+    node: int
+    taken: bool
+
+
+class Witness(Protocol):
+    """Looks at the network around each fault that it has to heal."""
+
+    def before_disruption(self) -> None:
+        """It is about to happen."""
+
+    def after_disruption(self) -> None:
+        """It has happened."""
+
+
+class Timeline:
+    """The faults of one run, on the network's clock."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        network: Network,
+        medium: Medium,
+        flights: Flights,
+        streams: Streams,
+        witness: Witness,
+    ) -> None:
+        """Put the faults on the network's clock."""
+        self.happened: list[Happened] = []
+        self.orders: list[OrderSent] = []
+        self.first_disruption_s: float | None = None
+        self._network, self._medium, self._flights = network, medium, flights
+        self._scenario, self._streams = scenario, streams
+        self._witness = witness
+        self._waiting: list[tuple[Condition, int]] = []
+        self._seen: dict[str, float] = {}  # when a condition's event was first true
+        self._events_read = 0
+        for index, fault in enumerate(scenario.faults):
+            if fault.at_s is not None:
+                network.clock.call_at(fault.at_s, self._start, index)
+            else:
+                self._waiting.append((parse_condition(str(fault.when)), index))
+
+    def check(self, look: Look) -> None:
+        """Start what waits for a condition; to be called with every look."""
+        if not self._waiting:
+            return
+        self._note_events(look)
+        waiting, self._waiting = self._waiting, []
+        for condition, index in waiting:
+            seen_s = self._seen.get(condition.event)
+            if seen_s is None:
+                self._waiting.append((condition, index))
+            else:
+                at_s = max(seen_s + condition.delay_s, look.now_s)
+                self._network.clock.call_at(at_s, self._start, index)
+
+    def _note_events(self, look: Look) -> None:
+        if look.alive and look.served == look.alive:
+            self._seen.setdefault("all connected", look.now_s)
+            if self.first_disruption_s is not None and look.now_s > self.first_disruption_s:
+                self._seen.setdefault("healed", look.now_s)
+        flown = (MeshEventKind.FLIGHT_DECIDED, MeshEventKind.FLIGHT_ORDERED)
+        for event in self._network.events[self._events_read :]:
+            if event.kind in flown:
+                self._seen.setdefault("the first flight", event.now_s)
+            elif event.kind is MeshEventKind.LANDED:
+                self._seen.setdefault("the first landing", event.now_s)
+            elif event.kind is MeshEventKind.DISCONNECTED:
+                self._seen.setdefault("the first loss", event.now_s)
+        self._events_read = len(self._network.events)
+
+    def _start(self, index: int) -> None:
+        fault = self._scenario.faults[index]
+        rng = self._streams.of(f"fault {index}")
+        act = getattr(self, f"_{fault.action}")
+        if fault.action in HEALING_STARTS_WITH:
+            with self._disruption():
+                self._note(fault.action, act(fault, rng))
+        else:
+            self._note(fault.action, act(fault, rng))
+
+    @contextlib.contextmanager
+    def _disruption(self) -> Iterator[None]:
+        if self.first_disruption_s is None:
+            self.first_disruption_s = self._network.clock.now_s
+        self._witness.before_disruption()
+        yield
+        self._witness.after_disruption()
+
+    def _note(self, action: str, nodes: list[int]) -> None:
+        self.happened.append(Happened(self._network.clock.now_s, action, tuple(nodes)))
+
+    def _after(self, seconds: float | None, undo: Callable[[object], None]) -> None:
+        if seconds is not None:
+            self._network.clock.call_at(self._network.clock.now_s + seconds, undo, None)
+
+    def _power(self, nodes: list[int], on: bool) -> None:
+        for node in nodes:
+            self._network.power(node, on)
+
+    def _kill(self, fault: Fault, rng: random.Random) -> list[int]:
+        nodes = pick_drones(fault.what, True, self._network, self._medium, rng)
+        self._power(nodes, False)
+        return nodes
+
+    def _revive(self, fault: Fault, rng: random.Random) -> list[int]:
+        nodes = pick_drones(fault.what, False, self._network, self._medium, rng)
+        self._power(nodes, True)
+        return nodes
+
+    def _cut_link(self, fault: Fault, rng: random.Random) -> list[int]:
+        air, what = self._network.air, fault.what
+        if what.between is not None:
+            links = [tuple(what.between)]
+        else:
+            links = sorted(
+                (a, b) for a in sorted(self._network.nodes) for b in air.in_range(a) if a < b
+            )
+            links = rng.sample(links, min(what.number, len(links)))
+        for a, b in links:
+            air.cut(a, b)
+
+        def mend(_: object) -> None:
+            for a, b in links:
+                air.cut(a, b, off=False)
+
+        self._after(what.for_s, mend)
+        return sorted({node for link in links for node in link})
+
+    def _jam(self, fault: Fault, _rng: random.Random) -> list[int]:
+        what, jams = fault.what, self._medium.jams
+        jamming = Jamming((what.center[0], what.center[1]), what.radius_m, what.loss)
+        jams.append(jamming)
+        self._after(what.for_s, lambda _: jams.remove(jamming))
+        return []
+
+    def _gateway_off(self, fault: Fault, _rng: random.Random) -> list[int]:
+        node = fault.what.id
+        self._network.power(node, False)
+        self._after(fault.what.for_s, lambda _: self._network.power(node, True))
+        return [node]
+
+    def _loss(self, fault: Fault, _rng: random.Random) -> list[int]:
+        medium, before = self._medium, self._medium.loss
+        medium.loss = fault.what.share
+        self._after(fault.what.for_s, lambda _: setattr(medium, "loss", before))
+        return []
+
+    def _battery(self, fault: Fault, rng: random.Random) -> list[int]:
+        what, clock = fault.what, self._network.clock
+        routers = sorted(set(self._network.nodes) - set(gateways_of(self._network)))
+        nodes = sorted(rng.sample(routers, round(what.share * len(routers))))
+        if what.fly_m is not None:
+            self._flights.limit(nodes, what.fly_m, self._die)
+        if what.live_min is not None:
+            for node in nodes:
+                clock.call_at(clock.now_s + 60.0 * what.live_min, self._die, node)
+        return nodes
+
+    def _die(self, node: int) -> None:
+        if self._network.nodes[node].antenna.powered:
+            with self._disruption():
+                self._network.power(node, False)
+                self._note("battery empty", [node])
+
+    def _churn(self, fault: Fault, rng: random.Random) -> list[int]:
+        what, clock = fault.what, self._network.clock
+        end_s = math.inf if what.for_s is None else clock.now_s + what.for_s
+        end_s = min(end_s, self._scenario.duration_s)
+        for alive, per_min in ((True, what.deaths_per_min), (False, what.births_per_min)):
+            at_s = clock.now_s
+            while per_min:
+                at_s += rng.expovariate(per_min / 60.0)
+                if at_s >= end_s:
+                    break
+                clock.call_at(at_s, self._churn_one, (alive, rng.random()))
+        return []
+
+    def _churn_one(self, what: tuple[bool, float]) -> None:
+        alive, draw = what
+        gateways = set(gateways_of(self._network))
+        fit = [
+            node_id
+            for node_id, node in sorted(self._network.nodes.items())
+            if node_id not in gateways and node.antenna.powered == alive
+        ]
+        if fit:
+            chosen = fit[int(draw * len(fit))]
+            with self._disruption():
+                self._network.power(chosen, not alive)
+                self._note("death" if alive else "birth", [chosen])
+
+    def _order(self, fault: Fault, rng: random.Random) -> list[int]:
+        what = fault.what
+        if what.id is not None:
+            x, y, height = (*what.to, 0.0)[:3]
+            self._send_order(what.id, x, y, int(height))
+            return [what.id]
+        clock = self._network.clock
+        end_s = self._scenario.duration_s - 1.0
+        if what.for_s is not None:
+            end_s = min(end_s, clock.now_s + what.for_s)
+        at_s = clock.now_s
+        while at_s < end_s:
+            clock.call_at(at_s, self._random_order, (rng.random(), rng.random(), what.within_m))
+            at_s += what.every_s
+        return []
+
+    def _random_order(self, draws: tuple[float, float, float]) -> None:
+        which, direction, within_m = draws
+        gateways = set(gateways_of(self._network))
+        fit = [
+            node_id
+            for node_id, node in sorted(self._network.nodes.items())
+            if node_id not in gateways and node.antenna.powered
+        ]
+        if fit:
+            node = fit[int(which * len(fit))]
+            here, angle = self._network.location(node), 2 * math.pi * direction
+            x = here.longitude + within_m * math.cos(angle)
+            y = here.latitude + within_m * math.sin(angle)
+            self._send_order(node, x, y, 0)
+
+    def _send_order(self, node: int, x: float, y: float, height: int) -> None:
+        gateway = next(
+            (g for g in gateways_of(self._network) if self._network.nodes[g].antenna.powered), None
+        )
+        taken = gateway is not None and self._network.order(node, x, y, height, gateway)
+        self.orders.append(OrderSent(self._network.clock.now_s, node, taken))
+
+    def _wind(self, fault: Fault, _rng: random.Random) -> list[int]:
+        drones = [node.drone for node in self._network.nodes.values()]
+        calm_m_s = self._scenario.speed_m_s
+
+        def blow(speed_m_s: float) -> None:
+            for drone in drones:
+                drone.speed_m_s = speed_m_s
+
+        blow(calm_m_s * fault.what.speed_factor)
+        self._after(fault.what.for_s, lambda _: blow(calm_m_s))
+        return []

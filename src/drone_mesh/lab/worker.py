@@ -1,0 +1,142 @@
+"""Executes one run, wherever it is: in this process or on a worker of a cluster."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import json
+import math
+import threading
+import time
+import traceback
+from types import TracebackType
+from typing import NamedTuple
+
+from drone_mesh.lab import extensions
+from drone_mesh.lab.metrics import METRICS, measure_all
+from drone_mesh.lab.plan import RunSpec
+from drone_mesh.lab.provenance import code_version
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.simulation import Simulation
+from drone_mesh.lab.streams import Streams
+
+
+class OutageRow(NamedTuple):
+    """One row of outages.csv, but for the run's id; seconds of simulated time."""
+
+    node: int
+    lost_s: float
+    restored_s: float | None
+
+
+class Outcome(NamedTuple):
+    """What came of one run."""
+
+    spec: RunSpec
+    wall_s: float
+    code: str  # version of the code that ran it
+    values: dict[str, float]  # metric -> value; empty after a failure
+    event_hash: str
+    outages: tuple[OutageRow, ...]
+    failure: str  # kind; empty: none
+    message: str
+    traceback: str
+
+
+class RunTimeout(Exception):
+    """A run took longer than it may."""
+
+
+def execute_batch(specs: list[RunSpec]) -> list[Outcome]:
+    """Execute one after the other."""
+    return [execute(spec) for spec in specs]
+
+
+def execute(spec: RunSpec) -> Outcome:
+    """Never raises for what the run does: that is its outcome."""
+    started = time.perf_counter()
+    try:
+        with _Alarm(spec.timeout_s):
+            values, event_hash, outages = _measure(spec)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a user's technique may raise anything, SystemExit included
+        kind = "timeout" if isinstance(error, RunTimeout) else "exception"
+        message = " ".join(str(error).split()) or type(error).__name__
+        if kind == "exception":
+            message = f"{type(error).__name__}: {message}"
+        else:
+            message = f"still running after {spec.timeout_s:g} s of wall time"
+        return Outcome(
+            spec, time.perf_counter() - started, code_version(), {}, "", (), kind, message,
+            traceback.format_exc(),
+        )  # fmt: skip
+    wall_s = time.perf_counter() - started
+    return Outcome(spec, wall_s, code_version(), values, event_hash, outages, "", "", "")
+
+
+def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[OutageRow, ...]]:
+    if spec.search_path:
+        extensions.search_in_text(spec.search_path)
+    scenario = scenario_of(spec.scenario)
+    streams = Streams(spec.seed, spec.repetition)
+    simulation = Simulation(scenario, streams)
+    record = simulation.run()
+    values = measure_all(record)
+    for name in spec.own_metrics:
+        value = float(extensions.own_metric(name)(record))
+        values[extensions.own_column(name)] = value
+    gaps = tuple(OutageRow(gap.node, gap.lost_s, gap.restored_s) for gap in record.gaps())
+    return values, simulation.event_hash(), gaps
+
+
+@functools.lru_cache(maxsize=1024)
+def scenario_of(text: str) -> Scenario:
+    """The scenario of a spec's JSON."""
+    return Scenario.model_validate(json.loads(text))
+
+
+def metric_columns(own_metrics: tuple[str, ...]) -> list[str]:
+    """The columns of runs.csv that hold metrics."""
+    return [*METRICS, *map(extensions.own_column, own_metrics)]
+
+
+def as_cell(value: float) -> str:
+    """A metric as text: alike on each Python, empty where it is not defined."""
+    return "" if math.isnan(value) else f"{round(value, 6):.10g}"
+
+
+class _Alarm:
+    """Raises RunTimeout in the thread that entered it, when the time is over.
+
+    A signal would reach the main thread only, and a worker runs its tasks in another one. It stops
+    what runs in Python, also an endless loop, but not a library that never returns.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._lock = threading.Lock()
+        self._over = False
+
+    def __enter__(self) -> None:
+        self._thread = threading.get_ident()
+        self._timer = threading.Timer(self._seconds, self._ring)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        with self._lock:
+            self._over = True
+        self._timer.cancel()
+
+    def _ring(self) -> None:
+        with self._lock:
+            if not self._over:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                    ctypes.c_ulong(self._thread), ctypes.py_object(RunTimeout)
+                )
