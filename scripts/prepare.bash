@@ -127,9 +127,14 @@ prepare_simulation() {
   build
 }
 
+prepare_lab() {
+  make_venv
+  pip_install requirements/report.txt requirements/lab.txt
+}
+
 prepare_unit_tests() {
   make_venv
-  pip_install "${simulation_requirements[@]}" requirements/test.txt
+  pip_install "${simulation_requirements[@]}" requirements/{lab,test}.txt
   pip_install --no-deps requirements/test-bare.txt
 }
 

@@ -26,13 +26,14 @@ def between(start: Vector, end: Vector, share: float) -> Vector:
 class FlightPath:
     """One flight in straight lines: up, across, down.
 
-    A flight over a straight distance d takes d / SPEED_M_S and climbs d / 2. The way flown is
+    A flight over a straight distance d takes d / speed_m_s and climbs d / 2. The way flown is
     longer than d, so a drone is faster than that for most of it.
     """
 
     start: Vector
     goal: Vector
     start_s: float  # when it leaves `start`, simulated seconds
+    speed_m_s: float = SPEED_M_S
     duration_s: float = field(init=False)
     above_start: Vector = field(init=False)  # where it is at 10 %
     above_goal: Vector = field(init=False)  # where it is at 90 %
@@ -41,7 +42,7 @@ class FlightPath:
         distance_m = math.dist(self.start, self.goal)
         climb_m = distance_m / 2
         derived = {
-            "duration_s": distance_m / SPEED_M_S,
+            "duration_s": distance_m / self.speed_m_s,
             "above_start": (self.start[0], self.start[1], self.start[2] + climb_m),
             "above_goal": (self.goal[0], self.goal[1], self.goal[2] + climb_m),
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Callable
 
-from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.inprocess.clock import VirtualClock
@@ -21,6 +21,7 @@ class InProcessDrone(IDroneEngine):
         self._place = start
         self._path: FlightPath | None = None
         self._on_flight = on_flight
+        self.speed_m_s = SPEED_M_S  # of its next flight; experiments change it: wind
 
     @property
     def path(self) -> FlightPath | None:
@@ -36,7 +37,7 @@ class InProcessDrone(IDroneEngine):
             return
         if self._path is None:
             self._on_flight(True)
-        self._path = FlightPath(here.to_vector(), goal, self._clock.now_s)
+        self._path = FlightPath(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
         self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
 
     def get_location(self) -> Location:

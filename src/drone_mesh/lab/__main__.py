@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """python3 -m drone_mesh.lab: experiments without ROS."""
 
 import sys

@@ -45,11 +45,7 @@ class Campaign:
             if retry_failed:
                 store.forget_failures()
             name = cluster or ("in this process" if workers == 0 else f"{workers} local")
-            store.describe(
-                describe_session(
-                    self._command, self.loaded.overrides, self.loaded.digest, name
-                )
-            )
+            store.describe(describe_session(self._command, self.loaded, name))
             while True:
                 self._run_plan(plan, store, workers, cluster, shard, stream)
                 more = self._more_seeds(plan, store)

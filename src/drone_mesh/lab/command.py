@@ -90,23 +90,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    report = commands.add_parser("report", help="write tables and figures as one HTML file")
-    report.add_argument("results", type=Path)
-    report.add_argument("--out", type=Path, help="the page (default: RESULTS/report.html)")
-    report.add_argument(
-        "--export", metavar="FORMAT", action="append", default=[],
-        choices=("png", "pdf", "svg", "csv", "latex"),
-        help="also write each figure or table as a file: png, pdf, svg, csv or latex; repeatable",
-    )  # fmt: skip
-    report.set_defaults(run=_report)
-
     show = commands.add_parser("show", help="repeat one run, with all its events")
     show.add_argument("results", type=Path)
     show.add_argument("run_id", metavar="RUN", help="its id, or the beginning of it")
     show.add_argument("--page", type=Path, metavar="FILE", help="write a report page about it")
-    show.add_argument("--console", action="store_true", help="serve it with a time line")
-    show.add_argument("--port", type=int, default=9081, help="of --console (default 9081)")
-    show.add_argument("--rviz", action="store_true", help="publish it for rviz; needs ROS")
     show.set_defaults(run=_show)
 
     compare = commands.add_parser("compare", help="paired difference of two cells, per seed")
@@ -207,15 +194,6 @@ def _merge(options: argparse.Namespace) -> int:
     count = merge(options.into, options.shards)
     print(f"{count} runs from {len(options.shards)} shards added")
     print(describe_folder(options.into))
-    return 0
-
-
-def _report(options: argparse.Namespace) -> int:
-    # Here and below: only the analysis needs scipy, matplotlib and jinja2.
-    from drone_mesh.lab.report import write_report
-
-    for path in write_report(options.results, options.out, options.export):
-        print(f"wrote {path}")
     return 0
 
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import signal
 import statistics
+import threading
 from collections import deque
 from typing import TYPE_CHECKING, Iterable, Iterator
 
@@ -62,14 +64,15 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
     with contextlib.ExitStack() as stack:
         try:
             if cluster is None:
-                local = LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=None,
-                    memory_limit=None,
-                    silence_logs=logging.CRITICAL,
-                )
+                with _children_ignore_ctrl_c():
+                    local = LocalCluster(
+                        n_workers=workers,
+                        threads_per_worker=1,
+                        processes=True,
+                        dashboard_address=None,
+                        memory_limit=None,
+                        silence_logs=logging.CRITICAL,
+                    )
                 address = stack.enter_context(local)
             elif cluster == SLURM:
                 address = stack.enter_context(_slurm(workers))
@@ -81,11 +84,24 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
         yield client
 
 
+@contextlib.contextmanager
+def _children_ignore_ctrl_c() -> Iterator[None]:
+    """A terminal signals the workers too. Only this process answers; it ends the others."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # nobody's Ctrl-C arrives here
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
     try:
         from dask_jobqueue import SLURMCluster
     except ImportError as error:
-        raise EngineError("--cluster slurm needs dask-jobqueue: pip install dask-jobqueue") from error
+        raise EngineError("--cluster slurm needs: pip install dask-jobqueue") from error
     cluster = SLURMCluster()  # configured in ~/.config/dask/jobqueue.yaml
     cluster.scale(jobs=max(1, workers))
     return cluster  # type: ignore[no-any-return]
@@ -93,7 +109,7 @@ def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
 
 def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
     from distributed import CancelledError, KilledWorker, as_completed
-    from distributed.comm import CommClosedError
+    from distributed.comm.core import CommClosedError
 
     under_way: dict[Future, list[RunSpec]] = {}
     done = as_completed(loop=client.loop)

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from typing_extensions import Annotated, Literal, get_args
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab import extensions
+from drone_mesh.lab import boxes, extensions, places
 from drone_mesh.lab.expression import ExpressionError, Where
 from drone_mesh.lab.marked_yaml import Lines, Place, nearest_line, read_marked
 from drone_mesh.lab.scenario import Fault, Part, Scenario
@@ -74,6 +74,7 @@ class LoadedExperiment(NamedTuple):
     experiment: Experiment
     cells: Sequence[Cell]
     path: Path
+    folder: Path  # of the files and modules that it names
     overrides: Tuple[str, ...]
 
     @property
@@ -88,13 +89,18 @@ class LoadedExperiment(NamedTuple):
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def load_experiment(path: Path, overrides: Sequence[str] = ()) -> LoadedExperiment:
-    """Read and check all of it. Raises ConfigurationError: file, line, key and what is wrong."""
+def load_experiment(
+    path: Path, overrides: Sequence[str] = (), folder: Optional[Path] = None
+) -> LoadedExperiment:
+    """Read and check all of it. Raises ConfigurationError: file, line, key and what is wrong.
+
+    `folder`: where the files and modules that it names are, if not beside it.
+    """
     content, lines = read_marked(path)
-    source = _Source(path, lines)
+    source = _Source(path, lines, folder or path.parent)
     for override in overrides:
         _override(content, override, source)
-    extensions.search_in(path.parent)
+    extensions.search_in(source.folder)
     try:
         experiment = Experiment.model_validate(content)
     except ValidationError as error:
@@ -104,7 +110,7 @@ def load_experiment(path: Path, overrides: Sequence[str] = ()) -> LoadedExperime
     if not cells:
         raise source.error(("where",), "where excludes every cell of the sweep")
     _check_compare(experiment, cells, source)
-    return LoadedExperiment(experiment, cells, path, tuple(overrides))
+    return LoadedExperiment(experiment, cells, path, source.folder, tuple(overrides))
 
 
 def as_text(value: Any) -> str:
@@ -117,8 +123,9 @@ def as_text(value: Any) -> str:
 class _Source:
     """Makes errors that point into the file, or at the argument that overruled it."""
 
-    def __init__(self, path: Path, lines: Lines) -> None:
+    def __init__(self, path: Path, lines: Lines, folder: Path) -> None:
         self.path = path
+        self.folder = folder
         self.lines = lines
         self.overrides: Dict[Place, str] = {}
 
@@ -177,7 +184,7 @@ def _override(content: Dict[str, Any], override: str, source: _Source) -> None:
     """Put the value of `a.b=c` into the content."""
     path, equals, text = override.partition("=")
     if not equals or not path:
-        raise ConfigurationError(f"argument {override}: expected key=value, such as base.range_m=12")
+        raise ConfigurationError(f"argument {override}: expected key=value, as in seeds=50")
     try:
         value = yaml.safe_load(text)
     except yaml.YAMLError:
@@ -264,9 +271,9 @@ def _cells(experiment: Experiment, source: _Source) -> Iterator[Cell]:
         axes.append([dict(zip(group, row)) for row in zip(*group.values())])
     where = _where(experiment, list(named), source)
     for combination in itertools.product(*axes):
-        values = {axis: value for part in combination for axis, value in part.items()}
-        if where is None or where.holds(values):
-            yield Cell(values, _scenario(experiment, values, named, source))
+        point = {axis: value for part in combination for axis, value in part.items()}
+        if where is None or where.holds(point):
+            yield Cell(point, _scenario(experiment, point, named, source))
 
 
 def _where(experiment: Experiment, axes: Sequence[str], source: _Source) -> Optional[Where]:
@@ -288,12 +295,13 @@ def _scenario(
             placed[_put(content, axis, value)] = axis
         except _NoSuchPlace as error:
             raise source.error(named[axis], f"axis {axis}: {error}") from None
+    _read_files(content, source)
     try:
         scenario = Scenario.model_validate(content)
     except ValidationError as error:
         inside = tuple(error.errors()[0]["loc"])
         for place, axis in placed.items():
-            if inside[: len(place)] == place or place[: len(inside)] == inside:
+            if inside[: len(place)] == place:
                 raise source.error_of(error, (), Scenario, shown=named[axis]) from None
         raise source.error_of(error, ("base",), Scenario) from None
     for key in ("routing", "repair"):
@@ -303,6 +311,21 @@ def _scenario(
             raise source.error(named.get(key, ("base", key)), f"{key}: {error}") from None
     _check_ids(scenario, source)
     return scenario
+
+
+def _read_files(content: Dict[str, Any], source: _Source) -> None:
+    """Put what other files say into the scenario: its id has to depend on that, not on a path."""
+    for part, key, read in (
+        ("layout", "places", places.rows_of_file),
+        ("obstacles", "boxes", boxes.rows_of_file),
+    ):
+        holder = content.get(part)
+        if not isinstance(holder, dict) or not isinstance(holder.get("path"), str):
+            continue
+        try:
+            holder[key] = read(source.folder / holder["path"])
+        except ConfigurationError as error:
+            raise source.error(("base", part, "path"), f"{part}.path: {error}") from None
 
 
 def _check_ids(scenario: Scenario, source: _Source) -> None:
@@ -329,7 +352,9 @@ def _ids_of(fault: Fault) -> List[int]:
 
 
 def _check_metrics(experiment: Experiment, source: _Source) -> None:
-    wanted = [(("metrics", index), name) for index, name in enumerate(experiment.metrics)]
+    wanted: List[Tuple[Place, str]] = [
+        (("metrics", index), name) for index, name in enumerate(experiment.metrics)
+    ]
     if experiment.stop is not None:
         wanted.append((("stop", "metric"), experiment.stop.metric))
     for place, name in wanted:
@@ -350,7 +375,8 @@ def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: _Sourc
     axes = list(cells[0].values)
     if compare.over not in axes:
         raise source.error(
-            ("compare", "over"), f"compare.over: no axis {compare.over}; {_nearest(compare.over, axes)}"
+            ("compare", "over"),
+            f"compare.over: no axis {compare.over}; {_nearest(compare.over, axes)}",
         )
     if all(cell.values[compare.over] != compare.baseline for cell in cells):
         raise source.error(

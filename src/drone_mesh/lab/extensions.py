@@ -61,7 +61,7 @@ def own_metric(name: str) -> OwnMetric:
     try:
         inspect.signature(function).bind(None)
     except TypeError as error:
-        raise ConfigurationError(f"metric {name} must take one argument, the run's record") from error
+        raise ConfigurationError(f"metric {name} must take one argument: the record") from error
     return cast(OwnMetric, function)
 
 

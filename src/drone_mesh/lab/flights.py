@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.look import gateways_of, physical_graph
 
@@ -102,7 +102,9 @@ class Flights:
         way_m = math.dist(leg.path.start[:2], leg.path.goal[:2])
         if left_m < way_m:
             clock = self._network.clock
-            at_s = leg.path.start_s + leg.path.duration_s * max(0.0, left_m) / way_m
+            across = DESCENT_STARTS_AT - CLIMB_ENDS_AT  # share of the time that it takes
+            share = CLIMB_ENDS_AT + across * max(0.0, left_m) / way_m
+            at_s = leg.path.start_s + leg.path.duration_s * share
             clock.call_at(max(clock.now_s, at_s), self._battery_is_empty, leg)
 
     def _battery_is_empty(self, leg: Leg) -> None:

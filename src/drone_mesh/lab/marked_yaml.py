@@ -36,7 +36,7 @@ def read_marked(path: Path) -> tuple[dict[str, Any], Lines]:
         raise ConfigurationError(f"{path}{line}: {error.problem}") from error
     except (yaml.YAMLError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {' '.join(str(error).split())}") from error
-    if not isinstance(content, dict):
+    if root is None or not isinstance(content, dict):
         raise ConfigurationError(f"{path}: expected 'key: value' lines")
     lines: Lines = {}
     _note_lines(path, root, (), lines)

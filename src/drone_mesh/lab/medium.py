@@ -7,7 +7,7 @@ import random
 from dataclasses import dataclass, field
 from typing import Callable
 
-from drone_mesh.communication.messages import CREATOR, FROM, TO, TYPE
+from drone_mesh.communication import messages
 from drone_mesh.inprocess import Network
 
 
@@ -51,16 +51,16 @@ class Medium:
 
     def send(self, payload: bytes) -> bool:
         """As the air's."""
-        counted = self.traffic.get(payload[TYPE])
+        creator, sender, kind, to, _forward = messages.header(payload)
+        counted = self.traffic.get(kind)
         if counted is None:
-            counted = self.traffic[payload[TYPE]] = Traffic()
-        sender = payload[FROM]
-        if payload[CREATOR] == sender:
+            counted = self.traffic[kind] = Traffic()
+        if creator == sender:
             counted.own += 1
         else:
             counted.forwarded += 1
             self.sent_by[sender] = self.sent_by.get(sender, 0) + 1
-        if (self.loss or self.jams) and self._is_lost(sender, payload[TO]):
+        if (self.loss or self.jams) and self._is_lost(sender, to):
             self.lost += 1
             return False
         return self._send(payload)

@@ -30,7 +30,8 @@ def merge(into: Path, shards: Sequence[Path]) -> int:
     if len(digests) > 1:
         raise StoreError("these shards are of different experiments: their files differ")
     overrides = list(sessions[0][-1].get("overrides", ()))
-    plan = Plan(load_experiment(shards[0] / EXPERIMENT, overrides))
+    folder = Path(sessions[0][-1]["folder"])
+    plan = Plan(load_experiment(shards[0] / EXPERIMENT, overrides, folder))
     store = Store(into, plan)
     added = 0
     try:

@@ -249,17 +249,21 @@ def _displacements(run: RunRecord) -> list[float]:
     ]
 
 
-@_metric("", "pairs of live drones that came nearer than 0.3 m, at least one in flight", better="less")
+@_metric(
+    "", "pairs of live drones nearer than 0.3 m at some time, one of them in flight", better="less"
+)
 def collisions(run: RunRecord) -> float:
     return float(run.collisions)
 
 
-@_metric("m", "smallest distance of a drone in flight to another one; empty: nobody flew", better="more")
+@_metric("m", "smallest distance of a drone in flight to another; empty: no flight", better="more")
 def min_distance_m(run: RunRecord) -> float:
     return run.min_distance_m if math.isfinite(run.min_distance_m) else NAN
 
 
-@_metric("drones", "live drones that end within 0.3 m of another and did not start so", better="less")
+@_metric(
+    "drones", "live drones within 0.3 m of another at the end, and not at the start", better="less"
+)
 def stacked(run: RunRecord) -> float:
     return float(len(_stacked(run.end, run.end.graph) - _stacked(run.start, run.end.graph)))
 
@@ -312,7 +316,9 @@ def hops_max_after(run: RunRecord) -> float:
     return float(max(run.end.route_hops.values(), default=0))
 
 
-@_metric("ratio", "route in use by shortest path, mean over the served routers at the end", better="less")
+@_metric(
+    "ratio", "route in use by shortest path, mean of the served routers at the end", better="less"
+)
 def stretch(run: RunRecord) -> float:
     shortest = run.end.graph.hops_from(sorted(run.gateways))
     return _mean(
@@ -325,7 +331,9 @@ def degree_after(run: RunRecord) -> float:
     return run.end.graph.mean_degree()
 
 
-@_metric("share", "ground within range of a live drone at the end, by that before the fault", better="more")
+@_metric(
+    "share", "ground within range of a drone at the end, by that before the fault", better="more"
+)
 def coverage(run: RunRecord) -> float:
     before = _before(run)
     range_m = run.scenario.range_m
@@ -361,7 +369,11 @@ def _mean(values: object) -> float:
 # Traffic ---------------------------------------------------------------------------------------
 
 
-@_metric("packets", "packets handed to the radio, tries included, broadcasts once per receiver", better="less")
+@_metric(
+    "packets",
+    "packets handed to the radio, with all tries; broadcasts once per receiver",
+    better="less",
+)
 def packets(run: RunRecord) -> float:
     return float(sum(one.own + one.forwarded for one in run.traffic.values()))
 

@@ -12,7 +12,9 @@ from drone_mesh.lab.medium import Medium
 from drone_mesh.lab.scenario import Pick
 
 
-def pick_drones(pick: Pick, alive: bool, network: Network, medium: Medium, rng: random.Random) -> list[int]:
+def pick_drones(
+    pick: Pick, alive: bool, network: Network, medium: Medium, rng: random.Random
+) -> list[int]:
     """Drones with power (or without, for `alive=False`) that this fault hits, by the rule's order.
 
     The order is drawn over all drones, so that with the same stream a smaller share is a part of a
@@ -24,7 +26,8 @@ def pick_drones(pick: Pick, alive: bool, network: Network, medium: Medium, rng: 
     order = rng.sample(everyone, len(everyone))
     fit = [n for n in order if n not in spared and network.nodes[n].antenna.powered == alive]
     if pick.ids is not None:
-        return [n for n in pick.ids if n in network.nodes and network.nodes[n].antenna.powered == alive]
+        there = [n for n in pick.ids if n in network.nodes]
+        return [n for n in there if network.nodes[n].antenna.powered == alive]
     if pick.number is not None:
         number = pick.number
     elif pick.share is not None:
@@ -57,9 +60,7 @@ def _cut_vertices(network: Network, order: Sequence[int], number: int) -> list[i
     return chosen
 
 
-def _in_circle(
-    pick: Pick, network: Network, fit: Sequence[int], rng: random.Random
-) -> list[int]:
+def _in_circle(pick: Pick, network: Network, fit: Sequence[int], rng: random.Random) -> list[int]:
     places = {n: network.location(n) for n in network.nodes}
     if pick.center is not None:
         x, y = pick.center

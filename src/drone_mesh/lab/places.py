@@ -32,15 +32,23 @@ class StartPlace(NamedTuple):
 def draw_places(layout: Layout, range_m: float, rng: random.Random) -> list[StartPlace]:
     """All drones by id. Raises ConfigurationError for a layout that cannot be had."""
     if layout.kind == "file":
-        return read_places(Path(str(layout.path)))
+        return [StartPlace(int(i), x, y, bool(g)) for i, x, y, g in layout.places or ()]
     if layout.kind == "casus":
         return _casus(layout)
-    if layout.kind in ("grid", "line"):
+    if layout.kind == "line":
+        drones, step_m = range(layout.drones), layout.spacing_m
+        places = [StartPlace(i, i * step_m, 0.0, i < layout.gateways) for i in drones]
+    elif layout.kind == "grid":
         places = _grid(layout)
     else:
         points = _connected_points(layout, range_m, rng)
         places = _with_gateways(layout, points, rng)
     return _shuffled(places, rng) if layout.ids == "shuffled" else places
+
+
+def rows_of_file(path: Path) -> list[list[float]]:
+    """The places of a file as numbers: id, x, y, 1 for a gateway. Raises ConfigurationError."""
+    return [[float(p.node_id), p.x, p.y, float(p.gateway)] for p in read_places(path)]
 
 
 def read_places(path: Path) -> list[StartPlace]:
@@ -93,8 +101,6 @@ def _casus(layout: Layout) -> list[StartPlace]:
 def _grid(layout: Layout) -> list[StartPlace]:
     routers = layout.drones - layout.gateways
     columns = layout.columns or max(1, math.ceil(math.sqrt(routers)))
-    if layout.kind == "line":
-        columns = routers
     fleet = plan_fleet(layout.gateways, routers, columns, layout.spacing_m)
     return [StartPlace(p.node_id, p.longitude, p.latitude, p.role is Role.GATEWAY) for p in fleet]
 
@@ -132,9 +138,7 @@ def width_for(drones: int, mean_degree: float, range_m: float) -> float:
 def _uniform(
     layout: Layout, range_m: float, draw: Callable[[], float]
 ) -> list[tuple[float, float]]:
-    width_m = layout.width_m or width_for(
-        layout.drones, layout.mean_degree or MEAN_DEGREE, range_m
-    )
+    width_m = layout.width_m or width_for(layout.drones, layout.mean_degree or MEAN_DEGREE, range_m)
     return [(draw() * width_m, draw() * width_m) for _ in range(layout.drones)]
 
 

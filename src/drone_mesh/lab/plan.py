@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import Any, Iterator, List, NamedTuple, Sequence
+from typing import Any, Iterator, NamedTuple, Sequence
 
 from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text
 from drone_mesh.lab.scenario import Scenario
 
+LONGEST_VALUE = 200  # letters in one field of runs.csv; a file of places becomes its hash
 SCHEMA = 1  # of runs.csv; another number makes every run a new one
 
 
@@ -46,7 +47,7 @@ class Plan:
 
     def __iter__(self) -> Iterator[PlannedRun]:
         experiment = self.loaded.experiment
-        folder = str(self.loaded.path.parent.resolve())
+        folder = str(self.loaded.folder.resolve())
         for repetition in range(self.seeds):
             for cell, text in enumerate(self._texts):
                 run = run_id(text, experiment.seed, repetition, self.own_metrics)
@@ -57,7 +58,7 @@ class Plan:
                 yield PlannedRun(spec, cell)
 
     @property
-    def parameter_columns(self) -> List[str]:
+    def parameter_columns(self) -> list[str]:
         """All parameters that any cell has, flattened, in the order of their first appearance."""
         columns: dict[str, None] = {}
         for text in self._texts:
@@ -84,7 +85,10 @@ def flatten(content: Any, before: str = "") -> dict[str, str]:
     elif isinstance(content, list) and content and all(isinstance(v, dict) for v in content):
         items = [(str(index), value) for index, value in enumerate(content)]
     else:
-        return {before: as_text(content)}
+        text = as_text(content)
+        if len(text) > LONGEST_VALUE:
+            text = f"sha256:{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+        return {before: text}
     flat: dict[str, str] = {}
     for key, value in items:
         flat.update(flatten(value, f"{before}.{key}" if before else key))

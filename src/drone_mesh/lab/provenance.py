@@ -9,7 +9,10 @@ import platform
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from drone_mesh.lab.experiment import LoadedExperiment
 
 _HERE = Path(__file__).resolve().parent
 _PACKAGES = ("drone_mesh", "numpy", "pydantic", "scipy", "dask", "distributed", "matplotlib")
@@ -25,15 +28,14 @@ def code_version() -> str:
     return commit + ("+dirty" if changed else "")
 
 
-def describe_session(
-    command: list[str], overrides: Sequence[str], digest: str, workers: str
-) -> dict[str, Any]:
+def describe_session(command: list[str], loaded: LoadedExperiment, workers: str) -> dict[str, Any]:
     """One entry of provenance.json."""
     return {
         "started": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "command": command,
-        "overrides": list(overrides),
-        "experiment_hash": digest,
+        "overrides": list(loaded.overrides),
+        "folder": str(loaded.folder.resolve()),
+        "experiment_hash": loaded.digest,
         "code": code_version(),
         "workers": workers,
         "python": sys.version.split()[0],

@@ -3,7 +3,14 @@
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
 from typing import Any, ClassVar, Dict, FrozenSet, List, Optional, Tuple
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_serializer, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 from typing_extensions import Annotated, Literal
 
 from drone_mesh.drone.fleet import MAX_DRONES
@@ -33,7 +40,7 @@ class Layout(Part):
         "grid": frozenset({"drones", "columns", "spacing_m"}),
         "line": frozenset({"drones", "spacing_m"}),
         "casus": frozenset({"case"}),
-        "file": frozenset({"path"}),
+        "file": frozenset({"path", "places"}),
     }
 
     kind: Literal["uniform", "clusters", "grid", "line", "casus", "file"] = "uniform"
@@ -49,7 +56,8 @@ class Layout(Part):
     columns: Optional[Annotated[int, Field(ge=1, le=MAX_DRONES)]] = None  # default: a square
     spacing_m: Above0 = 6.0
     case: int = 0  # of config/casus.yaml
-    path: Optional[str] = None  # of a file of places
+    path: Optional[str] = None  # file: id,x,y,role lines, beside the experiment
+    places: Optional[List[List[float]]] = None  # what stands in it: id, x, y, 1 for a gateway
 
     @model_validator(mode="after")
     def _only_what_its_kind_uses(self) -> "Layout":
@@ -65,7 +73,6 @@ class Layout(Part):
         if self.kind != "file" and self.gateways >= self.drones and self.kind != "casus":
             raise ValueError(f"{self.gateways} gateways leave no router of {self.drones} drones")
         return self
-
 
     @model_serializer(mode="wrap")
     def _what_its_kind_uses(self, dump: Any) -> Dict[str, Any]:
@@ -89,7 +96,6 @@ class Radio(Part):
         if self.kind == "shared" and self.model_fields_set & {"delay_s", "jitter_s"}:
             raise ValueError("delay_s and jitter_s are for the disc; the shared radio has rate")
         return self
-
 
     @model_serializer(mode="wrap")
     def _what_its_kind_uses(self, dump: Any) -> Dict[str, Any]:
@@ -264,6 +270,7 @@ class Fault(Part):
 class Obstacles(Part):
     """Boxes that block or damp the radio, and block flight."""
 
+    path: Optional[str] = None  # a file of boxes, beside the experiment
     boxes: List[Box] = []
     radio: Literal["block", "wall"] = "block"
     cut_db: AtLeast0 = 9.0  # wall: per wall crossed (Sommer et al., WONS 2011, as in Veins)

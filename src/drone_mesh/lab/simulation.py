@@ -36,9 +36,7 @@ class Simulation:
         self.network = _network(scenario, streams)
         self.medium = Medium(self.network, streams.of, scenario.radio.loss)
         self.flights = Flights(self.network)
-        self.timeline = Timeline(
-            scenario, self.network, self.medium, self.flights, streams, self
-        )
+        self.timeline = Timeline(scenario, self.network, self.medium, self.flights, streams, self)
         self._looks: list[Look] = []
         self._start = self._scene(None)
         self._before: Scene | None = None
@@ -82,8 +80,8 @@ class Simulation:
         """A hash of everything that the mesh software reported: the same run has the same one."""
         digest = hashlib.sha256()
         for event in self.network.events:
-            line = f"{event.now_s:.6f} {event.node} {event.kind.value} {event.peer} {event.detail}\n"
-            digest.update(line.encode())
+            what = f"{event.kind.value} {event.peer} {event.detail}"
+            digest.update(f"{event.now_s:.6f} {event.node} {what}\n".encode())
         return digest.hexdigest()[:16]
 
     def _pass_time(self, until_s: float) -> None:

@@ -30,5 +30,6 @@ def describe_folder(folder: Path) -> str:
         lines.append(f"warning: run with uncommitted changes ({codes[0]})")
     sessions = read_provenance(folder)
     if sessions:
-        lines.append(f"last session: {sessions[-1]['started']}, {' '.join(sessions[-1]['command'])}")
+        last = sessions[-1]
+        lines.append(f"last session: {last['started']}, {' '.join(last['command'])}")
     return "\n".join(lines)

@@ -1,0 +1,111 @@
+"""A results folder, read for analysis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Mapping, NamedTuple, Sequence
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab import extensions
+from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text, load_experiment
+from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.plan import Plan, PlannedRun
+from drone_mesh.lab.store import (
+    EXPERIMENT,
+    FAILURES,
+    RUNS,
+    StoreError,
+    read_provenance,
+    read_rows,
+)
+
+DEFAULT_METRICS = ("healed", "t_total_s", "uptime", "distance_total_m", "packets")
+
+Row = Mapping[str, str]
+
+
+class Results(NamedTuple):
+    """All runs of an experiment's plan that are done."""
+
+    folder: Path
+    loaded: LoadedExperiment
+    plan: Sequence[PlannedRun]
+    rows: Mapping[str, Row]  # by run id
+    failures: Sequence[Row]
+    sessions: Sequence[Mapping[str, object]]
+
+    @property
+    def metrics(self) -> list[str]:
+        """The columns that the experiment asks for."""
+        wanted = self.loaded.experiment.metrics or DEFAULT_METRICS
+        return [extensions.own_column(name) if ":" in name else name for name in wanted]
+
+    def of_cell(self, cell: int) -> dict[int, Row]:
+        """The rows of one cell, by repetition."""
+        return {
+            planned.spec.repetition: self.rows[planned.spec.run]
+            for planned in self.plan
+            if planned.cell == cell and planned.spec.run in self.rows
+        }
+
+    def find_cell(self, text: str) -> int:
+        """The one cell that fits axis=value[,axis=value...]. Raises ConfigurationError."""
+        wanted: dict[str, str] = {}
+        for part in filter(None, text.split(",")):
+            axis, equals, value = part.partition("=")
+            if not equals or axis not in self.loaded.axes:
+                axes = ", ".join(self.loaded.axes) or "no axes"
+                raise ConfigurationError(f"cell {text}: expected axis=value with one of {axes}")
+            wanted[axis] = value
+        fit = [i for i, cell in enumerate(self.loaded.cells) if _fits(cell, wanted)]
+        if len(fit) != 1:
+            found = "; ".join(self.loaded.cells[i].label for i in fit[:4]) or "none"
+            raise ConfigurationError(f"cell {text}: {len(fit)} cells fit, expected one: {found}")
+        return fit[0]
+
+    def find_run(self, beginning: str) -> PlannedRun:
+        """The one planned run whose id begins so. Raises ConfigurationError."""
+        fit = [planned for planned in self.plan if planned.spec.run.startswith(beginning)]
+        if len(fit) != 1:
+            raise ConfigurationError(
+                f"{self.folder}: {len(fit)} runs of the plan begin with {beginning}, expected one"
+            )
+        return fit[0]
+
+
+def load_results(folder: Path) -> Results:
+    """Read a folder that `lab run` wrote. Raises StoreError or ConfigurationError."""
+    sessions = read_provenance(folder)
+    if not sessions or not (folder / EXPERIMENT).exists():
+        raise StoreError(f"{folder}: not a results folder of lab run")
+    last = sessions[-1]
+    extensions.search_in_text(str(last["folder"]))
+    loaded = load_experiment(folder / EXPERIMENT, list(last["overrides"]), Path(last["folder"]))
+    rows = {row["run"]: row for row in read_rows(folder / RUNS)}
+    seeds = _seeds(loaded, rows)
+    plan = list(Plan(loaded, seeds))
+    return Results(folder, loaded, plan, rows, read_rows(folder / FAILURES), sessions)
+
+
+def number(row: Row, column: str) -> float | None:
+    """A metric of a run; None where it is not defined."""
+    text = row.get(column, "")
+    return float(text) if text else None
+
+
+def is_share(column: str) -> bool:
+    """Whether every run has 0 or 1 here."""
+    return column in METRICS and METRICS[column].is_share
+
+
+def _fits(cell: Cell, wanted: Mapping[str, str]) -> bool:
+    return all(as_text(cell.values[axis]) == value for axis, value in wanted.items())
+
+
+def _seeds(loaded: LoadedExperiment, rows: Mapping[str, Row]) -> int:
+    """Repetitions, with those that `stop:` added."""
+    most = max((int(row["repetition"]) for row in rows.values()), default=-1) + 1
+    stop = loaded.experiment.stop
+    if stop is None:
+        return loaded.experiment.seeds
+    return max(loaded.experiment.seeds, min(most, stop.max_seeds))

@@ -1,0 +1,98 @@
+"""Repeats one run of a results folder with all its events."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import NamedTuple, Sequence
+
+from drone_mesh.errors import MeshError
+from drone_mesh.lab.plan import PlannedRun
+from drone_mesh.lab.provenance import code_version
+from drone_mesh.lab.record import RunRecord
+from drone_mesh.lab.results import Results, load_results
+from drone_mesh.lab.simulation import Simulation
+from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.worker import scenario_of
+from drone_mesh.state.model import MeshStatus
+
+
+class Replay(NamedTuple):
+    """A run, repeated."""
+
+    planned: PlannedRun
+    label: str
+    states: Sequence[MeshStatus]  # one per sample
+    record: RunRecord
+    event_hash: str
+
+
+def replay(results: Results, beginning: str) -> Replay:
+    """Run it again. Raises MeshError as the run does."""
+    planned = results.find_run(beginning)
+    spec = planned.spec
+    simulation = Simulation(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition))
+    states: list[MeshStatus] = []
+    record = simulation.run(states.append)
+    label = results.loaded.cells[planned.cell].label
+    return Replay(planned, label, states, record, simulation.event_hash())
+
+
+def explain_hash(results: Results, shown: Replay) -> str:
+    """Whether this was the very run of the folder; if not, why."""
+    run = shown.planned.spec.run
+    row = results.rows.get(run)
+    if row is None:
+        return f"event hash {shown.event_hash}; the folder has no row of this run to compare with"
+    if row["event_hash"] == shown.event_hash:
+        return f"event hash {shown.event_hash}: the very run of {results.folder}"
+    now = code_version()
+    why = (
+        f"the row is of code {row['code']}, this is {now}"
+        if row["code"] != now
+        else "the code is the same: is it deterministic? a technique that draws random numbers "
+        "itself, or reads a clock, is not"
+    )
+    return f"another run: event hash {shown.event_hash}, the row has {row['event_hash']}; {why}"
+
+
+def show_run(options: argparse.Namespace) -> int:
+    """`lab show`: 0, or 1 when it was not the same run."""
+    results = load_results(options.results)
+    shown = replay(results, options.run_id)
+    title = f"{results.loaded.experiment.name} {shown.planned.spec.run}"
+    if options.page is not None:
+        _write_page(options, shown, title)
+    else:
+        _print_story(shown)
+    verdict = explain_hash(results, shown)
+    print(verdict)
+    return 0 if "another run" not in verdict else 1
+
+
+def _print_story(shown: Replay) -> None:
+    spec = shown.planned.spec
+    print(f"run {spec.run}, seed {spec.seed}, repetition {spec.repetition}: {shown.label}")
+    print(json.dumps(json.loads(spec.scenario), indent=1))
+    happened = [
+        (item.at_s, f"fault: {item.action} {list(item.nodes)}") for item in shown.record.happened
+    ]
+    events = [
+        (event.stamp_s, f"node {event.node}: {event.kind} {list(event.peers) or ''} {event.detail}")
+        for event in shown.record.events
+    ]
+    for at_s, text in sorted([*happened, *events], key=lambda line: line[0]):
+        print(f"{at_s:10.3f} s  {text.rstrip()}")
+
+
+def _write_page(options: argparse.Namespace, shown: Replay, title: str) -> None:
+    # Only a page needs matplotlib and jinja2.
+    from drone_mesh.report.page import render_page
+    from drone_mesh.report.story import tell_story
+
+    text = render_page(tell_story(shown.states, shown.record.events), title)
+    try:
+        options.page.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise MeshError(f"cannot write {options.page}: {error.strerror}") from error
+    print(f"wrote {options.page}")

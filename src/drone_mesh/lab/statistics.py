@@ -1,0 +1,144 @@
+"""Intervals and tests, by scipy; and the two figures of survival analysis that reports need.
+
+Kaplan-Meier and the restricted mean are thirty lines here: lifelines would bring pandas and six
+more packages for these two.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Callable, NamedTuple, Sequence
+
+import numpy as np
+from scipy import stats
+
+RESAMPLES = 2000
+CONFIDENCE = 0.95
+SEED = 1  # of the resampling: the same rows give the same report
+
+
+class Interval(NamedTuple):
+    """An estimate with its 95 % confidence interval; NaN where there is none."""
+
+    value: float
+    low: float
+    high: float
+    n: int
+    note: str = ""  # what was not as usual
+
+    def __str__(self) -> str:
+        if math.isnan(self.value):
+            return "-"
+        if math.isnan(self.low):
+            return f"{self.value:.3g}"
+        return f"{self.value:.3g} [{self.low:.3g}, {self.high:.3g}]"
+
+
+def mean_interval(values: Sequence[float]) -> Interval:
+    """Mean, BCa bootstrap."""
+    return _bootstrap(values, np.mean)
+
+
+def median_interval(values: Sequence[float]) -> Interval:
+    """Median, BCa bootstrap."""
+    return _bootstrap(values, np.median)
+
+
+def _bootstrap(values: Sequence[float], statistic: Callable[..., float]) -> Interval:
+    n = len(values)
+    if n == 0:
+        return Interval(math.nan, math.nan, math.nan, 0)
+    value = float(statistic(values))
+    if n == 1:
+        return Interval(value, math.nan, math.nan, 1, "one run")
+    if min(values) == max(values):
+        return Interval(value, value, value, n, "all runs are equal")
+    for method in ("BCa", "percentile"):
+        with np.errstate(all="ignore"):
+            found = stats.bootstrap(
+                (np.asarray(values, float),),
+                statistic,
+                n_resamples=RESAMPLES,
+                confidence_level=CONFIDENCE,
+                method=method,
+                random_state=np.random.default_rng(SEED),
+            )
+        low, high = map(float, found.confidence_interval)
+        if math.isfinite(low) and math.isfinite(high):
+            note = "" if method == "BCa" else "percentile bootstrap: BCa is undefined here"
+            return Interval(value, low, high, n, note)
+    return Interval(value, math.nan, math.nan, n, "no interval")
+
+
+def share_interval(successes: int, n: int) -> Interval:
+    """A share, Wilson."""
+    if n == 0:
+        return Interval(math.nan, math.nan, math.nan, 0)
+    found = stats.binomtest(successes, n).proportion_ci(CONFIDENCE, method="wilson")
+    return Interval(successes / n, float(found.low), float(found.high), n)
+
+
+class Paired(NamedTuple):
+    """Per-seed differences b - a."""
+
+    difference: Interval  # of the mean
+    p: float  # Wilcoxon signed-rank, two-sided; 1 where all differences are 0
+
+
+def paired_difference(a: Sequence[float], b: Sequence[float]) -> Paired:
+    """Both by seed, in the same order."""
+    differences = [y - x for x, y in zip(a, b)]
+    interval = mean_interval(differences)
+    if not any(differences):
+        return Paired(interval, 1.0 if differences else math.nan)
+    return Paired(interval, float(stats.wilcoxon(differences).pvalue))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Adjusted p values of one family of tests (Holm 1979); NaN stays and does not count."""
+    order = sorted(
+        (i for i, p in enumerate(p_values) if not math.isnan(p)), key=p_values.__getitem__
+    )
+    adjusted = [math.nan] * len(p_values)
+    largest = 0.0
+    for place, index in enumerate(order):
+        largest = max(largest, min(1.0, (len(order) - place) * p_values[index]))
+        adjusted[index] = largest
+    return adjusted
+
+
+class Survival(NamedTuple):
+    """Times to an event of which some were not seen."""
+
+    events: int
+    censored: int
+    median: float  # Kaplan-Meier; NaN: less than half had the event
+    restricted_mean: Interval  # mean time up to `until`
+    until: float  # the smallest time at which a run was still watched without doubt
+
+
+def survival(times: Sequence[float], seen: Sequence[bool]) -> Survival:
+    """`seen[i]`: the event came at times[i]; otherwise it had not come by then."""
+    events = sum(seen)
+    if not times:
+        return Survival(0, 0, math.nan, Interval(math.nan, math.nan, math.nan, 0), math.nan)
+    censored_at = [t for t, s in zip(times, seen) if not s]
+    until = min(censored_at) if censored_at else max(times)
+    # No run is censored before `until`: up to there the mean of the cut times is exact.
+    area = mean_interval([min(t, until) for t in times])
+    return Survival(events, len(times) - events, _km_median(times, seen), area, until)
+
+
+def kaplan_meier(times: Sequence[float], seen: Sequence[bool]) -> list[tuple[float, float]]:
+    """(time, share that has not had the event) at each time of an event, from (0, 1) on."""
+    curve = [(0.0, 1.0)]
+    share = 1.0
+    for time in sorted({t for t, s in zip(times, seen) if s}):
+        at_risk = sum(t >= time for t in times)
+        share *= 1.0 - sum(t == time and s for t, s in zip(times, seen)) / at_risk
+        curve.append((time, share))
+    return curve
+
+
+def _km_median(times: Sequence[float], seen: Sequence[bool]) -> float:
+    return next((t for t, share in kaplan_meier(times, seen) if share <= 0.5), math.nan)

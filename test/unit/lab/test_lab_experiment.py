@@ -1,0 +1,230 @@
+"""An experiment file: what it means, and that each mistake in it is one line that points at it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.plan import Plan
+
+GOOD = """\
+name: trial
+seeds: 3
+base:
+  layout: {kind: grid, drones: 5}
+  duration_s: 5
+  faults:
+    - at_s: 2
+      kill: {share: 0.1}
+    - when: 10 s after the first flight
+      revive: {number: 1}
+sweep:
+  faults.kill.share: [0.1, 0.5]
+  radio.loss: [0, 0.2, 0.4]
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "trial.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_sweep_is_the_product_of_its_axes(tmp_path: Path) -> None:
+    loaded = load_experiment(write(tmp_path, GOOD))
+    assert [cell.label for cell in loaded.cells] == [
+        "faults.kill.share=0.1 radio.loss=0",
+        "faults.kill.share=0.1 radio.loss=0.2",
+        "faults.kill.share=0.1 radio.loss=0.4",
+        "faults.kill.share=0.5 radio.loss=0",
+        "faults.kill.share=0.5 radio.loss=0.2",
+        "faults.kill.share=0.5 radio.loss=0.4",
+    ]
+    last = loaded.cells[-1].scenario
+    assert last.radio.loss == 0.4
+    assert last.faults[0].kill is not None
+    assert last.faults[0].kill.share == 0.5
+
+
+def test_where_leaves_cells_out(tmp_path: Path) -> None:
+    text = GOOD + "where: faults.kill.share < 0.3 or radio.loss in [0.4]\n"
+    loaded = load_experiment(write(tmp_path, text))
+    assert len(loaded.cells) == 4
+
+
+def test_zip_moves_axes_in_step(tmp_path: Path) -> None:
+    text = GOOD.split("sweep:")[0] + "zip:\n  - {layout.drones: [4, 9], duration_s: [5, 10]}\n"
+    cells = load_experiment(write(tmp_path, text)).cells
+    assert [(c.scenario.layout.drones, c.scenario.duration_s) for c in cells] == [(4, 5), (9, 10)]
+
+
+def test_an_argument_overrules_the_file(tmp_path: Path) -> None:
+    path = write(tmp_path, GOOD)
+    loaded = load_experiment(path, ["seeds=7", "base.range_m=12", "sweep.radio.loss=[0.1]"])
+    assert loaded.experiment.seeds == 7
+    assert loaded.cells[0].scenario.range_m == 12
+    assert [cell.scenario.radio.loss for cell in loaded.cells] == [0.1, 0.1]
+
+
+def test_a_run_keeps_its_id_when_seeds_or_cells_are_added(tmp_path: Path) -> None:
+    path = write(tmp_path, GOOD)
+    few = {planned.spec.run for planned in Plan(load_experiment(path))}
+    more = ["seeds=5", "sweep.radio.loss=[0, 0.2, 0.3, 0.4]"]
+    many = {planned.spec.run for planned in Plan(load_experiment(path, more))}
+    assert len(few) == 18
+    assert few < many
+
+
+def test_a_default_that_is_written_out_is_the_same_run(tmp_path: Path) -> None:
+    plain = [p.spec.run for p in Plan(load_experiment(write(tmp_path, GOOD)))]
+    written = GOOD.replace("  duration_s: 5\n", "  duration_s: 5.0\n  range_m: 9\n")
+    assert [p.spec.run for p in Plan(load_experiment(write(tmp_path, written)))] == plain
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("seeds: 3", "seedss: 3", 2, "unknown key seedss; did you mean seeds?"),
+        ("seeds: 3", "seeds: 0", 2, "seeds: input should be greater than or equal to 1, not 0"),
+        ("seeds: 3", "seeds: many", 2, "seeds: input should be a valid integer, not 'many'"),
+        ("name: trial", "name: ../x", 1, "name: string should match pattern"),
+        ("name: trial\n", "", 0, "missing key name"),
+        ("kind: grid", "kind: grit", 4, "base.layout.kind: input should be 'uniform'"),
+        ("drones: 5", "drone: 5", 4, "unknown key base.layout.drone; did you mean drones?"),
+        ("drones: 5", "drones: 300", 4, "base.layout.drones: input should be less than or equal"),
+        ("drones: 5", "mean_degree: 8", 4, "base.layout: layout grid has no mean_degree"),
+        ("at_s: 2", "at_s: -2", 7, "base.faults.0.at_s: input should be greater than or equal"),
+        ("at_s: 2", "at: 2", 7, "unknown key base.faults.0.at; did you mean at_s?"),
+        ("share: 0.1}", "share: 0.1, number: 3}", 8, "give exactly one of share, number"),
+        ("share: 0.1}", "ids: [9]}", 8, "base.faults.0.kill: give exactly one"),
+        (
+            "kill: {share: 0.1}",
+            "kil: {share: 0.1}",
+            12,
+            "axis faults.kill.share: faults has no entry kill",
+        ),
+        (
+            "10 s after the first flight",
+            "some day",
+            9,
+            "expected 'when EVENT' or 'N s after EVENT'",
+        ),
+        ("the first flight", "the first fligth", 9, "did you mean 'the first flight'?"),
+        ("radio.loss: [0, 0.2, 0.4]", "radio.lost: [0]", 13, "unknown key radio.lost; did you"),
+        ("radio.loss: [0, 0.2, 0.4]", "radio.loss: [0, 2]", 13, "radio.loss: input should be less"),
+        ("radio.loss: [0, 0.2, 0.4]", "radio.loss: []", 13, "sweep.radio.loss: no values"),
+        ("radio.loss: [0, 0.2, 0.4]", "radio.loss: 1", 13, "sweep.radio.loss: input should be a"),
+        ("radio.loss: [0, 0.2, 0.4]", "routing: [no_such]", 13, "routing technique 'no_such'"),
+        ("radio.loss: [0, 0.2, 0.4]", "routing: [no.such:X]", 13, "cannot be loaded"),
+        ("radio.loss: [0, 0.2, 0.4]", "routing: ['json:JSONDecoder']", 13, "IRoutingTechnique"),
+    ],
+)
+def test_each_mistake_is_one_line_with_file_line_and_key(
+    tmp_path: Path, old: str, new: str, line: int, words: str
+) -> None:
+    assert old in GOOD
+    path = write(tmp_path, GOOD.replace(old, new, 1))
+    with pytest.raises(ConfigurationError) as caught:
+        load_experiment(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}, line {line}: " if line else f"{path}: ")
+    assert words in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("added", "line", "words"),
+    [
+        ("metrics: [healed, t_totl_s]", 14, "unknown metric t_totl_s; did you mean t_total_s?"),
+        ("metrics: ['no_module:f']", 14, "metric no_module:f cannot be loaded"),
+        ("metrics: ['os:getcwd']", 14, "must take one argument"),
+        ("where: radio.los > 1", 14, "where: no axis radio.los"),
+        ("where: __import__('os')", 14, "where: use axes, numbers"),
+        ("where: radio.loss > 5", 14, "where excludes every cell"),
+        ("compare: {over: radio.los, baseline: 0}", 14, "did you mean radio.loss?"),
+        ("compare: {over: radio.loss, baseline: 7}", 14, "7 is not a value of radio.loss"),
+        ("stop: {metric: healed, max_seeds: 9}", 14, "give either half_width or"),
+        ("seeds: 4", 14, "duplicate key seeds, first on line 2"),
+        ("zip: [{a: [1], b: [1, 2]}]", 14, "the lists must have the same length"),
+        ("zip: [{radio.loss: [0]}]", 14, "radio.loss is swept twice"),
+    ],
+)
+def test_what_belongs_to_the_whole_file_is_checked_as_well(
+    tmp_path: Path, added: str, line: int, words: str
+) -> None:
+    path = write(tmp_path, f"{GOOD}{added}\n")
+    with pytest.raises(ConfigurationError) as caught:
+        load_experiment(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}, line {line}: ")
+    assert words in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("argument", "words"),
+    [
+        ("sedes=3", "unknown key sedes; did you mean seeds?"),
+        ("seeds", "expected key=value"),
+        ("seeds=x", "seeds: input should be a valid integer, not 'x'"),
+        ("base.radio.loss=0.5", "radio.loss is swept; use sweep.radio.loss=[0.5] instead"),
+        ("base.layout.drnes=3", "unknown key base.layout.drnes; did you mean drones?"),
+        ("base.faults.7.at_s=1", "base.faults has no entry 7"),
+    ],
+)
+def test_a_bad_argument_is_named(tmp_path: Path, argument: str, words: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        load_experiment(write(tmp_path, GOOD), [argument])
+    assert str(caught.value).startswith(f"argument {argument}: ")
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"name: [", "trial.yaml, line 1: "),
+        (b"\xff\xfe", "not a text file in UTF-8"),
+        (b"- 1\n", "expected 'key: value' lines"),
+        (b"", "expected 'key: value' lines"),
+    ],
+)
+def test_a_file_that_is_no_experiment_is_refused(tmp_path: Path, data: bytes, words: str) -> None:
+    path = tmp_path / "trial.yaml"
+    path.write_bytes(data)
+    with pytest.raises(ConfigurationError, match="trial.yaml") as caught:
+        load_experiment(path)
+    assert words in str(caught.value)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="No such file"):
+        load_experiment(tmp_path / "none.yaml")
+
+
+def test_places_come_from_a_file_beside_the_experiment(tmp_path: Path) -> None:
+    (tmp_path / "yard.csv").write_text("id,x,y,role\n0,0,0,gateway\n3,5,0,router\n")
+    text = "name: yard\nbase:\n  layout: {kind: file, path: yard.csv}\n"
+    (cell,) = load_experiment(write(tmp_path, text)).cells
+    assert cell.scenario.layout.places == [[0, 0, 0, 1], [3, 5, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("0,0,0,gateway\n0,1,1,router\n", "line 3: id 0 is out of range or a duplicate"),
+        ("0,0,0,router\n", "no gateway"),
+        ("0,0,zero,gateway\n", "line 2: expected id,x,y,role"),
+        ("0,0,inf,gateway\n", "line 2: expected finite x, y"),
+    ],
+)
+def test_a_bad_file_of_places_is_refused(tmp_path: Path, rows: str, words: str) -> None:
+    (tmp_path / "yard.csv").write_text(f"id,x,y,role\n{rows}")
+    text = "name: yard\nbase:\n  layout: {kind: file, path: yard.csv}\n"
+    path = write(tmp_path, text)
+    with pytest.raises(ConfigurationError) as caught:
+        load_experiment(path)
+    assert str(caught.value).startswith(f"{path}, line 3: ")
+    assert words in str(caught.value)

@@ -1,0 +1,302 @@
+"""One run: layouts, faults and what is measured, under the virtual clock."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.graph import Graph
+from drone_mesh.lab.metrics import METRICS, measure_all
+from drone_mesh.lab.places import draw_places
+from drone_mesh.lab.record import RunRecord
+from drone_mesh.lab.scenario import Layout, Scenario
+from drone_mesh.lab.simulation import Simulation
+from drone_mesh.lab.streams import Streams
+
+
+def run(repetition: int = 0, seed: int = 1, **scenario: Any) -> RunRecord:
+    content = {"layout": {"kind": "line", "drones": 5}, "duration_s": 40, **scenario}
+    return Simulation(Scenario.model_validate(content), Streams(seed, repetition)).run()
+
+
+def kill(at_s: float = 20, **pick: Any) -> dict[str, Any]:
+    return {"at_s": at_s, "kill": pick}
+
+
+def happened(record: RunRecord) -> list[tuple[float, str, tuple[int, ...]]]:
+    return [tuple(item) for item in record.happened]
+
+
+# Layouts
+
+
+def test_uniform_layouts_are_connected_and_as_dense_as_asked() -> None:
+    degrees = []
+    for repetition in range(10):
+        layout = Layout(kind="uniform", drones=100, mean_degree=8)
+        places = draw_places(layout, 9.0, Streams(1, repetition).of("layout"))
+        points = [(place.x, place.y) for place in places]
+        near = {
+            i: [j for j, q in enumerate(points) if j != i and math.dist(p, q) < 9.0]
+            for i, p in enumerate(points)
+        }
+        assert Graph(near).is_connected()
+        degrees.append(Graph(near).mean_degree())
+    assert 7.0 < sum(degrees) / len(degrees) < 9.5  # connected draws are denser than all
+
+
+def test_the_gateway_stands_in_the_middle_and_has_the_lowest_id() -> None:
+    places = draw_places(Layout(drones=50), 9.0, Streams(1, 0).of("layout"))
+    assert [place.gateway for place in places] == [True] + [False] * 49
+    middle_x = (min(p.x for p in places) + max(p.x for p in places)) / 2
+    middle_y = (min(p.y for p in places) + max(p.y for p in places)) / 2
+    distances = [math.dist((p.x, p.y), (middle_x, middle_y)) for p in places]
+    assert distances[0] == min(distances)
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        {"kind": "grid", "drones": 10},
+        {"kind": "line", "drones": 4},
+        {"kind": "clusters", "drones": 30},
+        {"kind": "casus", "case": 101},
+        {"kind": "uniform", "drones": 20, "width_m": 20, "gateways": 2, "ids": "shuffled"},
+    ],
+)
+def test_every_kind_of_layout_gives_ids_and_gateways(layout: dict[str, Any]) -> None:
+    places = draw_places(Layout.model_validate(layout), 9.0, Streams(1, 0).of("layout"))
+    assert len({place.node_id for place in places}) == len(places)
+    assert sum(place.gateway for place in places) == layout.get("gateways", 1)
+
+
+def test_a_layout_that_is_never_connected_is_an_error() -> None:
+    layout = Layout(kind="uniform", drones=3, width_m=5000.0)
+    with pytest.raises(ConfigurationError, match="none of 2000 draws was connected"):
+        draw_places(layout, 9.0, Streams(1, 0).of("layout"))
+
+
+# Faults
+
+
+def test_a_killed_relay_splits_the_line_and_the_next_drone_repairs_it() -> None:
+    record = run(faults=[kill(ids=[2])], duration_s=150)
+    measured = measure_all(record)
+    assert measured["split"] == 1
+    assert measured["cut_off"] == 2
+    assert measured["victims"] == 1
+    assert measured["healed"] == 1
+    assert measured["parts_before"] == measured["parts_after"] == 1
+    assert measured["flights"] >= 1
+    assert measured["distance_total_m"] >= 6
+    phases = [measured[f"t_{phase}_s"] for phase in ("detect", "decide", "fly", "reroute")]
+    assert sum(phases) == pytest.approx(measured["t_total_s"])
+
+
+def test_a_run_that_ends_before_it_is_healed_has_no_time_to_heal() -> None:
+    measured = measure_all(run(faults=[kill(ids=[2])], duration_s=30))
+    assert measured["healed"] == 0
+    assert math.isnan(measured["t_total_s"])
+    assert measured["observed_s"] == 10
+    assert measured["connected_share"] == pytest.approx(1 / 3)
+
+
+def test_a_smaller_share_of_victims_is_a_part_of_a_larger_one() -> None:
+    layout = {"kind": "grid", "drones": 26}
+    victims = [
+        set(run(layout=layout, duration_s=21, faults=[kill(share=share)]).happened[0].nodes)
+        for share in (0.2, 0.4)
+    ]
+    assert len(victims[0]) == 5
+    assert victims[0] < victims[1]
+    assert 0 not in victims[1]  # gateways are spared
+
+
+def test_other_repetitions_have_other_victims() -> None:
+    layout = {"kind": "grid", "drones": 26}
+    faults = [kill(number=5)]
+    found = {
+        run(r, layout=layout, duration_s=21, faults=faults).happened[0].nodes for r in range(4)
+    }
+    assert len(found) == 4
+
+
+def test_a_cut_vertex_is_found_where_there_is_one() -> None:
+    record = run(faults=[kill(number=1, pick="cut_vertex")])
+    (victim,) = record.happened[0].nodes
+    assert victim in (1, 2, 3)  # of 0 - 1 - 2 - 3 - 4
+    ring = run(layout={"kind": "grid", "drones": 5, "columns": 2},
+               faults=[kill(number=1, pick="cut_vertex")])  # fmt: skip
+    assert ring.happened[0].nodes == ()
+
+
+def test_the_busiest_relay_is_the_one_next_to_the_gateway_of_a_line() -> None:
+    assert run(faults=[kill(number=1, pick="busiest")]).happened[0].nodes == (1,)
+
+
+def test_a_circle_takes_everybody_within_it() -> None:
+    record = run(faults=[kill(pick="circle", center=[24, 0], radius_m=7)])
+    assert set(record.happened[0].nodes) == {3, 4}
+
+
+def test_killed_drones_can_be_revived() -> None:
+    faults = [kill(ids=[4]), {"at_s": 30, "revive": {"ids": [4]}}]
+    record = run(faults=faults)
+    assert happened(record) == [(20, "kill", (4,)), (30, "revive", (4,))]
+    assert record.looks[-1].served == {1, 2, 3, 4}
+
+
+def test_a_gateway_that_is_off_for_a_while_comes_back() -> None:
+    record = run(faults=[{"at_s": 15, "gateway_off": {"for_s": 5}}], duration_s=50)
+    assert not record.looks[17].served
+    assert record.looks[-1].share == 1.0
+
+
+def test_a_cut_link_is_mended_after_its_time() -> None:
+    faults = [{"at_s": 15, "cut_link": {"between": [0, 1], "for_s": 10}}]
+    record = run(faults=faults, duration_s=50)
+    shares = {look.now_s: look.share for look in record.looks}
+    assert shares[16.0] == 0.0
+    assert shares[50.0] == 1.0
+
+
+def test_a_jammed_circle_loses_packets_only_while_it_is_jammed() -> None:
+    faults = [{"at_s": 12, "jam": {"center": [24, 0], "radius_m": 4, "for_s": 10}}]
+    simulation = Simulation(
+        Scenario.model_validate(
+            {"layout": {"kind": "line", "drones": 5}, "duration_s": 60, "faults": faults}
+        ),
+        Streams(1, 0),
+    )
+    record = simulation.run()
+    assert simulation.medium.lost > 0
+    assert not simulation.medium.jams
+    assert record.looks[-1].share == 1.0
+
+
+def test_loss_lasts_from_one_time_to_another() -> None:
+    faults = [{"at_s": 10, "loss": {"share": 1.0, "for_s": 20}}]
+    record = run(faults=faults, duration_s=60, layout={"kind": "line", "drones": 2})
+    assert not record.looks[25].served
+    assert record.looks[-1].share == 1.0
+
+
+def test_a_battery_ends_after_its_metres_or_its_minutes() -> None:
+    order = {"at_s": 11, "order": {"id": 4, "to": [24, 3]}}
+    record = run(faults=[{"at_s": 10, "battery": {"fly_m": 2}}, order])
+    assert [(i.action, i.nodes) for i in record.happened][2:] == [("battery empty", (4,))]
+    died_s = record.happened[2].at_s
+    assert record.legs[0].metres_until(died_s) == pytest.approx(2.0)
+    record = run(faults=[{"at_s": 6, "battery": {"live_min": 0.5}}], duration_s=40)
+    assert {item.at_s for item in record.happened[1:]} == {36.0}
+    assert record.looks[-1].alive == frozenset()
+
+
+def test_churn_is_random_and_the_same_for_the_same_seed() -> None:
+    faults = [{"at_s": 10, "churn": {"deaths_per_min": 20, "births_per_min": 10}}]
+    layout = {"kind": "grid", "drones": 16}
+    one, same, other = (run(r, layout=layout, faults=faults).happened for r in (0, 0, 1))
+    assert one == same
+    assert one != other
+    assert {item.action for item in one} >= {"churn", "death"}
+
+
+def test_orders_are_counted_with_those_that_arrived() -> None:
+    faults = [{"at_s": 10, "order": {"every_s": 5, "for_s": 20}}]
+    pair = {"kind": "line", "drones": 2}
+    measured = measure_all(run(faults=faults, layout=pair))
+    assert measured["orders"] == 4
+    assert measured["order_delivery"] == 1.0
+    assert measured["order_delay_ms"] == pytest.approx(2.0)  # one hop
+    cut = {"at_s": 9, "cut_link": {"between": [0, 1]}}
+    assert measure_all(run(faults=[cut, *faults], layout=pair))["order_delivery"] == 0.0
+
+
+def test_wind_slows_the_flights_that_begin_in_it() -> None:
+    order = {"at_s": 11, "order": {"id": 4, "to": [24, 6]}}
+    calm = run(faults=[order])
+    windy = run(faults=[{"at_s": 5, "wind": {"speed_factor": 0.5}}, order])
+    assert calm.legs[0].path.duration_s == pytest.approx(3.0)
+    assert windy.legs[0].path.duration_s == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(
+    ("when", "at_s"),
+    [
+        ("when all connected", 1.0),
+        ("7 s after all connected", 8.0),
+        ("2 s after the first flight", 22.0),
+    ],
+)
+def test_a_condition_starts_a_fault(when: str, at_s: float) -> None:
+    order = {"at_s": 20, "order": {"id": 4, "to": [24, 3]}}
+    record = run(faults=[order, {"when": when, "revive": {"number": 1}}], sample_s=0.5)
+    (time,) = [item.at_s for item in record.happened if item.action == "revive"]
+    assert time == pytest.approx(at_s, abs=0.5)
+
+
+# Common random numbers
+
+
+def test_losses_of_a_link_do_not_depend_on_what_others_send() -> None:
+    """The fate of the n-th packet of a link is the same, whatever else is in the air."""
+
+    def fates(drones: int) -> list[bool]:
+        content = {"layout": {"kind": "line", "drones": drones}, "radio": {"loss": 0.3}}
+        simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
+        return [simulation.medium._is_lost(0, 1) for _ in range(50)]
+
+    assert fates(3) == fates(6)
+    assert 5 < sum(fates(3)) < 25
+
+
+def test_another_technique_changes_neither_layout_nor_victims() -> None:
+    records = [
+        run(layout={"drones": 30}, faults=[kill(share=0.2)], timing=timing, duration_s=30)
+        for timing in ({"check_period_s": 10}, {"check_period_s": 2})
+    ]
+    assert records[0].start.places == records[1].start.places
+    assert records[0].happened == records[1].happened
+    assert records[0].events != records[1].events
+
+
+# Metrics
+
+
+def test_every_metric_has_a_definition_and_a_finite_value_or_none() -> None:
+    measured = measure_all(run())
+    assert set(measured) == set(METRICS)
+    assert all(metric.definition for metric in METRICS.values())
+    assert not any(math.isinf(value) for value in measured.values())
+
+
+def test_a_quiet_line_measures_as_it_stands() -> None:
+    measured = measure_all(run())
+    assert measured["healed"] == 1
+    assert measured["hops_mean_after"] == 2.5
+    assert measured["hops_max_after"] == 4
+    assert measured["stretch"] == 1.0
+    assert measured["parts_after"] == 1
+    assert measured["degree_after"] == pytest.approx(8 / 5)
+    assert measured["coverage"] == 1.0
+    assert measured["flights"] == measured["collisions"] == measured["stacked"] == 0
+    assert math.isnan(measured["min_distance_m"])
+
+
+def test_a_drone_that_lands_on_another_is_a_collision_and_stacked() -> None:
+    order = {"at_s": 15, "order": {"id": 4, "to": [18, 0]}}
+    measured = measure_all(run(faults=[order]))
+    assert measured["collisions"] == 1
+    assert measured["stacked"] == 2
+    assert measured["min_distance_m"] < 0.1
+    assert measured["displacement_max_m"] == pytest.approx(6)
+
+
+def test_a_stale_route_is_an_outage_even_before_it_is_noticed() -> None:
+    record = run(faults=[kill(ids=[1])], duration_s=22)
+    (first, *_) = record.gaps()
+    assert first.lost_s == 20.0
+    assert {gap.node for gap in record.gaps()} == {2, 3, 4}

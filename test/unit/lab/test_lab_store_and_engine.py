@@ -1,0 +1,445 @@
+"""The results folder and the workers: nothing lost, nothing twice, the same bytes every way."""
+
+from __future__ import annotations
+
+import csv
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, Callable, Iterator
+
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.campaign import Campaign
+from drone_mesh.lab.command import main
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.plan import Plan
+from drone_mesh.lab.store import Store, StoreError, read_rows
+from drone_mesh.lab.worker import execute
+
+ROOT = Path(__file__).resolve().parents[3]
+SMALL = """\
+name: small
+seeds: 4
+base:
+  layout: {kind: line, drones: 3}
+  duration_s: 20
+  faults: [{at_s: 12, kill: {number: 1}}]
+sweep: {radio.loss: [0, 0.2]}
+"""
+OWN = """\
+import os, signal, time
+
+def boom(record):
+    raise ValueError("no good")
+
+def drones(record):
+    return float(len(record.start.places))
+
+def endless(record):
+    while True:
+        pass
+
+def slow(record):
+    time.sleep(0.1)
+    return 1.0
+
+def deadly(record):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+def deadly_once(record):
+    marker = os.environ["LAB_TEST_MARKER"]
+    if not os.path.exists(marker):
+        open(marker, "w").close()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 1.0
+"""
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Callable[..., Path]:
+    (tmp_path / "own_lab_parts.py").write_text(OWN)
+
+    def write(added: str = "", text: str = SMALL) -> Path:
+        path = tmp_path / "small.yaml"
+        path.write_text(text + added)
+        return path
+
+    return write
+
+
+def lab(*words: object) -> int:
+    return main([str(word) for word in words])
+
+
+def run(path: Path, out: Path, *words: object) -> int:
+    return lab("run", path, "--out", out, "--workers", 0, *words)
+
+
+def measured(folder: Path) -> bytes:
+    """runs.csv without its last column, the wall time."""
+    lines = (folder / "runs.csv").read_bytes().splitlines()
+    return b"\n".join(line.rpartition(b",")[0] for line in lines)
+
+
+def test_a_run_gives_one_tidy_row_per_run_in_the_order_of_the_plan(
+    bench: Callable[..., Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    assert run(bench(), out) == 0
+    rows = read_rows(out / "runs.csv")
+    plan = list(csv.DictReader((out / "plan.csv").open()))
+    assert [row["run"] for row in rows] == [row["run"] for row in plan]
+    assert [(row["repetition"], row["radio.loss"]) for row in rows[:3]] == [
+        ("0", "0.0"), ("0", "0.2"), ("1", "0.0"),
+    ]  # fmt: skip
+    assert rows[0]["faults.0.kill.number"] == "1"
+    assert rows[0]["victims"] == "1"
+    assert (out / "experiment.yaml").read_text() == SMALL
+    assert {path.name for path in out.iterdir()} == {
+        ".lock", "experiment.yaml", "failures.csv", "logs", "outages.csv", "plan.csv",
+        "provenance.json", "runs.csv",
+    }  # fmt: skip
+
+
+def test_a_second_run_does_only_what_is_missing(
+    bench: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    path = bench()
+    run(path, out, "seeds=2")
+    done: list[str] = []
+
+    def counted(spec: Any) -> Any:
+        done.append(spec.run)
+        return execute(spec)
+
+    monkeypatch.setattr("drone_mesh.lab.engine.execute", counted)
+    run(path, out)
+    assert len(done) == 4  # two more seeds of two cells
+    run(path, out, "sweep.radio.loss=[0, 0.1, 0.2]")
+    assert len(done) == 8
+    run(path, out)
+    assert len(done) == 8
+
+
+def test_rows_are_the_same_bytes_with_and_without_interruption(
+    bench: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = bench()
+    run(path, tmp_path / "whole")
+    out = tmp_path / "parts"
+    run(path, out, "seeds=1")
+    lines = (out / "runs.csv").read_bytes().splitlines(keepends=True)
+    (out / "runs.csv").write_bytes(lines[0] + lines[1] + lines[2][:40])  # killed while writing
+    run(path, out)
+    assert measured(out) == measured(tmp_path / "whole")
+    assert (out / "outages.csv").read_bytes() == (tmp_path / "whole/outages.csv").read_bytes()
+
+
+def test_shards_together_are_the_whole(bench: Callable[..., Path], tmp_path: Path) -> None:
+    path = bench()
+    run(path, tmp_path / "whole")
+    shards = [tmp_path / f"shard{index}" for index in range(3)]
+    for index, shard in enumerate(shards):
+        run(path, shard, "--shard", f"{index}/3")
+    sizes = [len(read_rows(shard / "runs.csv")) for shard in shards]
+    assert sizes == [3, 3, 2]
+    assert lab("merge", tmp_path / "all", *shards) == 0
+    assert measured(tmp_path / "all") == measured(tmp_path / "whole")
+
+
+def test_shards_of_different_experiments_are_not_merged(
+    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(bench(), tmp_path / "a", "seeds=1")
+    run(bench(), tmp_path / "b", "seeds=2")
+    assert lab("merge", tmp_path / "all", tmp_path / "a", tmp_path / "b") == 1
+    assert "different experiments" in capsys.readouterr().err
+
+
+def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_go_on(
+    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = SMALL.replace("[0, 0.2]", "[0]") + "metrics: ['own_lab_parts:boom']\n"
+    out = tmp_path / "out"
+    assert run(bench(text=text), out) == 1
+    failures = read_rows(out / "failures.csv")
+    assert len(failures) == 4
+    first = failures[0]
+    assert (first["kind"], first["message"]) == ("exception", "ValueError: no good")
+    assert 'raise ValueError("no good")' in first["traceback"]
+    assert first["command"] == f"python3 -m drone_mesh.lab show {out} {first['run']}"
+    assert "ValueError" in (out / "logs" / f"{first['run']}.txt").read_text()
+    assert "4 failed" in capsys.readouterr().out
+    assert run(bench(text=text), out) == 0  # failures are not missing
+    assert run(bench(text=text), out, "--retry-failed") == 1
+
+
+def test_an_endless_run_is_a_timeout(bench: Callable[..., Path], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    added = "metrics: ['own_lab_parts:endless']\ntimeout_s: 0.5\n"
+    run(bench(added), out, "seeds=1", "sweep.radio.loss=[0]")
+    (failure,) = read_rows(out / "failures.csv")
+    assert failure["kind"] == "timeout"
+    assert failure["message"] == "still running after 0.5 s of wall time"
+
+
+def test_a_metric_of_the_users_is_a_column(bench: Callable[..., Path], tmp_path: Path) -> None:
+    run(bench("metrics: ['own_lab_parts:drones']\n"), tmp_path / "out", "seeds=1")
+    assert {row["drones"] for row in read_rows(tmp_path / "out/runs.csv")} == {"3"}
+
+
+def test_seeds_are_added_until_the_interval_is_narrow(
+    bench: Callable[..., Path], tmp_path: Path
+) -> None:
+    stop = "stop: {metric: packets, relative_half_width: 0.00001, max_seeds: 10}\n"
+    run(bench(stop), tmp_path / "never", "sweep.radio.loss=[0.2]")
+    assert len(read_rows(tmp_path / "never/runs.csv")) == 10
+    stop = "stop: {metric: packets, relative_half_width: 0.9, max_seeds: 10}\n"
+    run(bench(stop), tmp_path / "soon", "sweep.radio.loss=[0.2]")
+    assert len(read_rows(tmp_path / "soon/runs.csv")) == 4
+
+
+def test_two_runs_in_one_folder_are_refused(bench: Callable[..., Path], tmp_path: Path) -> None:
+    plan = Plan(load_experiment(bench()))
+    first = Store(tmp_path / "out", plan)
+    with pytest.raises(StoreError, match=f"process {os.getpid()} on .* is writing there"):
+        Store(tmp_path / "out", plan)
+    first.close()
+    Store(tmp_path / "out", plan).close()
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_runs(
+    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert run(bench(), tmp_path / "file" / "out") == 1
+    assert "Not a directory; what was written before is kept" in capsys.readouterr().err
+
+
+def test_a_bad_experiment_writes_nothing(bench: Callable[..., Path], tmp_path: Path) -> None:
+    assert run(bench("seds: 3\n"), tmp_path / "out") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_full_disk_ends_the_run_and_loses_nothing(
+    bench: Callable[..., Path], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A limit on the size of files stands for the disk: a write fails in the same way."""
+    path, out = bench(), tmp_path / "out"
+    run(path, tmp_path / "whole")
+    size = (tmp_path / "whole/runs.csv").stat().st_size
+
+    def small_disk() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size // 2, size // 2))
+
+    command = [sys.executable, "-m", "drone_mesh.lab", "run", path, "--out", out, "--workers", "0"]
+    done = subprocess.run(
+        list(map(str, command)), preexec_fn=small_disk, capture_output=True, text=True, timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src"), "PYTHONDONTWRITEBYTECODE": "1"},
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert f"cannot write {out / 'runs.csv'}: File too large" in done.stderr
+    assert "continue with: lab run" in done.stderr
+    assert "Traceback" not in done.stderr
+    kept = read_rows(out / "runs.csv")
+    assert 0 < len(kept) < 8
+    run(path, out)
+    assert measured(out) == measured(tmp_path / "whole")
+
+
+# Workers -----------------------------------------------------------------------------------------
+
+
+def start(path: Path, out: Path, *words: str, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "drone_mesh.lab", "run", str(path), "--out", str(out), *words],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src"), **environment},
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def finish(process: subprocess.Popen[str]) -> str:
+    output, _ = process.communicate(timeout=100)
+    return output
+
+
+def wait_for_rows(out: Path, number: int, process: subprocess.Popen[str]) -> None:
+    deadline_s = time.monotonic() + 60
+    while time.monotonic() < deadline_s:
+        if (out / "runs.csv").exists() and len(read_rows(out / "runs.csv")) >= number:
+            return
+        assert process.poll() is None, process.communicate()[0]
+        time.sleep(0.05)
+    raise AssertionError(f"fewer than {number} rows within 60 s")
+
+
+@pytest.fixture
+def slow(bench: Callable[..., Path]) -> Path:
+    """48 runs of a tenth of a second."""
+    text = SMALL.replace("seeds: 4", "seeds: 24") + "metrics: ['own_lab_parts:slow']\n"
+    return bench(text=text)
+
+
+@pytest.fixture
+def slow_rows(slow: Path, tmp_path: Path) -> Iterator[bytes]:
+    run(slow, tmp_path / "reference")
+    yield measured(tmp_path / "reference")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", ["1", "2", "4"])
+def test_any_number_of_workers_writes_the_same_bytes(
+    bench: Callable[..., Path], tmp_path: Path, workers: str
+) -> None:
+    path = bench()
+    run(path, tmp_path / "reference")
+    process = start(path, tmp_path / "out", "--workers", workers)
+    output = finish(process)
+    assert process.returncode == 0, output
+    assert measured(tmp_path / "out") == measured(tmp_path / "reference")
+
+
+@pytest.mark.slow
+def test_a_killed_client_loses_nothing(slow: Path, slow_rows: bytes, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = start(slow, out, "--workers", "2")
+    wait_for_rows(out, 5, process)
+    process.kill()
+    process.wait()
+    kept = len(read_rows(out / "runs.csv"))
+    assert 5 <= kept < 48
+    assert run(slow, out) == 0
+    assert measured(out) == slow_rows
+
+
+@pytest.mark.slow
+def test_a_killed_worker_loses_nothing(
+    bench: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One run kills its own worker, the first time it is executed."""
+    marker = tmp_path / "marker"
+    path = bench("metrics: ['own_lab_parts:deadly_once']\n")
+    process = start(path, tmp_path / "out", "--workers", "2", LAB_TEST_MARKER=str(marker))
+    output = finish(process)
+    assert process.returncode == 0, output
+    assert marker.exists()
+    monkeypatch.setenv("LAB_TEST_MARKER", str(marker))
+    run(path, tmp_path / "reference")
+    assert measured(tmp_path / "out") == measured(tmp_path / "reference")
+
+
+@pytest.mark.slow
+def test_a_run_that_always_kills_its_worker_is_a_failure_and_the_others_go_on(
+    bench: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = bench("metrics: ['own_lab_parts:deadly']\n")
+    process = start(path, tmp_path / "out", "--workers", "1", "seeds=1", "sweep.radio.loss=[0]")
+    output = finish(process)
+    assert process.returncode == 1, output
+    (failure,) = read_rows(tmp_path / "out/failures.csv")
+    assert failure["kind"] == "worker died"
+
+
+@pytest.mark.slow
+def test_a_killed_scheduler_loses_nothing(slow: Path, slow_rows: bytes, tmp_path: Path) -> None:
+    """Scheduler and worker are processes of their own, as on a cluster."""
+    out = tmp_path / "out"
+    address_file = tmp_path / "scheduler.json"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
+    scheduler = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port",
+         "0", "--no-dashboard", "--scheduler-file", str(address_file)], **quiet,
+    )  # fmt: skip
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file",
+         str(address_file), "--nthreads", "1", "--no-dashboard", "--no-nanny"], **quiet,
+    )  # fmt: skip
+    try:
+        deadline_s = time.monotonic() + 60
+        address = ""
+        while not address:
+            assert time.monotonic() < deadline_s, "the scheduler wrote no address within 60 s"
+            time.sleep(0.1)
+            if address_file.exists():
+                address = address_file.read_text().partition('"address": "')[2].partition('"')[0]
+        process = start(slow, out, "--cluster", address)
+        wait_for_rows(out, 5, process)
+        scheduler.kill()
+        output = finish(process)
+        assert process.returncode == 1, output
+        assert "continue with: lab run" in output
+    finally:
+        for one in (scheduler, worker):
+            one.kill()
+            one.wait()
+    assert run(slow, out) == 0
+    assert measured(out) == slow_rows
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_everything_and_prints_how_to_go_on(
+    slow: Path, slow_rows: bytes, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    process = start(slow, out, "--workers", "2")
+    wait_for_rows(out, 5, process)
+    os.killpg(process.pid, signal.SIGINT)  # a terminal signals the whole group
+    output = finish(process)
+    assert process.returncode == 130, output
+    assert "continue with: lab run" in output
+    assert "Traceback" not in output
+    assert run(slow, out) == 0
+    assert measured(out) == slow_rows
+
+
+def test_a_campaign_counts_what_it_did(bench: Callable[..., Path], tmp_path: Path) -> None:
+    campaign = Campaign(load_experiment(bench()), tmp_path / "out", ["lab"])
+    campaign.run(0, None, stream=(tmp_path / "log").open("w"))
+    assert (campaign.completed, campaign.failures) == (8, 0)
+
+
+def test_a_results_folder_is_needed_to_repeat_a_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert lab("show", tmp_path, "abc") == 1
+    assert "not a results folder" in capsys.readouterr().err
+
+
+def test_show_repeats_the_very_run(
+    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(bench(), tmp_path / "out", "seeds=1")
+    row = read_rows(tmp_path / "out/runs.csv")[1]
+    capsys.readouterr()
+    assert lab("show", tmp_path / "out", row["run"][:6]) == 0
+    shown = capsys.readouterr().out
+    assert f"event hash {row['event_hash']}: the very run" in shown
+    assert "fault: kill" in shown
+
+
+def test_show_says_why_it_is_another_run(
+    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(bench(), tmp_path / "out", "seeds=1")
+    runs = tmp_path / "out/runs.csv"
+    row = read_rows(runs)[0]
+    runs.write_text(runs.read_text().replace(f"{row['event_hash']},{row['code']}", "0,older"))
+    assert lab("show", tmp_path / "out", row["run"]) == 1
+    assert "the row is of code older" in capsys.readouterr().out
+
+
+def test_an_unknown_run_is_named(bench: Callable[..., Path], tmp_path: Path) -> None:
+    run(bench(), tmp_path / "out", "seeds=1")
+    from drone_mesh.lab.results import load_results
+
+    with pytest.raises(ConfigurationError, match="0 runs of the plan begin with zzz"):
+        load_results(tmp_path / "out").find_run("zzz")
