@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 from typing import Callable
 
 from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.radio import InProcessAir
 
 
 @dataclass
 class Traffic:
-    """Packets of one type that were handed to the radio, broadcasts once per receiver."""
+    """Packets of one type that were handed to the radio."""
 
     own: int = 0
     forwarded: int = 0
@@ -45,12 +47,46 @@ class Medium:
     sent_by: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._send = self.network.air.send
         self._links: dict[tuple[int, int], random.Random] = {}
-        self.network.air.send = self.send  # type: ignore[method-assign]
+        air = self.network.air
+        if isinstance(air, InProcessAir):
+            self._send = air.send
+            air.send = self.send  # type: ignore[method-assign]
+        else:
+            for node in self.network.nodes.values():
+                self._watch(node.antenna)
+
+    @property
+    def disc(self) -> InProcessAir:
+        """The air; cuts, jams and losses are for the disc alone, as the experiment's check says."""
+        assert isinstance(self.network.air, InProcessAir)
+        return self.network.air
+
+    def _watch(self, antenna: IWirelessCommunication) -> None:
+        """Count what is handed to an antenna of the shared channel."""
+        send, broadcast = antenna.send_message_to, antenna.broadcast_message
+
+        def counted_send(payload: bytes) -> bool:
+            self._count(payload)
+            return send(payload)
+
+        def counted_broadcast(payload: bytes) -> None:
+            self._count(payload)
+            broadcast(payload)
+
+        antenna.send_message_to = counted_send  # type: ignore[method-assign]
+        antenna.broadcast_message = counted_broadcast  # type: ignore[method-assign]
 
     def send(self, payload: bytes) -> bool:
         """As the air's."""
+        sender, to = self._count(payload)
+        if (self.loss or self.jams) and self._is_lost(sender, to):
+            self.lost += 1
+            return False
+        return self._send(payload)
+
+    def _count(self, payload: bytes) -> tuple[int, int]:
+        """Returns the sender and the receiver of this hop."""
         creator, sender, kind, to, _forward = messages.header(payload)
         counted = self.traffic.get(kind)
         if counted is None:
@@ -60,10 +96,7 @@ class Medium:
         else:
             counted.forwarded += 1
             self.sent_by[sender] = self.sent_by.get(sender, 0) + 1
-        if (self.loss or self.jams) and self._is_lost(sender, to):
-            self.lost += 1
-            return False
-        return self._send(payload)
+        return sender, to
 
     def _is_lost(self, sender: int, to: int) -> bool:
         loss = self.loss

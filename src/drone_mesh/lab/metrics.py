@@ -371,7 +371,7 @@ def _mean(values: object) -> float:
 
 @_metric(
     "packets",
-    "packets handed to the radio, with all tries; broadcasts once per receiver",
+    "packets handed to the radio; on the disc all tries, broadcasts once per receiver",
     better="less",
 )
 def packets(run: RunRecord) -> float:
@@ -386,6 +386,16 @@ def packet_rate(run: RunRecord) -> float:
 @_metric("bytes", "32 bytes for each of these packets", better="less")
 def payload_bytes(run: RunRecord) -> float:
     return 32.0 * packets(run)
+
+
+@_metric("share", "time with frames on the air, those at one time added; shared radio only")
+def air_load(run: RunRecord) -> float:
+    return NAN if run.airtime_s is None else run.airtime_s / run.end_s
+
+
+@_metric("frames", "receptions that another frame destroyed; shared radio only", better="less")
+def frames_destroyed(run: RunRecord) -> float:
+    return NAN if run.frames_destroyed is None else float(run.frames_destroyed)
 
 
 @_metric("", "flight orders that were given")

@@ -59,6 +59,8 @@ class RunRecord:
     collisions: int
     min_distance_m: float  # of two drones that were not that near at the start; inf: never measured
     end_s: float
+    airtime_s: float | None  # of all frames, on the shared channel
+    frames_destroyed: int | None  # by other frames, on the shared channel
     refused_flights: int = 0
 
     @property

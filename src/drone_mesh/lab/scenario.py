@@ -93,13 +93,13 @@ class Radio(Part):
     def _only_what_its_kind_uses(self) -> "Radio":
         if self.kind == "disc" and self.rate is not None:
             raise ValueError("rate is for the shared radio; the disc has delay_s")
-        if self.kind == "shared" and self.model_fields_set & {"delay_s", "jitter_s"}:
-            raise ValueError("delay_s and jitter_s are for the disc; the shared radio has rate")
+        if self.kind == "shared" and self.model_fields_set & {"loss", "delay_s", "jitter_s"}:
+            raise ValueError("loss, delay_s and jitter_s are for the disc; shared has rate")
         return self
 
     @model_serializer(mode="wrap")
     def _what_its_kind_uses(self, dump: Any) -> Dict[str, Any]:
-        left_out = {"rate"} if self.kind == "disc" else {"delay_s", "jitter_s"}
+        left_out = {"rate"} if self.kind == "disc" else {"loss", "delay_s", "jitter_s"}
         return {key: value for key, value in dump(self).items() if key not in left_out}
 
 
@@ -295,3 +295,13 @@ class Scenario(Part):
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
     sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # how often the network is looked at
     speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights, reference section 11
+
+    @model_validator(mode="after")
+    def _has_what_its_radio_can(self) -> "Scenario":
+        if self.radio.kind == "shared":
+            for fault in self.faults:
+                if fault.action in ("cut_link", "jam", "loss"):
+                    raise ValueError(f"fault {fault.action} is for the disc radio")
+            if self.obstacles.boxes:
+                raise ValueError("obstacles are for the disc radio")
+        return self

@@ -73,6 +73,8 @@ class Simulation:
             collisions=len(self._pairs),
             min_distance_m=self._min_distance_m,
             end_s=end_s,
+            airtime_s=getattr(network.air, "airtime_s", None),
+            frames_destroyed=getattr(network.air, "collisions", None),
             refused_flights=self.flights.refused,
         )
 

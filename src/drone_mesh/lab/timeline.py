@@ -146,7 +146,7 @@ class Timeline:
         return nodes
 
     def _cut_link(self, fault: Fault, rng: random.Random) -> list[int]:
-        air, what = self._network.air, fault.what
+        air, what = self._medium.disc, fault.what
         if what.between is not None:
             links = [tuple(what.between)]
         else:

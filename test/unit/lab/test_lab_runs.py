@@ -238,6 +238,15 @@ def test_a_condition_starts_a_fault(when: str, at_s: float) -> None:
     assert time == pytest.approx(at_s, abs=0.5)
 
 
+def test_the_shared_channel_counts_its_airtime() -> None:
+    layout = {"kind": "grid", "drones": 9}
+    measured = measure_all(run(layout=layout, radio={"kind": "shared", "rate": "1M"}))
+    assert measured["connected_share"] == 1.0
+    assert 0 < measured["air_load"] < 0.5
+    assert measured["own_present"] > 0
+    assert math.isnan(measure_all(run())["air_load"])
+
+
 # Common random numbers
 
 

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, Callable, Iterator
+from typing import Any, Callable
 
 import pytest
 
@@ -289,9 +289,9 @@ def slow(bench: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture
-def slow_rows(slow: Path, tmp_path: Path) -> Iterator[bytes]:
+def slow_rows(slow: Path, tmp_path: Path) -> bytes:
     run(slow, tmp_path / "reference")
-    yield measured(tmp_path / "reference")
+    return measured(tmp_path / "reference")
 
 
 @pytest.mark.slow
