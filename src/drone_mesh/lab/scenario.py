@@ -294,7 +294,7 @@ class Scenario(Part):
     faults: List[Fault] = []
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
     sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # how often the network is looked at
-    speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights, reference section 11
+    speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights
 
     @model_validator(mode="after")
     def _has_what_its_radio_can(self) -> "Scenario":
