@@ -77,6 +77,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._rng = rng
         self._timing = timing or MeshTiming()
         self._debug = debug
+        self._search_again_s = antenna.medium.search_s  # 0: the next check is soon enough
         self._deadlines = Deadlines()
         self._introduces_for_others = False  # Due.INTRODUCE answers a node that needs a gateway
         self._neighbours = Neighbours()
@@ -256,6 +257,12 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._antenna.broadcast_message(
             IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
         )
+        if connected:
+            self._search_again_s = self._antenna.medium.search_s
+        elif self._search_again_s:
+            wait_s = self._search_again_s * (0.5 + self._rng.random())
+            self._search_again_s = min(2.0 * self._search_again_s, self._timing.check_period_s)
+            self._deadlines.set(Due.INTRODUCE, self._deadlines.now_s + wait_s)
 
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`."""

@@ -101,8 +101,18 @@ class GatewayConnection:
             self.send_heartbeat()
             return
         self._unanswered = 0
+        was_connected = self._states.connected
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
+        if was_connected and self._parts.antenna.medium.shared:
+            self._introduce()  # a neighbour may know another route, and answers
+
+    def on_neighbour_lost(self) -> None:
+        """A neighbour is out of reach. If it was the only route, others are asked at once."""
+        medium = self._parts.antenna.medium
+        if medium.shared and self._states.connected and self.next_hop() == NO_ROUTE:
+            self._heartbeat_sent_s = -math.inf
+            self.send_heartbeat()
 
     # What neighbours and gateways say --------------------------------------------------------
 

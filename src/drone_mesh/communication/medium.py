@@ -18,6 +18,8 @@ class Medium:
     * MISSING is one broadcast, and the same node is not announced again within `missing_quiet_s`;
     * a node that looks for a gateway is answered by one PRESENT for all, after a random part of
       `answer_spread_s`, unless another node answered first (Trickle, RFC 6206: suppression);
+    * a node that looks for a gateway searches again after `search_s`, and then after twice as long
+      each time (Trickle, RFC 6206), since no one acknowledges a broadcast;
     * a router asks one neighbour at a time for its gateway, for `answer_s`;
     * what is known to work is not probed in each round; see IWirelessCommunication.patience. A
       gateway's answer that a router forwards proves its own connection, too (the data-path
@@ -30,6 +32,7 @@ class Medium:
     answer_per_hop_s: float = 0.0  # and so much longer for each hop to the gateway
     heartbeats: int = 1
     answer_spread_s: float = 0.0
+    search_s: float = 0.0
     missing_quiet_s: float = 0.0
     silence_s: float = 0.0  # a neighbour heard since then is not lost by one undelivered packet
 

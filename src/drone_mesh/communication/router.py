@@ -129,6 +129,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair.on_bid(bid.creator, bid.cost)
 
     def _on_neighbour_lost(self, node: int) -> None:
+        self._connection.on_neighbour_lost()
         self._repair.on_neighbour_lost()
 
     def _took_off(self) -> None:

@@ -59,7 +59,7 @@ class AccessRules:
             retransmits=1,
             retransmit_delays=(2, 9),
             tries_when_silent=3,
-            first_pause_s=8 * cycle_s,
+            first_pause_s=5 * cycle_s,
             longest_pause_s=400 * cycle_s,
             gap_s=2 * cycle_s,
             broadcast_jitter_s=60 * cycle_s,
@@ -109,6 +109,7 @@ class Outgoing:
 
 _LEARNING = 0.1  # weight of the latest first try in the estimate of contention
 _MOST_CONTENTION = 0.9
+_STILL_THERE_S = 5.0  # our choice: a node that was heard so lately is believed to be there
 
 
 class MediumAccess:
@@ -126,8 +127,11 @@ class MediumAccess:
         self._free_s = -math.inf  # the gap after the last packet ends
         self._broadcast_heard_s = -math.inf
         self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
+        self._heard_s: dict[int, float] = {}
         self._counts = {"sent": 0, "acknowledged": 0, "lost": 0, "tries": 0, "broadcasts": 0}
-        self.contention = 0.0  # share of first tries that failed lately, 0 to _MOST_CONTENTION
+        # Share of first tries that failed lately, 0 to _MOST_CONTENTION. A receiver that is gone
+        # says nothing about the channel, so what it let fail does not count.
+        self.contention = 0.0
 
     def __len__(self) -> int:
         """Packets that wait."""
@@ -156,17 +160,10 @@ class MediumAccess:
         self._waiting += 1
         return True
 
-    def replace_broadcast(self, payload: bytes, prefix: int) -> bool:
-        """Have a broadcast that waits and begins with the same bytes carry the newer content."""
-        for waiting in self._lines.get(EVERYBODY, ()):
-            if waiting.payload[:prefix] == payload[:prefix]:
-                waiting.payload = payload
-                return True
-        return False
-
     def heard(self, sender: int, now_s: float, *, broadcast: bool) -> None:
         """A packet came in."""
         self._silent.discard(sender)
+        self._heard_s[sender] = now_s
         if broadcast:
             self._broadcast_heard_s = now_s
 
@@ -199,12 +196,10 @@ class MediumAccess:
             self._remove(packet)
             return Fate.DELIVERED
         counts["tries"] += packet.tries > 1
-        if packet.tries == 1 and receiver not in self._silent:
-            failed = 0.0 if acknowledged else _MOST_CONTENTION
-            self.contention += _LEARNING * (failed - self.contention)
         if acknowledged:
             counts["sent"] += 1
             counts["acknowledged"] += 1
+            self._learn(packet.tries > 1)
             self._silent.discard(receiver)
             self._remove(packet)
             return Fate.DELIVERED
@@ -212,6 +207,8 @@ class MediumAccess:
         if packet.tries >= most or now_s - packet.queued_s > rules.lifetime_s:
             counts["sent"] += 1
             counts["lost"] += 1
+            if self._heard_s.get(receiver, -math.inf) > packet.queued_s - _STILL_THERE_S:
+                self._learn(True)  # it is there, so the channel is to blame
             self._silent.add(receiver)
             self._remove(packet)
             return Fate.GIVEN_UP
@@ -239,9 +236,13 @@ class MediumAccess:
         self._waiting = 0
         return dropped
 
+    def _learn(self, first_try_failed: bool) -> None:
+        failed = _MOST_CONTENTION if first_try_failed else 0.0
+        self.contention += _LEARNING * (failed - self.contention)
+
     def _pause_s(self, tries: int) -> float:
         rules = self.rules
-        mean_s = rules.first_pause_s / (1.0 - self.contention) * 2.0 ** (tries - 1)
+        mean_s = rules.first_pause_s / (1.0 - self.contention) ** 2 * 2.0 ** (tries - 1)
         return min(mean_s, rules.longest_pause_s) * 2.0 * self._rng.random()
 
     def _remove(self, packet: Outgoing) -> None:

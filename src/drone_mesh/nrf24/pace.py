@@ -23,6 +23,7 @@ def medium_of(settings: RadioSettings) -> Medium:
         answer_per_hop_s=100 * cycle_s,
         heartbeats=3,
         answer_spread_s=200 * cycle_s,
+        search_s=800 * cycle_s,
         missing_quiet_s=5.0,
         silence_s=3.0,
     )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import random
 import threading
+from collections import Counter
 
 import pytest
 
+from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
@@ -84,3 +86,43 @@ def test_the_same_seed_gives_the_same_mesh():
 
     assert run(3) == run(3)
     assert run(3) != run(4)
+
+
+def grid(nodes, seed=1):
+    mesh = EmulatedMesh(VirtualClock(), IdealDisc(9.0), seed)
+    columns = round((nodes - 1) ** 0.5)
+    mesh.add_gateway(0, GATEWAY)
+    for index in range(nodes - 1):
+        row, column = divmod(index, columns)
+        mesh.add_router(index + 1, (6.0 * column, 6.0 * row, 0.05))
+    return mesh
+
+
+def test_26_nodes_on_one_channel_connect_and_stay_connected():
+    mesh = grid(26)
+    assert mesh.run_until(mesh.all_connected, within_s=12.0)
+    seconds, connected = 60, 0
+    for _ in range(seconds):
+        mesh.run_for(1.0)
+        connected += sum(mesh.hops(node) != 255 for node in mesh.nodes if node)
+    assert connected / seconds / 25 >= 0.998
+    assert mesh.air.collisions < 0.4 * mesh.air.frames
+    assert [node.chip.warnings for node in mesh.nodes.values() if node.chip.warnings] == []
+    mesh.stop()
+
+
+def test_the_fast_model_agrees_with_the_chips():
+    """A minute of 26 nodes, three seeds; `python3 -m drone_mesh.lab.air_validation` shows more."""
+    chips, model = Counter(), Counter()
+    for seed in (1, 2, 3):
+        mesh = grid(26, seed)
+        mesh.run_for(60.0)
+        chips.update(frames=mesh.air.frames, collisions=mesh.air.collisions)
+        mesh.stop()
+        network = Network(seed=seed, radio="shared")
+        network.add_fleet(1, 25, 5, 6.0)
+        network.run_for(60.0)
+        model.update(frames=network.air.frames, collisions=network.air.collisions)
+    assert model["frames"] == pytest.approx(chips["frames"], rel=0.15)
+    collided = chips["collisions"] / chips["frames"]
+    assert model["collisions"] / model["frames"] == pytest.approx(collided, abs=0.05)

@@ -1,0 +1,255 @@
+"""The shared channel, packet by packet: what it does to frames, and meshes on it."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from scenarios import events, flown, layout
+
+from drone_mesh.communication.interfaces import IMeshNetwork
+from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.shared_antenna import SharedAntenna
+from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance, ScriptedLoss
+from drone_mesh.nrf24.settings import RadioSettings
+
+
+class Mesh(IMeshNetwork):
+    """Keeps what the antenna hands it."""
+
+    def __init__(self, node_id):
+        self.node_id = node_id
+        self.heard, self.undelivered = [], []
+
+    def get_node_id(self):
+        return self.node_id
+
+    def on_msg(self, payload, now_s):
+        self.heard.append((now_s, payload))
+
+    def on_undelivered(self, payload, now_s):
+        self.undelivered.append(payload)
+
+    def on_antenna_power(self, on, now_s):
+        raise AssertionError("no one switches it")
+
+    def on_antenna_registered(self, now_s):
+        raise AssertionError("a radio is not registered anywhere")
+
+
+class Bench:
+    """Radios in a row, at given places on x."""
+
+    def __init__(self, *places_m, links=None, settings=None):
+        self.clock = VirtualClock()
+        self.loses = lambda hop: False
+        model = ScriptedLoss(links or IdealDisc(9.0), lambda hop: self.loses(hop))
+        self.air = SharedAir(self.clock, model, settings or RadioSettings(), 9.0)
+        self.meshes, self.antennas = [], []
+        for node_id, x_m in enumerate(places_m):
+            mesh = Mesh(node_id)
+            antenna = SharedAntenna(
+                self.air,
+                node_id,
+                GroundEngine(node_id, Location(0.0, x_m, 0.0)),
+                lambda work: work(self.clock.now_s),
+                random.Random(f"bench {node_id}"),
+            )
+            antenna.start_antenna(mesh)
+            self.meshes.append(mesh)
+            self.antennas.append(antenna)
+
+    def run(self, seconds):
+        self.clock.run_until(self.clock.now_s + seconds)
+
+
+def packet(sender, to, filling=0x55):
+    return bytes((sender, sender, 3, to, to)) + bytes((filling,)) * 27
+
+
+def test_a_packet_takes_two_frames_and_the_time_of_the_radio():
+    bench = Bench(0.0, 6.0)
+    assert bench.antennas[0].send_message_to(packet(0, 1))
+    bench.run(1.0)
+    ((heard_s, payload),) = bench.meshes[1].heard
+    assert payload == packet(0, 1)
+    # docs/radio.md: 505 us to let an acknowledgement out, 130 us settling, 1316 us of data
+    assert heard_s == pytest.approx(505e-6 + 130e-6 + 1316e-6, abs=200e-6)
+    assert bench.air.frames == 2
+    assert bench.air.airtime_s == pytest.approx(1316e-6 + 292e-6)
+
+
+def test_a_broadcast_is_one_frame_and_each_receiver_finds_its_own_id_in_byte_3():
+    bench = Bench(0.0, 6.0, 8.0, 20.0)
+    bench.antennas[0].broadcast_message(packet(0, 254))
+    bench.run(1.0)
+    assert bench.air.frames == 1
+    heard = [[payload[3] for _, payload in mesh.heard] for mesh in bench.meshes]
+    assert heard == [[], [1], [2], []]
+
+
+def test_a_lost_acknowledgement_costs_a_frame_and_no_second_delivery():
+    bench = Bench(0.0, 6.0)
+    lost = []
+    bench.loses = lambda hop: hop.packet is None and not lost and not lost.append(hop)
+    bench.antennas[0].send_message_to(packet(0, 1))
+    bench.run(1.0)
+    assert len(bench.meshes[1].heard) == 1
+    assert bench.air.frames == 4
+    assert bench.meshes[0].undelivered == []
+
+
+def test_a_receiver_that_is_gone_costs_18_frames_and_is_reported():
+    bench = Bench(0.0, 20.0)
+    bench.antennas[0].send_message_to(packet(0, 1))
+    bench.run(12.0)
+    assert bench.air.frames == 18
+    assert bench.meshes[0].undelivered == [packet(0, 1)]
+
+
+def test_two_that_cannot_hear_each_other_both_reach_a_third():
+    bench = Bench(0.0, 8.0, 16.0)
+    for round_number in range(20):
+        for sender in (0, 2):
+            bench.antennas[sender].send_message_to(packet(sender, 1, round_number))
+        bench.run(3.0)
+    assert bench.air.collisions > 0
+    for sender in (0, 2):
+        got = [p[5] for _, p in bench.meshes[1].heard if p[0] == sender]
+        assert got == list(range(20))
+
+
+def test_a_frame_survives_one_that_is_weaker_by_the_capture_ratio():
+    near_and_far = Bench(1.0, 0.0, -8.9)  # 19 dB apart at node 1
+    for sender in (0, 2):
+        near_and_far.antennas[sender].send_message_to(packet(sender, 1))
+    near_and_far.run(0.0025)  # the first frame of both, which began at the same moment
+    assert [p[0] for _, p in near_and_far.meshes[1].heard] == [0]
+
+
+def test_a_radio_is_deaf_while_it_sends():
+    bench = Bench(0.0, 6.0)
+    for sender in (0, 1):
+        bench.antennas[sender].send_message_to(packet(sender, 1 - sender))
+    bench.run(0.004)
+    assert [mesh.heard for mesh in bench.meshes] == [[], []]
+    bench.run(3.0)
+    assert [len(mesh.heard) for mesh in bench.meshes] == [1, 1]
+
+
+def test_a_radio_without_power_neither_sends_nor_hears():
+    bench = Bench(0.0, 6.0)
+    bench.antennas[1].switch_power(False)
+    assert not bench.antennas[1].send_message_to(packet(1, 0))
+    bench.antennas[0].send_message_to(packet(0, 1))
+    bench.run(12.0)
+    assert bench.meshes[1].heard == []
+    bench.antennas[1].switch_power(True)
+    bench.antennas[0].send_message_to(packet(0, 1))
+    bench.run(1.0)
+    assert len(bench.meshes[1].heard) == 1
+
+
+def test_an_unknown_radio_or_rate_is_refused():
+    with pytest.raises(ConfigurationError, match="invalid radio 'sharde': use disc or shared"):
+        Network(radio="sharde")
+    with pytest.raises(ConfigurationError, match="invalid data rate '3M': use one of 250k, 1M, 2M"):
+        Network(radio="shared", rate="3M")
+
+
+# Meshes --------------------------------------------------------------------------------------
+
+
+def grid(nodes, rate="250k", spacing=6.0, seed=1, **options):
+    network = Network(seed=seed, radio="shared", rate=rate, **options)
+    network.add_fleet(1, nodes - 1, round((nodes - 1) ** 0.5), spacing)
+    return network
+
+
+def share_connected(network, seconds):
+    routers = [node for node in network.nodes if node]
+    samples = round(seconds / 0.5)
+    connected = 0
+    for _ in range(samples):
+        network.run_for(0.5)
+        connected += sum(map(network.connected, routers))
+    return connected / samples / len(routers)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "rate", "spacing", "within_s", "share"),
+    [
+        (17, "250k", 6.0, 8.0, 0.999),
+        (26, "250k", 6.0, 12.0, 0.998),
+        (50, "250k", 6.0, 20.0, 0.995),
+        (101, "250k", 6.0, 60.0, 0.98),
+        (101, "1M", 6.0, 12.0, 0.998),
+        (50, "250k", 1.0, 30.0, 0.99),
+    ],
+)
+def test_a_mesh_on_one_channel_connects_and_stays_connected(nodes, rate, spacing, within_s, share):
+    network = grid(nodes, rate, spacing)
+    assert network.run_until(network.all_connected, within_s)
+    assert share_connected(network, 120.0) >= share
+
+
+def test_a_mesh_whose_power_falls_with_distance_connects():
+    links = LogDistance.with_edge_at(9.0, random.Random("links"))
+    network = grid(50, links=links)
+    assert network.run_until(network.all_connected, 30.0)
+    assert share_connected(network, 120.0) >= 0.99
+
+
+def test_a_mesh_lives_with_the_loss_of_every_tenth_frame():
+    rng = random.Random("loss")
+    network = grid(50, links=ScriptedLoss(IdealDisc(9.0), lambda hop: rng.random() < 0.1))
+    assert network.run_until(network.all_connected, 60.0)
+    assert share_connected(network, 120.0) >= 0.98
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_101_nodes_30_die_and_all_that_have_a_path_are_back_within_40_s(seed):
+    network = grid(101, "1M", seed=seed)
+    assert network.run_until(network.all_connected, 60.0)
+    network.run_for(20.0)
+    for node in random.Random(f"dead {seed}").sample(range(1, 101), 30):
+        network.power(node, False)
+    died_s = network.clock.now_s
+    reachable = [node for node in network.shortest_hops() if node]
+    network.run_for(40.0)
+    assert [node for node in reachable if not network.connected(node)] == []
+    assert [node for node in reachable if network.path_to_gateway(node) is None] == []
+    assert flown(network, since_s=died_s) & set(reachable) == set()
+
+
+def test_a_silent_minute_is_quieter_than_the_start():
+    network = grid(26)
+    network.run_for(20.0)
+    at_start = network.air.frames
+    network.run_for(20.0)
+    assert network.air.frames - at_start < at_start
+
+
+def test_layout_201_flies_as_on_the_disc():
+    network = layout(201, radio="shared")
+    assert network.run_until(network.all_connected, 20.0)
+    network.run_for(20.0)
+    network.power(2, False)
+    assert network.run_until(lambda: events(network, "LANDED") != [], 120.0)
+    assert network.run_until(lambda: network.connected(3), 20.0)
+    assert flown(network) == {3}
+
+
+def test_the_same_seed_gives_the_same_frames():
+    def run(seed):
+        network = grid(17, seed=seed)
+        network.run_for(30.0)
+        return network.air.frames, network.air.collisions, network.air.airtime_s
+
+    assert run(1) == run(1)
+    assert run(1) != run(2)

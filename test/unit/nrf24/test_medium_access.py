@@ -1,0 +1,239 @@
+"""The rules of access to the channel, by themselves, under a virtual clock.
+
+docs/radio.md, "Driver rules".
+"""
+
+from __future__ import annotations
+
+import heapq
+import random
+
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.nrf24.medium_access import EVERYBODY, AccessRules, Fate, MediumAccess, Priority
+
+CYCLE_S = 0.0026
+RULES = AccessRules.for_cycle(CYCLE_S)
+PACKET = bytes(32)
+
+
+def packet(number: int) -> bytes:
+    return number.to_bytes(32, "little")
+
+
+class Contest:
+    """Senders that cannot hear each other, and one receiver. Tries that overlap all fail."""
+
+    def __init__(self, senders: int, seed: int = 1) -> None:
+        self.now_s = 0.0
+        self.nodes = [MediumAccess(RULES, random.Random(f"{seed} {n}")) for n in range(senders)]
+        self.delivered: list[list[float]] = [[] for _ in range(senders)]
+        self.lost = 0
+        self.tries = 0
+
+    def offer_all(self, packets: int) -> None:
+        for node in self.nodes:
+            for number in range(packets):
+                assert node.offer(0, packet(number), self.now_s)
+
+    def run(self, until_s: float) -> None:
+        under_way: list[tuple[float, int, float, object]] = []  # end, sender, start, packet
+        last: list[tuple[float, float, int]] = []  # start, end, sender of recent tries
+        while True:
+            sending = {entry[1] for entry in under_way}
+            starts = [
+                (max(node.next_try_s, self.now_s), sender)
+                for sender, node in enumerate(self.nodes)
+                if sender not in sending
+            ]
+            start_s, sender = min(starts, default=(float("inf"), -1))
+            if under_way and under_way[0][0] <= start_s:
+                end_s, sender, began_s, tried = heapq.heappop(under_way)
+                self.now_s = end_s
+                alone = not any(
+                    other != sender and began < end_s and ended > began_s
+                    for began, ended, other in last
+                )
+                fate = self.nodes[sender].tried(tried, alone, end_s)
+                if fate is Fate.DELIVERED:
+                    self.delivered[sender].append(end_s)
+                self.lost += fate is Fate.GIVEN_UP
+                last = [one for one in last if one[1] > end_s - 2 * CYCLE_S]
+            elif start_s <= until_s:
+                self.now_s = start_s
+                due = self.nodes[sender].due(start_s)
+                if due is None:  # rounding
+                    self.now_s += 1e-9
+                    continue
+                self.tries += 1
+                heapq.heappush(under_way, (start_s + CYCLE_S, sender, start_s, due))
+                last.append((start_s, start_s + CYCLE_S, sender))
+            else:
+                return
+
+
+@pytest.mark.parametrize("senders", [2, 10, 50])
+def test_contenders_that_start_at_the_same_moment_all_get_through_within_seconds(senders):
+    contest = Contest(senders)
+    contest.offer_all(1)
+    contest.run(30.0)
+    delivered = [times[0] for times in contest.delivered if times]
+    assert len(delivered) + contest.lost == senders
+    assert contest.lost <= senders // 10
+    assert max(delivered) < 10.0
+
+
+@pytest.mark.parametrize("senders", [2, 10, 50])
+def test_the_channel_is_shared_fairly_and_no_contender_starves(senders):
+    contest = Contest(senders)
+    packets = 300 // senders
+    contest.offer_all(packets)
+    contest.run(120.0)
+    counts = [len(times) for times in contest.delivered]
+    assert min(counts) > 0
+    fairness = sum(counts) ** 2 / (senders * sum(count**2 for count in counts))  # Jain's index
+    assert fairness > 0.9
+
+
+def test_more_contenders_do_not_lower_what_the_channel_carries_below_half():
+    def carried_per_s(senders):
+        contest = Contest(senders)
+        contest.offer_all(1000 // senders)
+        contest.run(5.0)
+        return sum(map(len, contest.delivered)) / 5.0
+
+    assert carried_per_s(50) > 0.5 * carried_per_s(10)
+
+
+def test_a_receiver_that_is_gone_costs_at_most_18_frames_and_later_packets_6():
+    access = MediumAccess(RULES, random.Random(1))
+    costs = []
+    now_s = 0.0
+    for number in range(3):
+        access.offer(7, packet(number), now_s)
+        frames, fate = 0, Fate.WAITS
+        while fate is Fate.WAITS:
+            now_s = max(now_s, access.next_try_s)
+            due = access.due(now_s)
+            frames += 1 + access.retransmits()[0]
+            now_s += CYCLE_S
+            fate = access.tried(due, False, now_s)
+        costs.append(frames)
+    assert costs == [18, 6, 6]
+    assert access.contention == 0.0  # it says nothing about the channel
+
+
+def test_a_receiver_that_is_heard_again_gets_all_tries():
+    access = MediumAccess(RULES, random.Random(1))
+    now_s = 0.0
+
+    def tries():
+        nonlocal now_s
+        access.offer(7, PACKET, now_s)
+        count, fate = 0, Fate.WAITS
+        while fate is Fate.WAITS:
+            now_s = max(now_s, access.next_try_s)
+            fate = access.tried(access.due(now_s), False, now_s)
+            count += 1
+        return count
+
+    assert [tries(), tries()] == [9, 3]
+    access.heard(7, now_s, broadcast=False)
+    assert tries() == 9
+
+
+def test_waiting_for_one_receiver_does_not_delay_the_others():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, packet(1), 0.0)
+    now_s = access.next_try_s
+    access.tried(access.due(now_s), False, now_s)
+    access.offer(8, packet(2), now_s)
+    now_s = access.next_try_s
+    assert access.due(now_s).receiver == 8
+
+
+def test_packets_for_one_receiver_keep_their_order():
+    access = MediumAccess(RULES, random.Random(1))
+    for number in range(5):
+        access.offer(7, packet(number), 0.0)
+    now_s, order = 0.0, []
+    while len(access):
+        now_s = max(now_s, access.next_try_s)
+        due = access.due(now_s)
+        if access.tried(due, random.Random(now_s).random() < 0.5, now_s) is Fate.DELIVERED:
+            order.append(due.payload[0])
+    assert order == [0, 1, 2, 3, 4]
+
+
+def test_control_packets_go_before_data():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, packet(1), 0.0, Priority.DATA)
+    access.offer(8, packet(2), 0.0, Priority.CONTROL)
+    assert access.due(1.0).receiver == 8
+
+
+def test_a_burst_is_paced():
+    access = MediumAccess(RULES, random.Random(1))
+    for receiver in range(100):
+        access.offer(receiver, PACKET, 0.0)
+    now_s = 0.0
+    while len(access):
+        now_s = max(now_s, access.next_try_s)
+        access.tried(access.due(now_s), True, now_s + CYCLE_S)
+        now_s += CYCLE_S
+    assert now_s > 100 * (CYCLE_S + 0.8 * RULES.gap_s)
+
+
+def test_a_broadcast_and_the_answers_to_one_are_spread():
+    waits = []
+    for seed in range(200):
+        access = MediumAccess(RULES, random.Random(seed))
+        access.offer(EVERYBODY, PACKET, 1.0)
+        waits.append(access.next_try_s - 1.0)
+    assert 0.0 <= min(waits) < 0.1 * RULES.broadcast_jitter_s
+    assert 0.9 * RULES.broadcast_jitter_s < max(waits) <= RULES.broadcast_jitter_s
+    access = MediumAccess(RULES, random.Random(1))
+    access.heard(3, 1.0, broadcast=True)
+    access.offer(3, PACKET, 1.0)
+    assert access.next_try_s > 1.0
+
+
+def test_the_same_bytes_for_the_same_receiver_wait_only_once():
+    access = MediumAccess(RULES, random.Random(1))
+    assert access.offer(7, PACKET, 0.0)
+    assert access.offer(7, PACKET, 0.0)
+    assert len(access) == 1
+
+
+def test_a_full_queue_refuses_packets():
+    access = MediumAccess(RULES, random.Random(1))
+    taken = [access.offer(7, packet(number), 0.0) for number in range(RULES.queue_length + 1)]
+    assert taken == [True] * RULES.queue_length + [False]
+
+
+def test_failing_tries_make_the_pauses_longer_and_the_mesh_patient():
+    access = MediumAccess(RULES, random.Random(1))
+    assert access.patience == 0.0
+    for number in range(50):
+        access.offer(7, packet(number), 0.0)
+        due = access.due(1e9)
+        access.tried(due, False, 0.0)
+        access.tried(due, True, 0.0)
+    assert access.contention > 0.8
+    assert access.patience == RULES.most_patience
+
+
+def test_what_was_cleared_is_not_tried_again():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(7, PACKET, 0.0)
+    due = access.due(0.0)
+    assert access.clear() == [due]
+    assert access.tried(due, False, 0.1) in (Fate.WAITS, Fate.GIVEN_UP)
+    assert len(access) == 0
+    assert access.due(100.0) is None
+
+
+def test_rules_without_tries_are_refused():
+    with pytest.raises(ConfigurationError, match="tries must be at least 1"):
+        AccessRules(**{**RULES.__dict__, "tries": 0})
