@@ -74,7 +74,7 @@ def open_page() -> Page:
     wait_for(
         "two connected routers on the page",
         WALL_LIMIT_S,
-        lambda: sum(node["connected"] for node in list(page.nodes.values())) == 3,
+        lambda: [n["condition"] for n in list(page.nodes.values())] == ["connected"] * 3,
     )
     return page
 
@@ -93,9 +93,11 @@ class MeshConsoleTest(unittest.TestCase):
         self.assertTrue(page.order(do="power", node=1, on=False)["done"])
         wait_for("1 is off", WALL_LIMIT_S, lambda: not page.nodes["1"]["on"])
         self.assertTrue(page.order(do="power", node=1, on=True)["done"])
-        wait_for("1 is connected", WALL_LIMIT_S, lambda: page.nodes["1"]["connected"])
+        wait_for(
+            "1 is connected", WALL_LIMIT_S, lambda: page.nodes["1"]["condition"] == "connected"
+        )
         self.assertTrue(page.order(do="fly", node=2, x=5.0, y=4.0, z=0)["done"])
-        wait_for("2 arrived", WALL_LIMIT_S, lambda: page.nodes["2"]["at"] == [5.0, 4.0, 0.0])
+        wait_for("2 arrived", WALL_LIMIT_S, lambda: page.nodes["2"]["position"] == [5.0, 4.0, 0.0])
         self.assertTrue(page.order(do="speed", paused=True, factor=0)["done"])
         wait_for("paused", WALL_LIMIT_S, lambda: page.clock["paused"])
         self.assertTrue(page.order(do="speed", paused=False, factor=5)["done"])
