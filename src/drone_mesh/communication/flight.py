@@ -73,7 +73,9 @@ class Pilot:
     def watch(self) -> bool:
         """Look where the drone is; whether the flight is over now."""
         assert self._flight is not None
-        if not self._flight.is_over(self.location()):
+        location, is_flying = self.location(), self._engine.is_flying()
+        is_over = self._flight.is_over(location) if is_flying is None else not is_flying
+        if not is_over:
             self._ask_position_later()
             return False
         self.forget_flight()

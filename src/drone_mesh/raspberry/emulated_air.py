@@ -40,6 +40,8 @@ class EmulatedAir:
         self._column_m = COLUMN_M[settings.data_rate]
         self._in_column = max(FEWEST_IN_COLUMN, math.ceil((nodes - 1) / MOST_COLUMNS))
         self._clock = WallClock()
+        self.nodes = nodes
+        self._chips: dict[int, EmulatedChip] = {}
         self._air = Air(self._clock, LogDistance(random.Random()), random.Random())
         if trace_file is not None:
             self._air.observe(self._trace.see)
@@ -56,9 +58,8 @@ class EmulatedAir:
 
     def radio(self, node_id: int, settings: RadioSettings) -> NRF24LowLevelInterface:
         """The driver of a new chip at the place of that node."""
-        place = self.place(node_id)
-        position = place.to_vector()
-        chip = EmulatedChip(self._air, f"node {node_id}", position)
+        chip = EmulatedChip(self._air, f"node {node_id}", self.place(node_id).to_vector())
+        self._chips[node_id] = chip
         return NRF24LowLevelInterface(
             chip.spi,
             chip.ce,
@@ -67,6 +68,10 @@ class EmulatedAir:
             settings=settings,
             runtime=self._clock.runtime,
         )
+
+    def move(self, node_id: int, place: Location) -> None:
+        """Bring the radio of that node to a place."""
+        self._chips[node_id].position = place.to_vector()
 
     def close(self) -> None:
         """End the air and write the trace. The radios must be closed before."""

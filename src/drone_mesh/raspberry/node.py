@@ -11,8 +11,7 @@ from typing import Callable
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IInternetConnection
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
-from drone_mesh.drone.ground import GroundEngine
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
@@ -33,12 +32,13 @@ class RadioNode:
     def __init__(
         self,
         radio: NRF24LowLevelInterface,
-        location: Location,
+        engine: IDroneEngine,
         options: Options,
         make_internet: MakeInternet | None = None,
     ) -> None:
-        """Takes ownership of the radio. Raises what `make_internet` raises."""
+        """Takes ownership of radio and engine. Raises what `make_internet` raises."""
         self.radio = radio
+        self.engine = engine
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
         self._seat = self._executor.seat()
         self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
@@ -46,7 +46,7 @@ class RadioNode:
         self.component = assemble_component(
             radio.node_id,
             self._antenna,
-            GroundEngine(radio.node_id, location),
+            engine,
             random.Random(),
             internet=self._internet,
             routing=options.routing,
@@ -76,6 +76,7 @@ class RadioNode:
             if self._internet is not None:
                 self._internet.disconnect()
             self.radio.close()
+        self.engine.close()
 
 
 _ABOUT_GATEWAYS = frozenset(

@@ -11,12 +11,15 @@ from typing import Callable, Mapping, Sequence
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings
+from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
+from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
 
@@ -56,6 +59,8 @@ class Options:
     timing: MeshTiming
     routing: str
     location: Location
+    flight: FlightOptions
+    fleet: FleetOptions  # the drones of emulated nodes
     emulated: int  # number of emulated nodes that replace the real one; 0: none
     trace: Path | None  # file for the frames on the emulated air
     log_level: str
@@ -196,6 +201,8 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     place.add_argument("--latitude", type=float, default=0.0, help="y (default: %(default)g)")
     place.add_argument("--longitude", type=float, default=0.0, help="x (default: %(default)g)")
     place.add_argument("--height", type=float, default=0.0, help="(default: %(default)g)")
+    add_flight_options(parser)
+    add_fleet_options(parser)
     parser.add_argument(
         "--trace",
         type=Path,
@@ -241,6 +248,8 @@ def _options(
             timing=MeshTiming(parsed.check_period, parsed.connection_lost_after),
             routing=parsed.routing,
             location=location,
+            flight=flight_options(parsed),
+            fleet=fleet_options(parsed),
             emulated=parsed.emulated,
             trace=parsed.trace,
             log_level=parsed.log_level,

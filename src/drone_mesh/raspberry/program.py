@@ -13,6 +13,7 @@ from types import FrameType
 from typing import Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
+from drone_mesh.drone.engines import create_engine
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import Work
 from drone_mesh.internet.on_demand import http_internet
@@ -21,6 +22,7 @@ from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import open_spi
 from drone_mesh.raspberry.emulated_air import EmulatedAir
+from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.options import Hardware, Options
 
@@ -66,13 +68,20 @@ def _signals() -> Iterator[threading.Event]:
 
 def _run(options: Options, ended: threading.Event) -> None:
     with contextlib.ExitStack() as stack:
-        nodes = _emulated_nodes(options, stack) if options.emulated else [_real_node(options)]
+        fleet = None
+        if options.emulated:
+            fleet = _emulated_fleet(options, stack)
+            nodes = _emulated_nodes(options, fleet)
+        else:
+            nodes = [_real_node(options)]
         stack.callback(_stop, nodes)
         for node in nodes:
             node.start()
         watch = _Watch(nodes, options)
         while not ended.wait(LOOK_PERIOD_S):
             watch.look(time.monotonic())
+            if fleet is not None:
+                fleet.move_radios()
         _log.info("stopping")
 
 
@@ -85,11 +94,12 @@ def _stop(nodes: Sequence[RadioNode]) -> None:
 
 def _real_node(options: Options) -> RadioNode:
     radio = _open_radio(options.node_id, options.hardware, options.radio)
-    try:
-        node = RadioNode(radio, options.location, options, _internet(options))
-    except MeshError:
-        radio.close()
-        raise
+    with contextlib.ExitStack() as opened:
+        opened.callback(radio.close)
+        engine = create_engine(options.node_id, options.location, options.flight)
+        opened.callback(engine.close)
+        node = RadioNode(radio, engine, options, _internet(options))
+        opened.pop_all()
     hardware = options.hardware
     _log.info(
         "node %d: nRF24L01+ on SPI %d.%d, CE on GPIO%d, %s; channel %d, %d kbit/s, CRC %d bit",
@@ -117,14 +127,20 @@ def _open_radio(
     return NRF24LowLevelInterface(spi, ce, irq, node_id=node_id, settings=settings)
 
 
-def _emulated_nodes(options: Options, stack: contextlib.ExitStack) -> list[RadioNode]:
+def _emulated_fleet(options: Options, stack: contextlib.ExitStack) -> EmulatedFleet:
     air = EmulatedAir(options.radio, options.emulated, options.trace)
     stack.callback(air.close)
+    fleet = EmulatedFleet(options.fleet, options.flight, air)
+    stack.callback(fleet.close)
+    return fleet
+
+
+def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
     return [
         RadioNode(
-            air.radio(node_id, options.radio),
-            air.place(node_id),
+            fleet.air.radio(node_id, options.radio),
+            fleet.engine(node_id),
             options,
             None if node_id else (_internet(options) or _without_internet),
         )

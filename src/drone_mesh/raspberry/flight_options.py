@@ -1,0 +1,80 @@
+"""The options of raspberry_router and raspberry_gateway that are about the drone."""
+
+from __future__ import annotations
+
+import argparse
+
+from drone_mesh.drone.engines import GROUND, FlightOptions
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.errors import ConfigurationError
+
+
+def add_flight_options(parser: argparse.ArgumentParser) -> None:
+    """Add the group to a parser."""
+    limits = FlightLimits()
+    group = parser.add_argument_group("drone", "docs/flying.md explains them.")
+    group.add_argument(
+        "--drone",
+        default=GROUND,
+        metavar="ENGINE",
+        help="ground: the node stands on the ground; mavlink:/dev/serial0,921600 or "
+        "mavlink:udpin:HOST:PORT, udpout:, tcp: an ArduPilot or PX4 autopilot; or "
+        "package.module:Class (default: %(default)s)",
+    )
+    group.add_argument(
+        "--origin",
+        type=_origin,
+        metavar="LAT,LON,ALT",
+        help="origin of the common frame: degrees (WGS84), metres above sea level; the same on "
+        "every node",
+    )
+    for name, default, unit, text in (
+        ("--max-height", limits.max_height_m, "METRES", "greatest height above home"),
+        ("--max-distance", limits.max_distance_m, "METRES", "greatest distance from home"),
+        ("--speed", limits.speed_m_s, "M/S", "speed of a flight"),
+        ("--min-battery", limits.min_battery_percent, "PERCENT", "least charge; 0: any"),
+        ("--cruise-height", limits.cruise_height_m, "METRES", "height of the lowest layer"),
+        ("--layers", limits.layer_m, "METRES", "between the layers in which drones cross"),
+    ):
+        help_text = f"{text} (default: %(default)g)"
+        group.add_argument(name, type=float, default=default, metavar=unit, help=help_text)
+    group.add_argument(
+        "--hover",
+        type=float,
+        metavar="METRES",
+        help="height at which a repair ends (default: the height that the drone had before)",
+    )
+    for name, text in (
+        ("--may-arm", "arm the drone for a flight"),
+        ("--may-take-off", "take off from the ground"),
+        ("--may-change-mode", "take a drone that holds its position into GUIDED or OFFBOARD"),
+    ):
+        group.add_argument(name, action="store_true", help=f"allow the program to {text}")
+
+
+def flight_options(parsed: argparse.Namespace) -> FlightOptions:
+    """What was asked for. Raises ConfigurationError."""
+    if parsed.emulated and parsed.drone != GROUND:
+        raise ConfigurationError("--drone is for a single node; use --drones with --emulated")
+    return FlightOptions(
+        drone=parsed.drone,
+        origin=parsed.origin,
+        limits=FlightLimits(
+            max_height_m=parsed.max_height,
+            max_distance_m=parsed.max_distance,
+            speed_m_s=parsed.speed,
+            min_battery_percent=parsed.min_battery,
+            cruise_height_m=parsed.cruise_height,
+            layer_m=parsed.layers,
+            hover_m=parsed.hover,
+        ),
+        permissions=Permissions(parsed.may_arm, parsed.may_take_off, parsed.may_change_mode),
+    )
+
+
+def _origin(text: str) -> Origin:
+    try:
+        return Origin.parse(text)
+    except ConfigurationError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
