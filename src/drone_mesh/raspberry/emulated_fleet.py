@@ -36,8 +36,8 @@ def add_fleet_options(parser: argparse.ArgumentParser) -> None:
         "--drones",
         choices=_KINDS,
         default=GROUND,
-        help="with --emulated: mavlink (ArduPilot) or px4 gives each node a simulated vehicle, which "
-        "flies as ordered (default: %(default)s)",
+        help="with --emulated: mavlink (ArduPilot) or px4 gives each node a simulated vehicle, "
+        "which flies as ordered (default: %(default)s)",
     )
     group.add_argument(
         "--ground-station",

@@ -8,7 +8,11 @@ import pytest
 
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone import Location
+from drone_mesh.drone.engines import FlightOptions
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
+from drone_mesh.raspberry.emulated_fleet import FleetOptions
 from drone_mesh.raspberry.options import (
     Hardware,
     HttpOptions,
@@ -28,6 +32,8 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         timing=MeshTiming(),
         routing="child_table_tree",
         location=Location(0.0, 0.0, 0.0),
+        flight=FlightOptions(),
+        fleet=FleetOptions(),
         emulated=0,
         trace=None,
         log_level="info",
@@ -40,7 +46,10 @@ def test_each_option_reaches_what_it_is_for():
         "--id 253 --spi 1.2 --ce 22 --irq 24 --channel 76 --rate 2M --crc 8 --broadcast shockburst "
         "--check-period 5 --connection-lost-after 60 --latitude 10 --longitude -20.5 "
         "--height 3 --log-level debug --routing drone_mesh.communication.child_table_tree:"
-        "ChildTableTree"
+        "ChildTableTree "
+        "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
+        "--max-distance 200 --speed 3 --min-battery 25 --cruise-height 8 --layers 1.5 --hover 12 "
+        "--may-arm --may-take-off --may-change-mode"
     )
     assert parse_router(line.split(), {}) == Options(
         node_id=253,
@@ -54,6 +63,13 @@ def test_each_option_reaches_what_it_is_for():
         timing=MeshTiming(check_period_s=5.0, connection_lost_after_s=60.0),
         routing="drone_mesh.communication.child_table_tree:ChildTableTree",
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),
+        flight=FlightOptions(
+            "mavlink:/dev/serial0,921600",
+            Origin(52.0907, 5.1214, 3.0),
+            FlightLimits(40.0, 200.0, 3.0, 25.0, 8.0, 1.5, 12.0),
+            Permissions(may_arm=True, may_take_off=True, may_change_mode=True),
+        ),
+        fleet=FleetOptions(),
         emulated=0,
         trace=None,
         log_level="debug",
@@ -99,6 +115,12 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --routing flooding", "technique 'flooding': use one of child_table_tree"),
         ("--id 3 --latitude 5001", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --longitude inf", "longitude inf is not a finite number"),
+        ("--id 3 --drone mavlink:/dev/serial0,57600", "--drone mavlink: needs --origin"),
+        ("--id 3 --origin 52,5", "invalid origin '52,5': use LAT,LON,ALT"),
+        ("--id 3 --max-height 501", "--max-height 501 is outside"),
+        ("--id 3 --drones mavlink", "--drones needs --emulated"),
+        ("--emulated 3 --drone package.module:Class", "use --drones with --emulated"),
+        ("--emulated 3 --ground-station 127.0.0.1:14550", "needs --drones mavlink"),
         ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
         ("--emulated 1", "invalid value '1': must be a whole number 2..17"),
         ("--id 3 --log-level loud", "invalid choice: 'loud'"),

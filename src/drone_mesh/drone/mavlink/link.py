@@ -1,44 +1,22 @@
-"""The line to an autopilot: serial, UDP or TCP, by pymavlink's connections."""
+"""MavlinkLink: messages over a line that may break."""
 
 from __future__ import annotations
 
 import logging
 import time
-from typing import Any
 
-from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID
+from drone_mesh.drone.mavlink.lines import Line, open_line
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.errors import ConfigurationError
 
-DEFAULT_BAUD = 57600  # of telemetry ports, of both autopilots
+SILENT_S = 10.0  # our choice: after so much silence a peer on another port may speak
 OPEN_AGAIN_S = 2.0  # our choice: how often a line that broke is tried
-MOST_BYTES = 4096  # of one reading
-NETWORK_KINDS = ("udpin", "udpout", "tcp")
 _BAD_DATA = "BAD_DATA"
 
 _log = logging.getLogger(__name__)
-
-
-def parse_address(text: str) -> tuple[str, int]:
-    """Device and baud rate (0: none) of "/dev/serial0,921600" or "udpin:0.0.0.0:14550"."""
-    kind, _, rest = text.partition(":")
-    if kind in NETWORK_KINDS:
-        host, _, port = rest.rpartition(":")
-        if host and port.isdecimal() and 1 <= int(port) <= 65535:
-            return text, 0
-    elif text.startswith("/"):
-        device, comma, baud = text.partition(",")
-        if not comma:
-            return device, DEFAULT_BAUD
-        if baud.isdecimal() and int(baud) > 0:
-            return device, int(baud)
-    raise ConfigurationError(
-        f"invalid MAVLink address {text!r}: use /dev/NAME,BAUD or udpin:HOST:PORT, "
-        "udpout:HOST:PORT, tcp:HOST:PORT"
-    )
 
 
 class MavlinkLink:
@@ -47,13 +25,13 @@ class MavlinkLink:
     def __init__(self, address: str) -> None:
         """Raises ConfigurationError if the address is wrong or the line cannot be had."""
         self._address = address
-        self._device, self._baud = parse_address(address)
         self._codec = mavlink.MAVLink(None, OUR_SYSTEM_ID, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
         self._codec.robust_parsing = True  # noise is normal: skip it
         self._open_again_s = 0.0
+        self._heard_s = time.monotonic()
         try:
-            self._line: Any = self._open()
-        except (OSError, ValueError) as error:  # SerialException is an OSError
+            self._line: Line | None = open_line(address)
+        except OSError as error:
             raise ConfigurationError(f"MAVLink address {address}: {error}") from error
 
     def receive(self, timeout_s: float) -> list[Message]:
@@ -63,12 +41,16 @@ class MavlinkLink:
             self._try_to_open()
             return []
         try:
-            if not self._line.select(timeout_s):
-                return []
-            data = self._line.recv(MOST_BYTES)
-        except (OSError, TypeError) as error:  # pyserial raises TypeError when closed under it
+            data = self._line.receive(timeout_s)
+        except OSError as error:
             self._broke(error)
             return []
+        now_s = time.monotonic()
+        if data:
+            self._heard_s = now_s
+        elif now_s - self._heard_s > SILENT_S:
+            self._heard_s = now_s
+            self._line.forget_peer()
         messages = self._codec.parse_buffer(data) if data else None
         return [m for m in messages or () if m.get_type() != _BAD_DATA]
 
@@ -77,9 +59,9 @@ class MavlinkLink:
         if self._line is None:
             return
         try:
-            self._line.write(message.pack(self._codec))
+            self._line.send(message.pack(self._codec))
             self._codec.seq = (self._codec.seq + 1) % 256
-        except (OSError, TypeError) as error:
+        except OSError as error:
             self._broke(error)
 
     def close(self) -> None:
@@ -87,14 +69,6 @@ class MavlinkLink:
         if self._line is not None:
             self._line.close()
             self._line = None
-
-    def _open(self) -> Any:
-        options: dict[str, Any] = {"source_system": OUR_SYSTEM_ID, "dialect": "ardupilotmega"}
-        if self._baud:
-            options["baud"] = self._baud
-        elif self._device.startswith("tcp:"):
-            options["retries"] = 1
-        return mavutil.mavlink_connection(self._device, **options)
 
     def _broke(self, error: Exception) -> None:
         _log.warning("MAVLink %s broke: %s; trying again", self._address, error)
@@ -105,7 +79,7 @@ class MavlinkLink:
         if time.monotonic() < self._open_again_s:
             return
         try:
-            self._line = self._open()
+            self._line = open_line(self._address)
             _log.info("MAVLink %s is open again", self._address)
-        except (OSError, ValueError):
+        except OSError:
             self._open_again_s = time.monotonic() + OPEN_AGAIN_S

@@ -1,0 +1,130 @@
+"""Bytes to and from an autopilot: serial and TCP by pyserial, UDP by a socket."""
+
+from __future__ import annotations
+
+import select
+import socket
+from typing import Protocol
+
+import serial
+
+from drone_mesh.errors import ConfigurationError
+
+DEFAULT_BAUD = 57600  # of telemetry ports, of both autopilots
+MOST_BYTES = 4096  # of one reading
+
+
+class Line(Protocol):
+    """Where bytes come and go. Any function raises OSError when the line has broken."""
+
+    def receive(self, timeout_s: float) -> bytes:
+        """What arrives within this time, as soon as there is something."""
+
+    def send(self, data: bytes) -> None:
+        """Bring it onto the line."""
+
+    def forget_peer(self) -> None:
+        """Listen to whoever speaks next, where a line can have several peers."""
+
+    def close(self) -> None:
+        """Give it back."""
+
+
+class SerialLine:
+    """A serial port, or a TCP connection as pyserial makes it."""
+
+    def __init__(self, url: str, baud: int) -> None:
+        """`url` is a device, or socket://HOST:PORT. Raises OSError."""
+        self._port = serial.serial_for_url(url, baudrate=baud)
+
+    def receive(self, timeout_s: float) -> bytes:
+        self._port.timeout = timeout_s
+        first = self._port.read(1)
+        waiting = min(self._port.in_waiting, MOST_BYTES) if first else 0
+        return bytes(first + self._port.read(waiting) if waiting else first)
+
+    def send(self, data: bytes) -> None:
+        self._port.write(data)
+
+    def forget_peer(self) -> None:
+        """A serial port or a connection has but one."""
+
+    def close(self) -> None:
+        self._port.close()
+
+
+class UdpLine:
+    """Datagrams: `listens` waits at the address for a peer, else the address is the peer's."""
+
+    def __init__(self, host: str, port: int, listens: bool) -> None:
+        """Raises OSError for an address that cannot be had."""
+        self._listens = listens
+        self._peer = None if listens else (host, port)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((host, port) if listens else ("", 0))
+            if not listens:
+                socket.gethostbyname(host)
+        except OSError:
+            self._socket.close()
+            raise
+
+    @property
+    def port(self) -> int:
+        """The port on this side."""
+        return int(self._socket.getsockname()[1])
+
+    def receive(self, timeout_s: float) -> bytes:
+        if not select.select([self._socket], [], [], timeout_s)[0]:
+            return b""
+        data, peer = self._socket.recvfrom(MOST_BYTES)
+        if self._peer is None:
+            self._peer = peer  # the first that speaks; nobody else can take the drone over
+        return data if peer == self._peer or self._is_peer(peer) else b""
+
+    def send(self, data: bytes) -> None:
+        if self._peer is not None:
+            self._socket.sendto(data, self._peer)
+
+    def forget_peer(self) -> None:
+        if self._listens:
+            self._peer = None
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _is_peer(self, sender: tuple[str, int]) -> bool:
+        peer = self._peer
+        return peer is not None and (socket.gethostbyname(peer[0]), peer[1]) == sender
+
+
+def parse_address(text: str) -> tuple[str, str, int]:
+    """Kind, host or device, and port or baud rate.
+
+    "/dev/serial0,921600" or "udpin:0.0.0.0:14550". Raises ConfigurationError.
+    """
+    kind, _, rest = text.partition(":")
+    if kind in ("udpin", "udpout", "tcp"):
+        host, _, port = rest.rpartition(":")
+        if host and port.isdecimal() and 1 <= int(port) <= 65535:
+            return kind, host, int(port)
+    elif text.startswith("/"):
+        device, comma, baud = text.partition(",")
+        if not comma:
+            return "serial", device, DEFAULT_BAUD
+        if baud.isdecimal() and int(baud) > 0:
+            return "serial", device, int(baud)
+    raise ConfigurationError(
+        f"invalid MAVLink address {text!r}: use /dev/NAME,BAUD or udpin:HOST:PORT, "
+        "udpout:HOST:PORT, tcp:HOST:PORT"
+    )
+
+
+def open_line(address: str) -> Line:
+    """Raises ConfigurationError for an invalid address, OSError for one that cannot be had."""
+    kind, place, number = parse_address(address)
+    if kind == "serial":
+        return SerialLine(place, number)
+    if kind == "tcp":
+        return SerialLine(f"socket://{place}:{number}", DEFAULT_BAUD)
+    return UdpLine(place, number, listens=kind == "udpin")
