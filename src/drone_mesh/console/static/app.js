@@ -38,13 +38,19 @@ async function order(request, button) {
 
 function fly(id, x, y, z) {
   const node = mesh.nodes.get(id);
-  const height = z ?? Math.round(node?.path.length ? node.path[node.path.length - 1] : (node?.position?.[2] ?? 0));
+  const height =
+    z ??
+    Math.round(node?.path.length ? node.path[node.path.length - 1] : (node?.position?.[2] ?? 0));
   order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: height });
 }
 
 const map = new MapView(mesh, byId("map"), byId("map-note"), (id, x, y) => fly(id, x, y));
 new NodeTable(mesh, byId("nodes"));
-const panel = new NodePanel(mesh, (id, on) => order({ do: "power", node: id, on }, byId("power")), fly);
+const panel = new NodePanel(
+  mesh,
+  (id, on) => order({ do: "power", node: id, on }, byId("power")),
+  fly,
+);
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
 
@@ -53,14 +59,17 @@ const charts = new Charts(mesh);
 function showHead() {
   const { t, achieved, factor, paused, summary, severity } = mesh.clock;
   if (t === undefined) return;
-  byId("clock").textContent = paused ? `${t.toFixed(1)} s, paused` : `${t.toFixed(1)} s, ${achieved.toFixed(1)}×`;
+  byId("clock").textContent = paused
+    ? `${t.toFixed(1)} s, paused`
+    : `${t.toFixed(1)} s, ${achieved.toFixed(1)}×`;
   byId("summary").textContent = summary;
   byId("summary").dataset.severity = severity;
   byId("pause").textContent = paused ? "Go on" : "Pause";
   byId("pause").setAttribute("aria-pressed", paused);
   const speed = byId("speed");
   if (document.activeElement !== speed) {
-    if (![...speed.options].some((option) => Number(option.value) === factor)) speed.add(new Option(`${factor}×`, factor));
+    if (![...speed.options].some((option) => Number(option.value) === factor))
+      speed.add(new Option(`${factor}×`, factor));
     speed.value = String(factor);
   }
 }
@@ -102,27 +111,36 @@ byId("layout-form").addEventListener("submit", (event) => {
 byId("zoom-in").addEventListener("click", () => map.zoom(1.3));
 byId("zoom-out").addEventListener("click", () => map.zoom(1 / 1.3));
 byId("fit").addEventListener("click", () => map.fit());
-byId("show-known").addEventListener("change", (event) => map.setOption("known", event.target.checked));
-byId("show-ranges").addEventListener("change", (event) => map.setOption("ranges", event.target.checked));
+byId("show-known").addEventListener("change", (event) =>
+  map.setOption("known", event.target.checked),
+);
+byId("show-ranges").addEventListener("change", (event) =>
+  map.setOption("ranges", event.target.checked),
+);
 byId("help-button").addEventListener("click", () => byId("help").showModal());
 
 for (const tab of document.querySelectorAll("nav button")) {
   tab.addEventListener("click", () => {
     document.body.dataset.tab = tab.dataset.tab;
-    for (const other of document.querySelectorAll("nav button")) other.removeAttribute("aria-current");
+    for (const other of document.querySelectorAll("nav button"))
+      other.removeAttribute("aria-current");
     tab.setAttribute("aria-current", "page");
   });
 }
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 function showTheme() {
-  document.documentElement.dataset.theme = localStorage.getItem(THEME_KEY) ?? (dark.matches ? "dark" : "light");
+  document.documentElement.dataset.theme =
+    localStorage.getItem(THEME_KEY) ?? (dark.matches ? "dark" : "light");
   map.themeChanged();
   charts.themeChanged();
 }
 dark.addEventListener("change", showTheme);
 byId("theme").addEventListener("click", () => {
-  localStorage.setItem(THEME_KEY, document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+  localStorage.setItem(
+    THEME_KEY,
+    document.documentElement.dataset.theme === "dark" ? "light" : "dark",
+  );
   showTheme();
 });
 showTheme();

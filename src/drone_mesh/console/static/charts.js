@@ -15,18 +15,39 @@ export class Charts {
     this.colours = readColours();
     this.hover = null; // 0..1 across every chart
     this.charts = [
-      { id: "share", top: () => 100, lines: [{ colour: "connected", fill: true, value: share }], text: (v) => (v[0] === null ? "–" : `${v[0].toFixed(0)} %`) },
-      { id: "rate", lines: [{ colour: "accent", fill: true, value: (s) => s.rate }], text: (v) => v[0]?.toFixed(0) ?? "–" },
-      { id: "hops", lines: [{ colour: "flying", value: (s) => s.most_hops }, { colour: "gateway", value: (s) => s.mean_hops }], text: (v) => `${v[1].toFixed(1)} / ${v[0]}` },
+      {
+        id: "share",
+        top: () => 100,
+        lines: [{ colour: "connected", fill: true, value: share }],
+        text: (v) => (v[0] === null ? "–" : `${v[0].toFixed(0)} %`),
+      },
+      {
+        id: "rate",
+        lines: [{ colour: "accent", fill: true, value: (s) => s.rate }],
+        text: (v) => v[0]?.toFixed(0) ?? "–",
+      },
+      {
+        id: "hops",
+        lines: [
+          { colour: "flying", value: (s) => s.most_hops },
+          { colour: "gateway", value: (s) => s.mean_hops },
+        ],
+        text: (v) => `${v[1].toFixed(1)} / ${v[0]}`,
+      },
     ];
     for (const chart of this.charts) {
       chart.canvas = document.getElementById(`chart-${chart.id}`);
       chart.now = document.getElementById(`${chart.id}-now`);
       new ResizeObserver(() => this.#draw(chart)).observe(chart.canvas);
-      chart.canvas.addEventListener("pointermove", (event) => this.#point(event.offsetX / chart.canvas.clientWidth));
+      chart.canvas.addEventListener("pointermove", (event) =>
+        this.#point(event.offsetX / chart.canvas.clientWidth),
+      );
       chart.canvas.addEventListener("pointerleave", () => this.#point(null));
     }
-    mesh.addEventListener("frame", (event) => (event.detail.samples.length || event.detail.full) && this.redraw());
+    mesh.addEventListener(
+      "frame",
+      (event) => (event.detail.samples.length || event.detail.full) && this.redraw(),
+    );
   }
 
   redraw() {
@@ -63,15 +84,29 @@ export class Charts {
     const [start, end] = [samples[0].stamp_s, samples[samples.length - 1].stamp_s];
     const values = chart.lines.map((line) => samples.map(line.value));
     const step = niceStep(Math.max(...values.flat(), 1) / 3);
-    const top = chart.top?.() ?? Math.max(step, Math.ceil(Math.max(...values.flat()) / step) * step);
+    const top =
+      chart.top?.() ?? Math.max(step, Math.ceil(Math.max(...values.flat()) / step) * step);
     const x = (t) => LEFT_PX + ((t - start) / (end - start || 1)) * (width - LEFT_PX - RIGHT_PX);
     const y = (value) => height - BOTTOM_PX - (value / top) * (height - BOTTOM_PX - TOP_PX);
     this.#axes(context, x, y, width, height, start, end, top, chart.top ? 50 : step);
     chart.lines.forEach((line, index) => {
-      const points = samples.map((s, i) => [x(s.stamp_s), values[index][i] === null ? null : y(values[index][i])]);
+      const points = samples.map((s, i) => [
+        x(s.stamp_s),
+        values[index][i] === null ? null : y(values[index][i]),
+      ]);
       this.#line(context, points, line, y(0));
     });
-    chart.now.textContent = this.#reading(context, chart, samples, values, x, y, start, end, height);
+    chart.now.textContent = this.#reading(
+      context,
+      chart,
+      samples,
+      values,
+      x,
+      y,
+      start,
+      end,
+      height,
+    );
   }
 
   #axes(context, x, y, width, height, start, end, top, step) {
@@ -120,7 +155,11 @@ export class Charts {
     let index = samples.length - 1;
     if (this.hover !== null) {
       const px = this.hover * chart.canvas.clientWidth;
-      index = samples.reduce((best, s, i) => (Math.abs(x(s.stamp_s) - px) < Math.abs(x(samples[best].stamp_s) - px) ? i : best), 0);
+      index = samples.reduce(
+        (best, s, i) =>
+          Math.abs(x(s.stamp_s) - px) < Math.abs(x(samples[best].stamp_s) - px) ? i : best,
+        0,
+      );
       context.strokeStyle = this.colours.muted;
       context.beginPath();
       context.moveTo(x(samples[index].stamp_s), TOP_PX);
@@ -152,6 +191,9 @@ function withRates(samples) {
   return samples.map((sample, i) => {
     const before = samples[Math.max(0, i - RATE_OVER)];
     const seconds = sample.stamp_s - before.stamp_s;
-    return { ...sample, rate: seconds > 0 ? Math.max(0, sample.messages - before.messages) / seconds : null };
+    return {
+      ...sample,
+      rate: seconds > 0 ? Math.max(0, sample.messages - before.messages) / seconds : null,
+    };
   });
 }

@@ -6,15 +6,36 @@ const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and 
 /** The palette's colours in the present theme, by name. */
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
-  const names = ["card", "ink", "muted", "accent", "grid", "gateway", "connected", "flying", "disconnected", "off", "silent", "known-link", "lost-link", "route-link", "path"];
-  return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  const names = [
+    "card",
+    "ink",
+    "muted",
+    "accent",
+    "grid",
+    "gateway",
+    "connected",
+    "flying",
+    "disconnected",
+    "off",
+    "silent",
+    "known-link",
+    "lost-link",
+    "route-link",
+    "path",
+  ];
+  return Object.fromEntries(
+    names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
+  );
 }
 
 /** Radius of a drone, px: as large as the room between drones allows, never too small to see or to hit. */
 export function droneRadius(camera, mesh) {
-  const positions = [...mesh.nodes.values()].filter((node) => node.position).map((node) => node.position);
+  const positions = [...mesh.nodes.values()]
+    .filter((node) => node.position)
+    .map((node) => node.position);
   if (!positions.length) return 4.5;
-  const span = (axis) => Math.max(...positions.map((at) => at[axis])) - Math.min(...positions.map((at) => at[axis])) + 1;
+  const span = (axis) =>
+    Math.max(...positions.map((at) => at[axis])) - Math.min(...positions.map((at) => at[axis])) + 1;
   const apart = Math.sqrt((span(0) * span(1)) / positions.length) * camera.scale;
   return Math.min(13, Math.max(4.5, apart * 0.3));
 }
@@ -44,27 +65,69 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
   context.lineCap = "round";
   drawGrid(context, camera, colours);
   const selected = mesh.nodes.get(mesh.selected);
-  if (options.ranges) for (const node of mesh.nodes.values()) drawRange(context, camera, mesh, node, colours, 0.35);
+  if (options.ranges)
+    for (const node of mesh.nodes.values()) drawRange(context, camera, mesh, node, colours, 0.35);
   else if (selected) drawRange(context, camera, mesh, selected, colours, 1);
   const radius = droneRadius(camera, mesh);
-  const drawn = { drones: 0, links: mesh.links.known.length + mesh.links.route.length, linksDrawn: 0, routeLinks: 0, lostLinks: 0 };
+  const drawn = {
+    drones: 0,
+    links: mesh.links.known.length + mesh.links.route.length,
+    linksDrawn: 0,
+    routeLinks: 0,
+    lostLinks: 0,
+  };
   const ends = (links) => links.map(([a, b]) => [mesh.nodes.get(a), mesh.nodes.get(b)]);
 
   if (options.known) {
     const crowd = mesh.links.known.length > MOST_LINKS;
-    const links = crowd ? mesh.links.known.filter((link) => link.includes(mesh.selected)) : mesh.links.known;
-    drawn.linksDrawn = drawLines(context, camera, radius, ends(links), colours["known-link"], 1, []);
+    const links = crowd
+      ? mesh.links.known.filter((link) => link.includes(mesh.selected))
+      : mesh.links.known;
+    drawn.linksDrawn = drawLines(
+      context,
+      camera,
+      radius,
+      ends(links),
+      colours["known-link"],
+      1,
+      [],
+    );
   }
-  drawn.lostLinks = drawLines(context, camera, radius, ends(mesh.links.lost), colours["lost-link"], 1.5, [5, 5]);
+  drawn.lostLinks = drawLines(
+    context,
+    camera,
+    radius,
+    ends(mesh.links.lost),
+    colours["lost-link"],
+    1.5,
+    [5, 5],
+  );
   const width = Math.min(3, Math.max(1, radius * 0.25));
-  drawn.routeLinks = drawLines(context, camera, radius, ends(mesh.links.route), colours["route-link"], width, []);
+  drawn.routeLinks = drawLines(
+    context,
+    camera,
+    radius,
+    ends(mesh.links.route),
+    colours["route-link"],
+    width,
+    [],
+  );
   drawn.linksDrawn += drawn.routeLinks;
   if (selected?.route.length > 1) {
     const stops = selected.route.map((id) => mesh.nodes.get(id));
-    drawLines(context, camera, radius, stops.slice(1).map((stop, i) => [stops[i], stop]), colours.accent, 4, []);
+    drawLines(
+      context,
+      camera,
+      radius,
+      stops.slice(1).map((stop, i) => [stops[i], stop]),
+      colours.accent,
+      4,
+      [],
+    );
   }
   for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours, radius);
-  for (const node of drawingOrder(mesh)) drawn.drones += drawDrone(context, camera, node, mesh.selected, colours, radius);
+  for (const node of drawingOrder(mesh))
+    drawn.drones += drawDrone(context, camera, node, mesh.selected, colours, radius);
   if (drag) drawDrag(context, camera, mesh.nodes.get(drag.id), drag, colours, radius);
   return drawn;
 }
@@ -84,14 +147,16 @@ function drawGrid(context, camera, colours) {
     const px = Math.round(camera.toScreen(x, 0)[0]) + 0.5;
     context.moveTo(px, 0);
     context.lineTo(px, camera.height);
-    if (px > 60 && px < camera.width - 20) context.fillText(metres(x, step), px, camera.height - 42);
+    if (px > 60 && px < camera.width - 20)
+      context.fillText(metres(x, step), px, camera.height - 42);
   }
   context.textAlign = "right";
   for (let y = Math.ceil(low / step) * step; y <= top; y += step) {
     const py = Math.round(camera.toScreen(0, y)[1]) + 0.5;
     context.moveTo(0, py);
     context.lineTo(camera.width, py);
-    if (py > 60 && py < camera.height - 50) context.fillText(metres(y, step), camera.width - 8, py - 4);
+    if (py > 60 && py < camera.height - 50)
+      context.fillText(metres(y, step), camera.width - 8, py - 4);
   }
   context.stroke();
 }
@@ -145,7 +210,8 @@ function drawPath(context, camera, node, colours, radius) {
   context.setLineDash([2, 5]);
   context.beginPath();
   context.moveTo(...onScreen(camera, node, radius));
-  for (let i = 0; i < node.path.length; i += 3) context.lineTo(...camera.toScreen(node.path[i], node.path[i + 1]));
+  for (let i = 0; i < node.path.length; i += 3)
+    context.lineTo(...camera.toScreen(node.path[i], node.path[i + 1]));
   context.stroke();
   context.setLineDash([]);
   const [px, py] = camera.toScreen(...node.path.slice(-3, -1));

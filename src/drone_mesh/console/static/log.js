@@ -5,8 +5,15 @@ import { idLink } from "./panel.js";
 const ROWS_SHOWN = 300;
 const NEIGHBOUR_KINDS = new Set(["neighbour found", "neighbour lost", "node missing"]);
 const TONE = {
-  connected: "good", "power on": "good", disconnected: "bad", "power off": "bad", emergency: "bad", "no route": "bad",
-  "flight decided": "flight", "flight ordered": "flight", landed: "flight",
+  connected: "good",
+  "power on": "good",
+  disconnected: "bad",
+  "power off": "bad",
+  emergency: "bad",
+  "no route": "bad",
+  "flight decided": "flight",
+  "flight ordered": "flight",
+  landed: "flight",
 };
 const PEERS_SHOWN = 12;
 
@@ -21,13 +28,19 @@ export class EventLog {
       else this.#add(event.detail.events);
     });
     mesh.addEventListener("select", () => this.onlySelected.checked && this.#rebuild());
-    for (const box of [showNeighbours, onlySelected]) box.addEventListener("change", () => this.#rebuild());
+    for (const box of [showNeighbours, onlySelected])
+      box.addEventListener("change", () => this.#rebuild());
   }
 
   #wanted(event) {
     if (!this.showNeighbours.checked && NEIGHBOUR_KINDS.has(event.kind)) return false;
     const selected = this.mesh.selected;
-    return !this.onlySelected.checked || selected === null || event.node === selected || event.peers.includes(selected);
+    return (
+      !this.onlySelected.checked ||
+      selected === null ||
+      event.node === selected ||
+      event.peers.includes(selected)
+    );
   }
 
   #rebuild() {
@@ -36,7 +49,10 @@ export class EventLog {
   }
 
   #add(events) {
-    const rows = events.filter((event) => this.#wanted(event)).slice(-ROWS_SHOWN).reverse();
+    const rows = events
+      .filter((event) => this.#wanted(event))
+      .slice(-ROWS_SHOWN)
+      .reverse();
     if (!rows.length) return;
     this.list.prepend(...rows.map((event) => this.#row(event)));
     while (this.list.children.length > ROWS_SHOWN) this.list.lastElementChild.remove();
@@ -49,8 +65,11 @@ export class EventLog {
     const text = document.createElement("span");
     text.className = TONE[event.kind] ?? "";
     text.append(idLink(this.mesh, event.node), ` ${event.kind}`);
-    event.peers.slice(0, PEERS_SHOWN).forEach((peer, index) => text.append(index ? ", " : " ", idLink(this.mesh, peer)));
-    if (event.peers.length > PEERS_SHOWN) text.append(` and ${event.peers.length - PEERS_SHOWN} more`);
+    event.peers
+      .slice(0, PEERS_SHOWN)
+      .forEach((peer, index) => text.append(index ? ", " : " ", idLink(this.mesh, peer)));
+    if (event.peers.length > PEERS_SHOWN)
+      text.append(` and ${event.peers.length - PEERS_SHOWN} more`);
     if (event.detail) text.append(` (${event.detail})`);
     row.append(time, text);
     return row;

@@ -86,7 +86,10 @@ export class MapView {
   }
 
   #describe(drawn) {
-    const left = this.options.known && drawn.linksDrawn < drawn.links ? " (those of the selected node are shown)" : "";
+    const left =
+      this.options.known && drawn.linksDrawn < drawn.links
+        ? " (those of the selected node are shown)"
+        : "";
     const text = `${drawn.drones} drones, ${drawn.links} links${left}, ${drawn.routeLinks} on routes to a gateway`;
     if (this.note.textContent !== text) this.note.textContent = text;
     const { x, y, scale } = this.camera;
@@ -125,8 +128,13 @@ export class MapView {
     // A finger that moves the map must not send away a drone that happens to be under it.
     const mayDrag = node && (event.pointerType === "mouse" || node.id === this.mesh.selected);
     this.pointers.set(event.pointerId, {
-      x: event.offsetX, y: event.offsetY, startX: event.offsetX, startY: event.offsetY,
-      node: node?.id ?? null, mayDrag, moved: false,
+      x: event.offsetX,
+      y: event.offsetY,
+      startX: event.offsetX,
+      startY: event.offsetY,
+      node: node?.id ?? null,
+      mayDrag,
+      moved: false,
     });
     if (this.pointers.size > 1) this.drag = null;
   }
@@ -138,7 +146,8 @@ export class MapView {
       return;
     }
     const [dx, dy] = [event.offsetX - pointer.x, event.offsetY - pointer.y];
-    if (Math.hypot(event.offsetX - pointer.startX, event.offsetY - pointer.startY) > DRAG_AFTER_PX) pointer.moved = true;
+    if (Math.hypot(event.offsetX - pointer.startX, event.offsetY - pointer.startY) > DRAG_AFTER_PX)
+      pointer.moved = true;
     if (this.pointers.size > 1) this.#pinch(pointer, event);
     else if (pointer.moved && pointer.mayDrag) {
       const [x, y] = this.camera.toWorld(event.offsetX, event.offsetY);
@@ -182,7 +191,9 @@ export class MapView {
   }
 
   #key(event) {
-    const step = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    const step = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[
+      event.key
+    ];
     if (step) this.camera.pan(step[0] * KEY_STEP_PX, step[1] * KEY_STEP_PX);
     else if (event.key === "+" || event.key === "=") this.camera.zoom(ZOOM_STEP);
     else if (event.key === "-") this.camera.zoom(1 / ZOOM_STEP);

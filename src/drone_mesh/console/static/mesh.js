@@ -57,7 +57,13 @@ export class Mesh extends EventTarget {
     if (frame.events) this.events = this.events.concat(frame.events).slice(-EVENTS_KEPT);
     if (frame.samples) this.samples = this.samples.concat(frame.samples).slice(-SAMPLES_KEPT);
     if (this.selected !== null && !this.nodes.has(this.selected)) this.select(null);
-    this.#notify("frame", { changed, full: frame.full, gone: frame.gone ?? [], events: frame.events ?? [], samples: frame.samples ?? [] });
+    this.#notify("frame", {
+      changed,
+      full: frame.full,
+      gone: frame.gone ?? [],
+      events: frame.events ?? [],
+      samples: frame.samples ?? [],
+    });
   }
 
   applyDetail(detail) {
@@ -83,7 +89,9 @@ export class Mesh extends EventTarget {
     const ids = [...this.nodes.keys()].sort((a, b) => a - b);
     if (!ids.length) return;
     const at = ids.indexOf(this.selected);
-    this.select(ids[at < 0 ? (step > 0 ? 0 : ids.length - 1) : (at + step + ids.length) % ids.length]);
+    this.select(
+      ids[at < 0 ? (step > 0 ? 0 : ids.length - 1) : (at + step + ids.length) % ids.length],
+    );
   }
 
   #relink() {

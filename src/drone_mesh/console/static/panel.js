@@ -8,7 +8,8 @@ export class NodePanel {
     this.mesh = mesh;
     this.power = power;
     this.fly = fly;
-    for (const what of ["frame", "select", "detail"]) mesh.addEventListener(what, () => this.#show());
+    for (const what of ["frame", "select", "detail"])
+      mesh.addEventListener(what, () => this.#show());
     mesh.addEventListener("select", () => this.#fillGoal());
     byId("power").addEventListener("click", () => this.switchPower());
     byId("node-close").addEventListener("click", () => mesh.select(null));
@@ -40,7 +41,11 @@ export class NodePanel {
     const facts = [
       [node.condition === "connected" ? "Gateway" : "Last gateway", orDash(node.gateway)],
       ["Hops", orDash(node.hops)],
-      ["Fallback position", node.fallback === 255 ? "–" : [node.fallback], { before: "node ", after: "’s" }],
+      [
+        "Fallback position",
+        node.fallback === 255 ? "–" : [node.fallback],
+        { before: "node ", after: "’s" },
+      ],
       ["Known nodes", String(node.known_nodes)],
       ["Messages sent", String(node.total_messages)],
       ["Position", node.position ? node.position.map((m) => m.toFixed(2)).join(", ") : "–"],
@@ -51,7 +56,9 @@ export class NodePanel {
     const shown = JSON.stringify(facts);
     if (list.dataset.shown === shown) return;
     list.dataset.shown = shown;
-    list.replaceChildren(...facts.map(([name, value, options]) => this.#fact(name, value, options)));
+    list.replaceChildren(
+      ...facts.map(([name, value, options]) => this.#fact(name, value, options)),
+    );
   }
 
   #neighbours(node) {
@@ -87,7 +94,9 @@ export class NodePanel {
     setText(byId("fly-error"), "");
     ["x", "y", "z"].forEach((axis, index) => {
       byId(`fly-${axis}`).removeAttribute("aria-invalid");
-      byId(`fly-${axis}`).value = goal ? String(index < 2 ? Number(goal[index].toFixed(1)) : Math.round(goal[index])) : "";
+      byId(`fly-${axis}`).value = goal
+        ? String(index < 2 ? Number(goal[index].toFixed(1)) : Math.round(goal[index]))
+        : "";
     });
   }
 
@@ -110,7 +119,11 @@ export class NodePanel {
     const input = byId(`fly-${axis}`);
     const text = input.value.trim().replace(",", ".");
     const value = text === "" ? NaN : Number(text);
-    const good = Number.isFinite(value) && value >= low && value <= high && (!whole || Number.isInteger(value));
+    const good =
+      Number.isFinite(value) &&
+      value >= low &&
+      value <= high &&
+      (!whole || Number.isInteger(value));
     if (good) input.removeAttribute("aria-invalid");
     else input.setAttribute("aria-invalid", "true");
     const kind = whole ? "a whole number" : "a number";

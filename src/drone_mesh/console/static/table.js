@@ -4,14 +4,45 @@ import { orDash } from "./mesh.js";
 
 const COLUMNS = [
   { name: "Node", title: "Id", sort: (n) => n.id, text: (n) => String(n.id) },
-  { name: "Condition", title: "", sort: (n) => n.condition, text: (n) => n.condition, condition: true },
-  { name: "GW", title: "The gateway that it uses, or used last", sort: (n) => n.gateway, text: (n) => orDash(n.gateway) },
+  {
+    name: "Condition",
+    title: "",
+    sort: (n) => n.condition,
+    text: (n) => n.condition,
+    condition: true,
+  },
+  {
+    name: "GW",
+    title: "The gateway that it uses, or used last",
+    sort: (n) => n.gateway,
+    text: (n) => orDash(n.gateway),
+  },
   { name: "Hops", title: "Hops to that gateway", sort: (n) => n.hops, text: (n) => orDash(n.hops) },
-  { name: "Next hop", title: "The neighbour on its route to that gateway", sort: (n) => n.next_hop, text: (n) => orDash(n.next_hop) },
+  {
+    name: "Next hop",
+    title: "The neighbour on its route to that gateway",
+    sort: (n) => n.next_hop,
+    text: (n) => orDash(n.next_hop),
+  },
   { name: "Nb", title: "Neighbours", sort: (n) => n.neighbours, text: (n) => String(n.neighbours) },
-  { name: "Known", title: "Known nodes; one known through two neighbours counts twice", sort: (n) => n.known_nodes, text: (n) => String(n.known_nodes) },
-  { name: "Sent", title: "Messages sent successfully", sort: (n) => n.total_messages, text: (n) => String(n.total_messages) },
-  { name: "Fallback", title: "The node whose position it would fly to", sort: (n) => n.fallback, text: (n) => orDash(n.fallback) },
+  {
+    name: "Known",
+    title: "Known nodes; one known through two neighbours counts twice",
+    sort: (n) => n.known_nodes,
+    text: (n) => String(n.known_nodes),
+  },
+  {
+    name: "Sent",
+    title: "Messages sent successfully",
+    sort: (n) => n.total_messages,
+    text: (n) => String(n.total_messages),
+  },
+  {
+    name: "Fallback",
+    title: "The node whose position it would fly to",
+    sort: (n) => n.fallback,
+    text: (n) => orDash(n.fallback),
+  },
   { name: "x", title: "m", sort: (n) => n.position?.[0] ?? 0, text: (n) => metres(n, 0) },
   { name: "y", title: "m", sort: (n) => n.position?.[1] ?? 0, text: (n) => metres(n, 1) },
   { name: "z", title: "m", sort: (n) => n.position?.[2] ?? 0, text: (n) => metres(n, 2) },
@@ -57,7 +88,8 @@ export class NodeTable {
 
   #showSort() {
     [...this.head.cells].forEach((th, index) => {
-      if (index === this.sortBy) th.setAttribute("aria-sort", this.ascending ? "ascending" : "descending");
+      if (index === this.sortBy)
+        th.setAttribute("aria-sort", this.ascending ? "ascending" : "descending");
       else th.removeAttribute("aria-sort");
     });
   }
@@ -81,7 +113,8 @@ export class NodeTable {
       row.tabIndex = -1;
       for (const column of COLUMNS) {
         const cell = row.insertCell();
-        if (column.condition) cell.append(Object.assign(document.createElement("span"), { className: "condition" }));
+        if (column.condition)
+          cell.append(Object.assign(document.createElement("span"), { className: "condition" }));
       }
       this.rows.set(node.id, row);
     }
@@ -129,7 +162,9 @@ export class NodeTable {
 
   #key(event) {
     const row = event.target.closest("tr");
-    const to = { ArrowDown: row.nextElementSibling, ArrowUp: row.previousElementSibling }[event.key];
+    const to = { ArrowDown: row.nextElementSibling, ArrowUp: row.previousElementSibling }[
+      event.key
+    ];
     if (event.key === "Enter") this.#choose(event);
     else if (to) {
       event.preventDefault();
