@@ -1,4 +1,4 @@
-"""MeshExecutor: the one thread that works in all mesh components of a process.
+"""MeshExecutor: one thread that drives all mesh components of a process.
 
 The core has no threads (docs/protocol.md, "Driven from outside"). Packets, orders and time meet
 here: work from other threads waits in one first-in-first-out queue, timers wait in a heap of
@@ -17,8 +17,8 @@ from collections import Counter
 from typing import Callable, Protocol
 
 FAILURE_PERIOD_S = 30.0  # our choice: one traceback per kind of failure in this time
-RETRY_AFTER_S = 1.0  # our choice: what failed and is still due waits so long, instead of spinning
-_WAKE = None  # in the queue: nothing to run, look at the deadlines again
+RETRY_AFTER_S = 1.0  # our choice: pause before failed work that is still due runs again
+_WAKE = None  # in the queue: no function, only check the deadlines again
 
 _log = logging.getLogger(__name__)
 
@@ -31,14 +31,14 @@ class Driven(Protocol):
 
     @property
     def next_tick_s(self) -> float:
-        """When `tick` wants to be called next; math.inf: not at all. May change with every call."""
+        """When `tick` must be called next; math.inf: never. May change with every call."""
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
 
 
 class _Periodic:
-    """A function that is called again and again; each call is due one period after the last."""
+    """A function that is called once per period."""
 
     def __init__(self, period_s: float, function: Work, first_s: float) -> None:
         self._period_s = period_s
@@ -46,7 +46,7 @@ class _Periodic:
         self.next_tick_s = first_s
 
     def tick(self, now_s: float) -> None:
-        """Call it; periods that went by meanwhile are skipped, not made up for."""
+        """Call it; periods that have passed meanwhile are skipped."""
         missed = max(0.0, (now_s - self.next_tick_s) // self._period_s)
         self.next_tick_s += self._period_s * (missed + 1.0)
         self._function(now_s)
@@ -67,7 +67,7 @@ class Seat:
         self.scheduled_s = math.inf
 
     def submit(self, function: Work) -> None:
-        """Run this, with the time, on the worker's thread, after what was submitted before."""
+        """Run `function(now_s)` on the worker's thread, after all earlier submissions."""
         self._executor.submit(function, self)
 
     def take(self, driven: Driven) -> None:
@@ -75,7 +75,7 @@ class Seat:
         self._driven = driven
 
     def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
-        """Have the executor call `function` once per period; returns what stops that."""
+        """Have the executor call `function` once per period; returns a function that stops it."""
         return self._executor.call_every(period_s, function)
 
     @property
@@ -91,7 +91,7 @@ class MeshExecutor:
     """Owns components and calls into them from one thread.
 
     Any thread may use `submit`, `call_every`, `time_advanced`, `lag_s`, `start` and `stop`. An
-    exception that comes out of one component is logged and counted, and stops nothing else.
+    exception from one component is logged and counted, and does not affect the others.
     """
 
     def __init__(
@@ -99,8 +99,8 @@ class MeshExecutor:
     ) -> None:
         """`clock` gives the time in seconds.
 
-        `clock_is_poked`: whoever moves the time calls `time_advanced` (simulated time). Otherwise
-        the clock runs by itself, at one second per second.
+        `clock_is_poked`: the code that advances the clock calls `time_advanced` (simulated time).
+        Otherwise the clock runs by itself, at one second per second.
         """
         self._clock = clock
         self._clock_is_poked = clock_is_poked
@@ -108,23 +108,23 @@ class MeshExecutor:
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._stopping = False
         # Written by the worker, read by others; single floats need no lock.
-        self._working_since_s = math.inf  # when that was due what is being worked on
+        self._working_since_s = math.inf  # when the current work was due
         self._next_due_s = math.inf
         self._worst_lag_s = 0.0
-        # The worker's alone.
+        # Only for the worker.
         self._deadlines: list[tuple[float, int, Seat | _Periodic]] = []
         self._order = itertools.count()
         self._said_s: dict[str, float] = {}
-        self.failures: Counter[str] = Counter()  # by name of the exception; others may read
+        self.failures: Counter[str] = Counter()  # by name of the exception
 
     # Any thread ------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start to work. Whatever was submitted before comes first."""
+        """Start the worker. Earlier submissions come first."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Work off what has been submitted, then stop; returns when the thread has ended."""
+        """Finish the submitted work, then stop; returns when the thread has ended."""
         self.submit(self._stop)
         if self._thread.is_alive():
             self._thread.join()
@@ -134,26 +134,26 @@ class MeshExecutor:
         return Seat(self)
 
     def submit(self, function: Work, seat: Seat | None = None) -> None:
-        """Run this, with the time, on the worker's thread, after what was submitted before."""
+        """Run `function(now_s)` on the worker's thread, after all earlier submissions."""
         self._queue.put((self._clock(), function, seat))
 
     def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
-        """Call `function` once per period, the first time after one; returns what stops that."""
+        """Call `function` once per period, first after one; returns a function to stop it."""
         periodic = _Periodic(period_s, function, self._clock() + period_s)
         self.submit(lambda _now_s: self._schedule(periodic, periodic.next_tick_s))
         return periodic.cancel
 
     def time_advanced(self) -> None:
-        """The clock was moved: see whether something has become due."""
+        """The clock has advanced: check whether work has become due."""
         if self._clock() >= self._next_due_s:
             self._queue.put(_WAKE)
 
     def lag_s(self, now_s: float) -> float:
-        """For how many seconds the oldest undone work has waited at `now_s`; 0: there is none."""
+        """How long the oldest unfinished work has waited at `now_s`, in seconds; 0: none."""
         return max(0.0, now_s - min(self._working_since_s, self._next_due_s))
 
     def take_worst_lag_s(self) -> float:
-        """How late the latest timer since the last call of this was, in seconds."""
+        """The longest delay of a timer since the last call of this function, in seconds."""
         worst_s, self._worst_lag_s = self._worst_lag_s, 0.0
         return worst_s
 
@@ -178,7 +178,7 @@ class MeshExecutor:
             self._working_since_s = math.inf
 
     def _take(self, block: bool) -> tuple[float, Work, Seat | None] | None:
-        """The next function that was submitted; None: look at the deadlines again."""
+        """The next submitted function; None: check the deadlines again."""
         timeout_s = None
         if block and not self._clock_is_poked and self._deadlines:
             timeout_s = max(0.0, self._deadlines[0][0] - self._clock())
@@ -191,7 +191,7 @@ class MeshExecutor:
         due_s, _, driven = heapq.heappop(self._deadlines)
         if isinstance(driven, Seat):
             if due_s != driven.scheduled_s:
-                return  # it was put elsewhere in the heap meanwhile
+                return  # it was rescheduled meanwhile
             driven.scheduled_s = math.inf
         elif due_s != driven.next_tick_s:
             return  # cancelled
@@ -205,7 +205,7 @@ class MeshExecutor:
         not_before_s = -math.inf
         try:
             function(now_s)
-        except Exception as error:  # one node's fault must not stop the others
+        except Exception as error:  # a failure of one node must not stop the others
             self._report(error, now_s)
             not_before_s = now_s + RETRY_AFTER_S
         if seat is not None and seat.next_tick_s != seat.scheduled_s:

@@ -19,11 +19,11 @@ from drone_mesh.inprocess.clock import VirtualClock
 HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)
 
 Deliver = Callable[[bytes], None]
-"""Hands a packet to the mesh component of one node, and looks after what it wants next."""
+"""Passes a packet to the mesh component of one node and schedules its next tick."""
 
 
 class InProcessAir:
-    """Who hears whom, and what becomes of packets on their way."""
+    """Which nodes hear each other, and how packets are lost, delayed or cut off."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class InProcessAir:
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,
     ) -> None:
-        """`loss`: share of packets that do not arrive, and whose sender knows it.
+        """`loss`: share of packets that do not arrive; the sender knows of the loss.
 
         A packet arrives after `delay_s` and a random part of `jitter_s`.
         """
@@ -46,20 +46,20 @@ class InProcessAir:
         self._jitter_s = jitter_s
         self._antennas: dict[int, InProcessAntenna] = {}
         self._cut: set[frozenset[int]] = set()
-        # Who hears whom among those that stand still: it changes with who comes, goes and flies,
-        # and is looked up for each packet.
+        # The links between nodes that stand still: looked up for each packet, and changed only when
+        # a node appears, disappears or flies.
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
-        self._standing: dict[int, Location] = {}  # where those are
+        self._standing: dict[int, Location] = {}  # their places
         self._flying: set[int] = set()
         self.delivered = 0
 
     def add(self, antenna: InProcessAntenna) -> None:
-        """An antenna comes into reach of the others."""
+        """Add an antenna."""
         self._antennas[antenna.node_id] = antenna
         self._link(antenna.node_id)
 
     def remove(self, antenna: InProcessAntenna) -> None:
-        """An antenna is gone."""
+        """Remove an antenna."""
         self._unlink(antenna.node_id)
         self._antennas.pop(antenna.node_id, None)
 
@@ -88,7 +88,7 @@ class InProcessAir:
         return links
 
     def _places(self, nodes: Iterable[int]) -> dict[int, Location]:
-        """Where those of these nodes are that are in the air at all."""
+        """The places of those of these nodes that have an antenna."""
         antennas = self._antennas
         return {node: antennas[node].drone.get_location() for node in nodes if node in antennas}
 
@@ -158,12 +158,12 @@ class InProcessAntenna(IWirelessCommunication):
         self._started = False
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Be reachable."""
+        """Become reachable."""
         self._started = True
         self._air.add(self)
 
     def stop_antenna(self) -> None:
-        """Be gone."""
+        """Become unreachable."""
         self._started = False
         self._air.remove(self)
 
@@ -178,7 +178,7 @@ class InProcessAntenna(IWirelessCommunication):
                 self._air.send(readdressed(payload, other))
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Nothing: whoever has the network has its nodes."""
+        """Does nothing: the owner of the network can read its nodes."""
 
     def on(self) -> bool:
         """Whether it has power."""

@@ -17,7 +17,7 @@ class Task(abc.ABC):
 
 
 class Signal(abc.ABC):
-    """Has those who wait for a condition look at it again."""
+    """Makes waiting tasks evaluate their condition again."""
 
     @abc.abstractmethod
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:

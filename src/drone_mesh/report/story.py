@@ -27,7 +27,7 @@ class RunStory:
     blips: int  # how many outages were shorter than BLIP_S
     before: MeshStatus  # the last one before the first power-off or loss, or else the first one
     after: MeshStatus  # the last state
-    tracks: Mapping[int, Sequence[tuple[float, float]]]  # x, y in metres of who moved since then
+    tracks: Mapping[int, Sequence[tuple[float, float]]]  # x, y in metres, of nodes that moved
     messages_of: Mapping[int, int]  # sent per node during the recording
 
 
@@ -42,7 +42,7 @@ def tell_story(states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> R
     first = before = after = None
     for mesh in states:
         if after is not None and mesh.stamp_s < after.stamp_s:
-            # Simulated time began anew: only the last run is told.
+            # Simulated time restarted: only the last run counts.
             samples, tracks, first, before = [], {}, None, None
         after = mesh
         if first is None:

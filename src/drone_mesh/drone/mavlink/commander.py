@@ -77,7 +77,7 @@ class Commander:
         """Give this command, again and again until its effect ends the calls.
 
         Returns why it will not be done, once that is known, else nothing. Changing the command
-        starts anew.
+        starts again.
         """
         if self._command != (command, parameters):
             self._command = (command, parameters)

@@ -1,7 +1,7 @@
 """MavlinkPilot: flies one drone by talking to its autopilot, as far as the human pilot allows.
 
 The human pilot is the master. This program follows only while the autopilot is in the mode that is
-meant for it, and lets go as soon as anybody or anything takes that away. It never resumes a flight
+meant for it, and lets go as soon as that mode ends for any reason. It never resumes a flight
 that it let go of.
 """
 
@@ -168,7 +168,7 @@ class MavlinkPilot:
     # Who is master ---------------------------------------------------------------------------
 
     def _trouble(self, now_s: float) -> str:
-        """Why nothing may fly now, whoever is in control; empty: nothing is wrong."""
+        """Why no flight is possible now, under any control; empty: it is possible."""
         telemetry, limits = self._telemetry, self._limits
         link = telemetry.link_trouble(now_s)
         if link:

@@ -156,7 +156,7 @@ class Telemetry:
         return self._fence_breached
 
     def sticks_moved(self, now_s: float) -> bool:
-        """Whether somebody has moved a stick of the pilot's transmitter just now."""
+        """Whether a stick of the pilot's transmitter has just moved."""
         return now_s - self._sticks_moved_s <= STICKS_REST_S
 
     def streams_missing(self, now_s: float) -> bool:

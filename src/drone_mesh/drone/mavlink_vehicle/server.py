@@ -20,7 +20,7 @@ from drone_mesh.errors import ConfigurationError
 Address = Tuple[str, int]
 
 TICK_S = 0.05  # our choice: ten centimetres of flight at 2 m/s
-FORGET_PEER_S = 10.0  # our choice: who is silent for so long is sent nothing more
+FORGET_PEER_S = 10.0  # our choice: a peer silent for this long gets no more messages
 MOST_BYTES = 4096
 LOOPBACK = "127.0.0.1"
 
@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Port:
-    """One vehicle on a UDP port of its own; it answers whoever speaks to it."""
+    """One vehicle on a UDP port of its own; it answers every peer."""
 
     def __init__(
         self, system_id: int, autopilot: Autopilot, home: Origin, ground_stations: Sequence[Address]
@@ -59,7 +59,7 @@ class _Port:
                 self.vehicle.on_message(message, now_s)
 
     def tick(self, now_s: float) -> None:
-        """Fly on, and forget who is silent."""
+        """Fly on, and forget silent peers."""
         for peer, heard_s in list(self._heard_s.items()):
             if now_s - heard_s > FORGET_PEER_S:
                 del self._heard_s[peer]
@@ -72,7 +72,7 @@ class _Port:
             try:
                 self.socket.sendto(data, peer)
             except OSError:
-                continue  # nobody listens there now; a datagram may be lost
+                continue  # no listener there now; a datagram may be lost
 
 
 class VehicleServer:

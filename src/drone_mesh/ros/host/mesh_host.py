@@ -42,7 +42,7 @@ class MeshHost:
         on_failure: Callable[[str], None],
         radios: Radios | None = None,
     ) -> None:
-        """`clock` gives simulated seconds; whoever moves it calls `time_advanced`.
+        """`clock` gives simulated seconds; the code that advances it calls `time_advanced`.
 
         `on_failure` is called with the reason when a node cannot start. `radios`: virtual ones by
         default.
