@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from drone_mesh.communication.interfaces import NO_ROUTE, IRoutingEssentials, IRoutingTechnique
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
 
 
 class ChildTableTree(IRoutingTechnique):

@@ -25,8 +25,6 @@ from drone_mesh.communication.interfaces import (
     PAYLOAD_BYTES,
     IMeshDebugInfo,
     IMeshNetwork,
-    IRoutingEssentials,
-    IRoutingTechnique,
     IWirelessCommunication,
 )
 from drone_mesh.communication.messages import HeartbeatMessage, IntroduceMessage, MessageType
@@ -39,6 +37,7 @@ from drone_mesh.communication.observer import (
 )
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.places import KnownPlaces
+from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
@@ -146,6 +145,9 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             deadlines.set(Due.INTRODUCE, math.inf)
             self._introduces_for_others = False
             self.search_other_nodes_in_range()
+        if now_s >= deadlines.get(Due.ROUTING):
+            deadlines.set(Due.ROUTING, math.inf)
+            self._routing.on_time(now_s)
         if now_s >= deadlines.get(Due.ASK_POSITION) and self._pilot.watch():
             self._landed()
         due_s = deadlines.get(Due.CHECK)
@@ -176,9 +178,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             return
         if self._neighbours.heard(from_, now_s):
             self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
-        self._routing.can_communicate_with_node(from_)
-        if creator not in (from_, me):
-            self._learn_path(creator, from_, kind)
+        if creator == me:  # it came back and teaches no route
+            self._routing.can_communicate_with_node(from_)
+        elif not self._routing.learn(creator, from_, kind, payload):
+            return
         if forward not in (me, BROADCAST):
             if kind == _HEARTBEAT:
                 self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
@@ -254,8 +257,11 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """PRESENT, to each node in range."""
         me = self._node_id
         hops, connected = self.get_hops_from_gateway_away(), self.get_connected_to_gateway()
+        payload = IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
+        room = messages.extension_room(MessageType.PRESENT)
+        extension = self._routing.extension(MessageType.PRESENT, room)
         self._antenna.broadcast_message(
-            IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
+            messages.extended(payload, extension) if extension else payload
         )
         if connected:
             self._search_again_s = self._antenna.medium.search_s
@@ -296,6 +302,36 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if self._introduces_for_others:
             self._introduces_for_others = False
             self._deadlines.set(Due.INTRODUCE, math.inf)
+
+    def now_s(self) -> float:
+        """The time that the component was last told."""
+        return self._deadlines.now_s
+
+    def wake_at(self, at_s: float) -> None:
+        """Have the technique's `on_time` called then."""
+        self._deadlines.set(Due.ROUTING, at_s)
+
+    def send_packet(self, kind: int, neighbour: int, body: bytes) -> bool:
+        """A packet of the technique's own type to a neighbour."""
+        me = self._node_id
+        return self._delivery.send(
+            messages.packet(kind, me, me, neighbour, neighbour, body), neighbour
+        )
+
+    def broadcast_packet(self, kind: int, body: bytes) -> None:
+        """A packet of the technique's own type to each node in range."""
+        me = self._node_id
+        self._antenna.broadcast_message(messages.packet(kind, me, me, BROADCAST, BROADCAST, body))
+
+    def own_place(self) -> Location | None:
+        """Where the drone is, if it can report that."""
+        return self._pilot.location()
+
+    def place_of(self, node: int) -> Location | None:
+        """The last place reported by `node`, or None."""
+        if node == self.get_preferred_gateway():
+            return self.places.gateway
+        return self.places.good if node == self.places.good_id else None
 
     # For the router and the gateway to fill in -----------------------------------------------
 
@@ -338,13 +374,6 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     # Receiving -------------------------------------------------------------------------------
 
-    def _learn_path(self, creator: int, from_: int, kind: int) -> None:
-        routing = self._routing
-        if kind == _HEARTBEAT:
-            routing.proven_path_to_node(from_, creator)
-        elif routing.get_direction_to_node(creator) == NO_ROUTE:
-            routing.other_can_communicate_with_node(from_, creator)
-
     def _process(self, payload: bytes, creator: int, from_: int, kind: int) -> None:
         if kind == MessageType.LOCATION:
             message = messages.LocationMessage.from_payload(payload)
@@ -360,6 +389,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._on_order(messages.GoToLocationMessage.from_payload(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
             self._on_negotiation(messages.MovementNegotiationMessage.from_payload(payload))
+        elif kind in messages.TECHNIQUE_TYPES:
+            self._routing.on_packet(creator, from_, kind, messages.body(payload))
         else:
             self._drop("a type that is not processed", payload)
 
@@ -368,9 +399,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     def _heartbeat(self) -> bytes:
         me = self._node_id
-        return HeartbeatMessage(
-            me, me, me, me, self.get_connected_to_gateway(), self.get_preferred_gateway(), 0
-        ).to_payload()
+        connected, gateway = self.get_connected_to_gateway(), self.get_preferred_gateway()
+        return self._parts.heartbeat(me, me, connected, gateway)
 
     def _send_location(self, asker: int) -> None:
         location = self._pilot.location()

@@ -10,7 +10,7 @@ from typing import Callable, NamedTuple
 
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.messages import HeartbeatMessage, Message, MessageType
+from drone_mesh.communication.messages import Message, MessageType
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.router_states import Link, RouterEvent, RouterStates
@@ -57,23 +57,24 @@ class GatewayConnection:
 
     def send_heartbeat(self) -> bool:
         """A heartbeat to the preferred gateway, unless one is under way. False: not sent."""
-        now_s, me, gateway = self._parts.now_s, self._parts.node_id, self.gateway
+        now_s, gateway = self._parts.now_s, self.gateway
         window_s = self._answer_window_s()
         if now_s - self._heartbeat_sent_s < window_s:
             return True
-        heartbeat = HeartbeatMessage(me, me, gateway, gateway, self._states.connected, gateway, 0)
+        was_connected = self._states.connected
         self._states.happened(RouterEvent.HEARTBEAT_SENT)
         self._parts.deadlines.set(Due.ANSWER, now_s + window_s)
         self._heartbeat_sent_s = now_s
-        if self._sent_over_shortcut(heartbeat) or self._parts.delivery.send_own(
-            heartbeat.to_payload()
-        ):
+        if self._sent_over_shortcut(was_connected):
+            return True
+        heartbeat = self._parts.heartbeat(gateway, gateway, was_connected, gateway)
+        if self._parts.delivery.send_own(heartbeat):
             return True
         self._heartbeat_sent_s = -math.inf
         self.answer_missed()
         return False
 
-    def _sent_over_shortcut(self, heartbeat: HeartbeatMessage) -> bool:
+    def _sent_over_shortcut(self, connected: bool) -> bool:
         """Send the heartbeat through a neighbour with fewer hops; True if it suffices.
 
         Fewer hops may be those to another gateway: then the neighbour's gateway is asked as well,
@@ -87,10 +88,7 @@ class GatewayConnection:
         its_gateway = self._parts.neighbours.gateway_of(to)
         if its_gateway == NO_ROUTE:
             its_gateway = self.gateway
-        me = self._parts.node_id
-        packet = HeartbeatMessage(
-            me, me, to, its_gateway, heartbeat.know_gateway, heartbeat.preferred_gateway, 0
-        ).to_payload()
+        packet = self._parts.heartbeat(to, its_gateway, connected, self.gateway)
         return self._parts.delivery.send(packet, to) and its_gateway == self.gateway
 
     def answer_missed(self) -> None:
@@ -123,6 +121,7 @@ class GatewayConnection:
             return connected or not (self._states.awaiting or self._asks_a_neighbour())
         if (
             connected
+            and self._parts.routing.TAKES_SHORTCUTS
             and hops + 1 < self.hops
             and (self._shortcut is None or hops < self._shortcut.hops)
             and self._parts.routing.get_direction_to_node(neighbour) == neighbour
@@ -154,8 +153,7 @@ class GatewayConnection:
         if gateway > MAX_NODE_ID or gateway == self._parts.node_id:
             return
         self._prefer(gateway)
-        self._parts.delivery.drop_routes_to(gateway)
-        self._parts.routing.other_can_communicate_with_node(neighbour, gateway)
+        self._parts.delivery.gateway_taken(neighbour, gateway)
         self.send_heartbeat()
 
     def proven(self, patience: float) -> bool:
@@ -191,8 +189,7 @@ class GatewayConnection:
     def give_up_routes(self) -> None:
         """Forget each route to the gateway, and inform the neighbours."""
         if self.gateway != NO_ROUTE:
-            self._parts.delivery.drop_routes_to(self.gateway)
-            self._parts.delivery.tell_missing(self.gateway)
+            self._parts.delivery.gateway_lost(self.gateway)
 
     def _answer_window_s(self) -> float:
         medium = self._parts.antenna.medium

@@ -14,6 +14,7 @@ class Due(enum.IntEnum):
     ASK_POSITION = 2  # in flight
     ANSWER = 3  # the latest moment for the gateway's answer to a heartbeat
     DECIDE = 4  # a negotiation
+    ROUTING = 5  # what the routing technique asked for
 
 
 class Deadlines:

@@ -11,14 +11,10 @@ from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines
-from drone_mesh.communication.interfaces import (
-    BROADCAST,
-    NO_ROUTE,
-    IRoutingTechnique,
-    IWirelessCommunication,
-)
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 
 NodeReport = Callable[[MeshEventKind, int], None]
 """Takes what happened, and which other node it concerns."""
@@ -66,10 +62,14 @@ class Delivery:
         """
         if self._antenna.medium.shared:
             return self._hand_over(payload, to)
+        transmissions = failures
         for _attempt in range(failures, self._attempts):
-            if self._antenna.send_message_to(payload):
-                self._sent(to)
+            taken = self._antenna.send_message_to(payload)
+            transmissions += self._antenna.transmissions_of_last_send()
+            if taken:
+                self._sent(to, transmissions)
                 return True
+        self._routing.sent(to, False, transmissions)
         self._neighbour_lost(to, came_from)
         return False
 
@@ -77,7 +77,7 @@ class Delivery:
         """Have the antenna queue a packet; what becomes of it is known later."""
         taken = self._antenna.send_message_to(payload)
         if taken:
-            self._sent(to)
+            self._sent(to, self._antenna.transmissions_of_last_send())
         return taken
 
     def undelivered(self, payload: bytes) -> bool:
@@ -88,6 +88,7 @@ class Delivery:
         """
         to, other = messages.receiver(payload), messages.addressee(payload)
         self.total_sent -= 1
+        self._routing.sent(to, False, self._antenna.transmissions_of_last_send())
         silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
         heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
         if heard and to not in self._gave_up:
@@ -103,14 +104,20 @@ class Delivery:
     def send_own(self, payload: bytes) -> bool:
         """Send a packet of our own towards its addressee, over one route after the other."""
         other = messages.addressee(payload)
-        tried: list[int] = []
+        tried: set[int] = set()
         while True:
-            to = self._routing.get_direction_to_node(other)
-            if to == NO_ROUTE or to in tried:
+            directions = self._routing.directions(other, NO_ROUTE, self._node_id)
+            untried = [to for to in directions if to not in tried]
+            if not untried:
                 return False
-            if self.send(messages.readdressed(payload, to), to):
+            if self.send_to_each(payload, untried):
                 return True
-            tried.append(to)
+            tried.update(untried)
+
+    def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:
+        """The same packet to each of these neighbours. True: at least one of them has it."""
+        taken = [self.send(messages.readdressed(payload, to), to) for to in next_hops]
+        return any(taken)
 
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
         """As `send_own`, to each of these; the packets for direct neighbours leave together."""
@@ -123,15 +130,15 @@ class Delivery:
         packets = [messages.addressed(payload, other) for other in direct]
         for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
             if taken:
-                self._sent(other)
+                self._sent(other, 1)
             elif not self.send(packet, other, failures=1):
                 self.send_own(packet)
         for other in set(others).difference(direct):
             self.send_own(messages.addressed(payload, other))
 
-    def _sent(self, to: int) -> None:
+    def _sent(self, to: int, transmissions: int) -> None:
         self.total_sent += 1
-        self._routing.can_communicate_with_node(to)
+        self._routing.sent(to, True, transmissions)
 
     # Lost nodes ------------------------------------------------------------------------------
 
@@ -143,22 +150,18 @@ class Delivery:
             self._report(MeshEventKind.NODE_MISSING, node)
             self.tell_missing(node, told_by=told_by)
 
-    def drop_routes_to(self, node: int) -> None:
-        """Forget each route to `node`, one after the other.
+    def gateway_lost(self, gateway: int) -> None:
+        """The routes to `gateway` do not work: forget them, and inform the neighbours."""
+        if self._routing.get_direction_to_node(gateway) == gateway:
+            self._neighbours.lost(gateway)
+        if self._routing.gateway_lost(gateway):
+            self.tell_missing(gateway)
 
-        A technique that keeps a route in spite of that is not asked again.
-        """
-        tried: list[int] = []
-        while True:
-            to = self._routing.get_direction_to_node(node)
-            if to == NO_ROUTE or to in tried:
-                return
-            tried.append(to)
-            if to == node:
-                self._neighbours.lost(node)
-                self._routing.cant_communicate_with_node(node)
-            else:
-                self._routing.other_cant_communicate_with_node(to, node)
+    def gateway_taken(self, neighbour: int, gateway: int) -> None:
+        """Try `gateway` through `neighbour`; other routes to it did not work."""
+        if self._routing.get_direction_to_node(gateway) == gateway:
+            self._neighbours.lost(gateway)
+        self._routing.gateway_taken(neighbour, gateway)
 
     def tell_missing(self, missing: int, first: int = NO_ROUTE, told_by: int = NO_ROUTE) -> None:
         """MISSING to every neighbour, `first` before the others and `told_by` not at all.

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Sequence
+
 from drone_mesh.communication import messages
 from drone_mesh.communication.circulation import CirculationGuard
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.delivery import Delivery, NodeReport
-from drone_mesh.communication.interfaces import NO_ROUTE, IRoutingTechnique
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 
 
 class Forwarding:
@@ -34,6 +37,11 @@ class Forwarding:
         creator, from_, kind, _to, forward = messages.header(payload)
         routing = self._routing
         identity = b""
+        if routing.FLOODS:
+            if creator == self._node_id:
+                return
+            self._flood(payload, routing.directions(forward, from_, creator), now_s)
+            return
         if creator == self._node_id:
             self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
             return
@@ -45,7 +53,8 @@ class Forwarding:
                 return
         lost = NO_ROUTE
         for _attempt in range(2):
-            to = routing.get_direction_to_node(forward)
+            directions = routing.directions(forward, from_, creator)
+            to = directions[0] if directions else NO_ROUTE
             if to in (NO_ROUTE, from_):
                 self._stranded(kind, forward, now_s)
                 if to == from_ or lost != forward:  # else all were informed when it was lost
@@ -66,11 +75,17 @@ class Forwarding:
         """The antenna gave a packet up, and there is no other route for it."""
         self._stranded(messages.type_of(payload), messages.addressee(payload), now_s)
 
+    def _flood(self, payload: bytes, next_hops: Sequence[int], now_s: float) -> None:
+        forwarded = messages.next_hop(payload, self._node_id, self._node_id)
+        if forwarded is None:
+            self._complaints.dropped("a heartbeat with too many hops", payload, now_s)
+        else:
+            self._delivery.send_to_each(forwarded, next_hops)
+
     def _drop_circulating(self, payload: bytes, used: int, now_s: float) -> None:
         kind, forward = messages.type_of(payload), messages.addressee(payload)
         self._complaints.dropped("a packet that circulates", payload, now_s)
-        if used not in (forward, NO_ROUTE):
-            self._routing.other_cant_communicate_with_node(used, forward)
+        self._routing.circulated(forward, used)
         self._stranded(kind, forward, now_s)
 
     def _stranded(self, kind: int, forward: int, now_s: float) -> None:

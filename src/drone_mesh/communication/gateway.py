@@ -12,7 +12,6 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IGatewayCommands,
     IInternetConnection,
-    IRoutingTechnique,
     IWirelessCommunication,
     KnownNode,
 )
@@ -21,6 +20,7 @@ from drone_mesh.communication.messages import (
     MovementNegotiationMessage,
 )
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location

@@ -142,6 +142,13 @@ class IWirelessCommunication(abc.ABC):
         """
         return [self.send_message_to(payload) for payload in payloads]
 
+    def transmissions_of_last_send(self) -> int:
+        """How often the last packet that was sent or given up was put on the air; at least 1.
+
+        A radio that retransmits by itself overrides this.
+        """
+        return 1
+
     @abc.abstractmethod
     def broadcast_message(self, payload: bytes) -> None:
         """Send to every node in range; each of them finds its own id in byte 3."""
@@ -165,92 +172,3 @@ class IInternetConnection(abc.ABC):
     @abc.abstractmethod
     def disconnect(self) -> None:
         """Disconnect. A second call changes nothing."""
-
-
-class IRoutingEssentials(abc.ABC):
-    """What a routing technique may ask of the component that it serves."""
-
-    @abc.abstractmethod
-    def search_other_nodes_in_range(self) -> None:
-        """Introduce this node to every node in range."""
-
-    @abc.abstractmethod
-    def send_heartbeat(self, other: int) -> bool:
-        """Send a heartbeat towards node `other`. False: no route, or no next hop took it."""
-
-    def send_heartbeats(self, others: Sequence[int]) -> None:
-        """Send a heartbeat towards each of these nodes; failures show in the routes."""
-        for other in others:
-            self.send_heartbeat(other)
-
-
-class IRoutingTechnique(abc.ABC):
-    """Which neighbour leads to which node.
-
-    A node in direct reach is a "child"; nodes behind it are its "grandchildren".
-
-    Called by one thread at a time, but for `get_direction_to_node` and `get_table_size`: a thread
-    that reports on the node may call these at any time. If they raise, the last report stands.
-    """
-
-    @abc.abstractmethod
-    def get_direction_to_node(self, node: int) -> int:
-        """The neighbour to hand a packet for `node` to, or NO_ROUTE."""
-
-    @abc.abstractmethod
-    def start_routing(self, essentials: IRoutingEssentials) -> None:
-        """Begin to find routes, by means of `essentials`."""
-
-    @abc.abstractmethod
-    def maintain_routing(self) -> None:
-        """Check the routes; called once a check period."""
-
-    @abc.abstractmethod
-    def node_moved_location(self) -> None:
-        """This node moved: forget what was known of its neighbours."""
-
-    @abc.abstractmethod
-    def cant_communicate_with_node(self, node: int) -> int:
-        """A packet could not be handed to neighbour `node`.
-
-        Returns 1 if that removed something and `node` can no longer be reached in any way, else 0.
-        """
-
-    @abc.abstractmethod
-    def other_cant_communicate_with_node(self, other: int, node: int) -> int:
-        """`other` says that it cannot reach `node`; the return value is as above."""
-
-    @abc.abstractmethod
-    def can_communicate_with_node(self, node: int) -> None:
-        """`node` is in direct reach."""
-
-    @abc.abstractmethod
-    def other_can_communicate_with_node(self, other: int, node: int) -> None:
-        """Neighbour `other` can reach `node`."""
-
-    @abc.abstractmethod
-    def get_table_size(self) -> int:
-        """Children and all their grandchildren; a node under two children counts twice."""
-
-    @abc.abstractmethod
-    def get_amount_of_children(self) -> int:
-        """Number of nodes in direct reach."""
-
-    @abc.abstractmethod
-    def get_set_of_children(self) -> frozenset[int]:
-        """Ids of the nodes in direct reach."""
-
-    @abc.abstractmethod
-    def empty(self) -> bool:
-        """Whether no node is known."""
-
-    def proven_path_to_node(self, other: int, node: int) -> None:
-        """A packet made by `node` just came through `other`: from now on that is the route to it.
-
-        Other routes to `node` are forgotten, except that it may be in direct reach itself
-        (docs/protocol.md, "Receiving and learning": heartbeats prove a path).
-        """
-        for child in self.get_set_of_children():
-            if child not in (other, node):
-                self.other_cant_communicate_with_node(child, node)
-        self.other_can_communicate_with_node(other, node)

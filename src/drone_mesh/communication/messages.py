@@ -22,11 +22,13 @@ from drone_mesh.errors import PacketError
 
 _CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # places of the header bytes
 HEADER_BYTES = 5
+BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
+TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
 class MessageType(enum.IntEnum):
-    """Byte 2. Types 128..255 are reserved for users' data."""
+    """Byte 2. 8..63 belong to routing techniques, 64..127 to reports, 128..255 to users' data."""
 
     NOTDEFINED = 0
     LOCATION = 1  # where its creator is
@@ -256,6 +258,10 @@ AnyMessage = Union[Message, _TypedMessage]
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
+_EXTENSION_AT = {  # places of the first byte behind a body that can be extended
+    int(MessageType.PRESENT): HEADER_BYTES + IntroduceMessage.BODY.size,
+    int(MessageType.HEARTBEAT): HEADER_BYTES + HeartbeatMessage.BODY.size,
+}
 _NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
     MessageType.LOCATION: struct.Struct("<ff"),
     MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
@@ -317,6 +323,39 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
             return None
         forwarded[_HEARTBEAT_HOPS] += 1
     return bytes(forwarded)
+
+
+def hops(payload: bytes) -> int:
+    """The hops that a PRESENT or a HEARTBEAT carries: to its gateway, or travelled so far."""
+    if payload[_TYPE] == _HEARTBEAT:
+        return payload[_HEARTBEAT_HOPS]
+    return payload[HEADER_BYTES]
+
+
+def extension_room(kind: int) -> int:
+    """The number of bytes behind the body that a routing technique may use; 0 for most types."""
+    return PAYLOAD_BYTES - _EXTENSION_AT[kind] if kind in _EXTENSION_AT else 0
+
+
+def extension(payload: bytes) -> bytes:
+    """The bytes behind the body of a PRESENT or a HEARTBEAT; zero where no technique uses them."""
+    return payload[_EXTENSION_AT[payload[_TYPE]] :]
+
+
+def extended(payload: bytes, extension: bytes) -> bytes:
+    """The same PRESENT or HEARTBEAT with these bytes behind its body.
+
+    Raises PacketError if they do not fit.
+    """
+    at = _EXTENSION_AT[payload[_TYPE]]
+    if len(extension) > PAYLOAD_BYTES - at:
+        raise PacketError(f"{len(extension)} extension bytes do not fit into {PAYLOAD_BYTES - at}")
+    return payload[:at] + extension + payload[at + len(extension) :]
+
+
+def body(payload: bytes) -> bytes:
+    """The 27 bytes behind the header."""
+    return payload[HEADER_BYTES:]
 
 
 def identity(payload: bytes) -> bytes:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
-from drone_mesh.communication.interfaces import IRoutingTechnique, IWirelessCommunication
+from drone_mesh.communication.interfaces import IWirelessCommunication
+from drone_mesh.communication.messages import HeartbeatMessage, MessageType
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
 from drone_mesh.communication.places import KnownPlaces
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 
 
@@ -28,6 +31,14 @@ class NodeParts:
     places: KnownPlaces
     pilot: Pilot
     antenna: IWirelessCommunication
+
+    def heartbeat(self, to: int, forward: int, connected: bool, gateway: int) -> bytes:
+        """A heartbeat of this node for `forward`, with what the routing technique adds to it."""
+        me = self.node_id
+        payload = HeartbeatMessage(me, me, to, forward, connected, gateway, 0).to_payload()
+        room = messages.extension_room(MessageType.HEARTBEAT)
+        extension = self.routing.extension(MessageType.HEARTBEAT, room)
+        return messages.extended(payload, extension) if extension else payload
 
     @property
     def now_s(self) -> float:

@@ -13,13 +13,13 @@ from drone_mesh.communication.connection import GatewayConnection
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
-    IRoutingTechnique,
     IWirelessCommunication,
 )
 from drone_mesh.communication.messages import MovementNegotiationMessage
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
 from drone_mesh.communication.router_states import Link, Repair, RouterEvent, RouterStates
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
 

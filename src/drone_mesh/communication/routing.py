@@ -6,12 +6,24 @@ import importlib
 from typing import Callable
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
-from drone_mesh.communication.interfaces import IRoutingTechnique
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.techniques.babel import Babel
+from drone_mesh.communication.techniques.batman import Batman
+from drone_mesh.communication.techniques.dsdv import Dsdv
+from drone_mesh.communication.techniques.etx_tree import EtxTree
+from drone_mesh.communication.techniques.flooding import Flooding
+from drone_mesh.communication.techniques.steady_tree import SteadyTree
 from drone_mesh.errors import ConfigurationError
 
 DEFAULT_ROUTING = "child_table_tree"
 ROUTING_TECHNIQUES: dict[str, Callable[[], IRoutingTechnique]] = {
     DEFAULT_ROUTING: ChildTableTree,
+    "steady_tree": SteadyTree,
+    "etx_tree": EtxTree,
+    "babel": Babel,
+    "batman": Batman,
+    "dsdv": Dsdv,
+    "flooding": Flooding,
 }
 
 

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
-from drone_mesh.communication.interfaces import NO_ROUTE, IRoutingEssentials, IRoutingTechnique
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
 
 
 class Essentials(IRoutingEssentials):

@@ -49,7 +49,7 @@ def test_an_unknown_name_is_refused_with_a_list_of_what_is_known(name):
         "routing_for_tests:A_NUMBER",
         "routing_for_tests:NotRouting",
         "routing_for_tests:WantsArguments",
-        "drone_mesh.communication.interfaces:IRoutingTechnique",
+        "drone_mesh.communication.routing_interfaces:IRoutingTechnique",
     ],
 )
 def test_what_cannot_be_loaded_is_refused_by_its_name(name):

@@ -1,0 +1,214 @@
+"""The routing seam: what a technique is told, and what it may do (docs/techniques.md).
+
+A technique has no thread, no clock and no randomness of its own: its component calls it, and it
+acts through IRoutingEssentials.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import ClassVar, Sequence
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.interfaces import Location
+
+
+class IRoutingEssentials(abc.ABC):
+    """What a routing technique may ask of the component that it serves."""
+
+    @abc.abstractmethod
+    def get_node_id(self) -> int:
+        """This node's id, 0..253."""
+
+    @abc.abstractmethod
+    def get_preferred_gateway(self) -> int:
+        """The gateway that this node uses, itself for a gateway; NO_ROUTE while it knows none."""
+
+    @abc.abstractmethod
+    def now_s(self) -> float:
+        """The time of the current call, in seconds of the component's clock."""
+
+    @abc.abstractmethod
+    def wake_at(self, at_s: float) -> None:
+        """Have `IRoutingTechnique.on_time` called at this time; replaces the last request."""
+
+    @abc.abstractmethod
+    def search_other_nodes_in_range(self) -> None:
+        """Introduce this node to every node in range, with the technique's extension bytes."""
+
+    @abc.abstractmethod
+    def send_heartbeat(self, other: int) -> bool:
+        """Send a heartbeat towards node `other`. False: no route, or no next hop took it."""
+
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """Send a heartbeat towards each of these nodes; failures show in the routes."""
+        for other in others:
+            self.send_heartbeat(other)
+
+    @abc.abstractmethod
+    def send_packet(self, kind: int, neighbour: int, body: bytes) -> bool:
+        """Send a packet of the technique's own type (8..63, up to 27 bytes) to a neighbour."""
+
+    @abc.abstractmethod
+    def broadcast_packet(self, kind: int, body: bytes) -> None:
+        """Send a packet of the technique's own type (8..63, up to 27 bytes) to all in range."""
+
+    @abc.abstractmethod
+    def own_place(self) -> Location | None:
+        """Where this node is; None if the drone cannot report it."""
+
+    @abc.abstractmethod
+    def place_of(self, node: int) -> Location | None:
+        """The last place reported by `node`, or None."""
+
+
+class IRoutingTechnique(abc.ABC):
+    """Which neighbour leads to which node.
+
+    A node in direct reach is a "child"; nodes behind it are its "grandchildren".
+
+    Called by one thread at a time, but for `get_direction_to_node` and `get_table_size`: a thread
+    that reports on the node may call these at any time. If they raise, the last report stands.
+    """
+
+    @abc.abstractmethod
+    def get_direction_to_node(self, node: int) -> int:
+        """The neighbour to hand a packet for `node` to, or NO_ROUTE."""
+
+    @abc.abstractmethod
+    def start_routing(self, essentials: IRoutingEssentials) -> None:
+        """Begin to find routes, by means of `essentials`."""
+
+    @abc.abstractmethod
+    def maintain_routing(self) -> None:
+        """Check the routes; called once a check period."""
+
+    @abc.abstractmethod
+    def node_moved_location(self) -> None:
+        """This node moved: forget what was known of its neighbours."""
+
+    @abc.abstractmethod
+    def cant_communicate_with_node(self, node: int) -> int:
+        """A packet could not be handed to neighbour `node`.
+
+        Returns 1 if that removed something and `node` can no longer be reached in any way, else 0.
+        """
+
+    @abc.abstractmethod
+    def other_cant_communicate_with_node(self, other: int, node: int) -> int:
+        """`other` says that it cannot reach `node`; the return value is as above."""
+
+    @abc.abstractmethod
+    def can_communicate_with_node(self, node: int) -> None:
+        """`node` is in direct reach."""
+
+    @abc.abstractmethod
+    def other_can_communicate_with_node(self, other: int, node: int) -> None:
+        """Neighbour `other` can reach `node`."""
+
+    @abc.abstractmethod
+    def get_table_size(self) -> int:
+        """Children and all their grandchildren; a node under two children counts twice."""
+
+    @abc.abstractmethod
+    def get_amount_of_children(self) -> int:
+        """Number of nodes in direct reach."""
+
+    @abc.abstractmethod
+    def get_set_of_children(self) -> frozenset[int]:
+        """Ids of the nodes in direct reach."""
+
+    @abc.abstractmethod
+    def empty(self) -> bool:
+        """Whether no node is known."""
+
+    def proven_path_to_node(self, other: int, node: int) -> None:
+        """A packet made by `node` just came through `other`: from now on that is the route to it.
+
+        Other routes to `node` are forgotten, except that it may be in direct reach itself
+        (docs/protocol.md, "Receiving and learning": heartbeats prove a path).
+        """
+        for child in self.get_set_of_children():
+            if child not in (other, node):
+                self.other_cant_communicate_with_node(child, node)
+        self.other_can_communicate_with_node(other, node)
+
+    # What the component does beyond that; the defaults are the rules of a tree of children ------
+
+    FLOODS: ClassVar[bool] = False
+    """A packet goes to several next hops, and the technique itself drops copies.
+
+    Dead ends are normal then: they are neither reported nor answered with MISSING, and the
+    component does not look for circulating packets.
+    """
+
+    TAKES_SHORTCUTS: ClassVar[bool] = True
+    """A router tries a neighbour that presents itself with fewer hops: its next heartbeat to the
+    gateway goes through that neighbour, and the answer decides."""
+
+    def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
+        """A packet arrived from neighbour `from_`, for this node or to be forwarded.
+
+        `messages.hops` and `messages.extension` read what PRESENT and HEARTBEAT carry. False: drop
+        the packet. By default a heartbeat proves a path, and any other packet teaches a route to
+        its creator if there was none (docs/protocol.md, "Receiving and learning").
+        """
+        self.can_communicate_with_node(from_)
+        if creator != from_:
+            if kind == messages.MessageType.HEARTBEAT:
+                self.proven_path_to_node(from_, creator)
+            elif self.get_direction_to_node(creator) == NO_ROUTE:
+                self.other_can_communicate_with_node(from_, creator)
+        return True
+
+    def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
+        """A packet was handed to `neighbour` (ok), or given up, after so many transmissions.
+
+        A neighbour that is given up is then reported to `cant_communicate_with_node`.
+        """
+        if ok:
+            self.can_communicate_with_node(neighbour)
+
+    def directions(self, node: int, came_from: int, creator: int) -> Sequence[int]:
+        """The neighbours to hand a packet for `node` to; empty: there is no route.
+
+        `came_from` is the neighbour that sent the packet, NO_ROUTE for one of this node's own.
+        """
+        to = self.get_direction_to_node(node)
+        return () if to == NO_ROUTE else (to,)
+
+    def gateway_lost(self, gateway: int) -> bool:
+        """The gateway no longer answers. True: inform the neighbours that it is missing."""
+        tried: list[int] = []
+        while True:
+            to = self.get_direction_to_node(gateway)
+            if to == NO_ROUTE or to in tried:
+                return True
+            tried.append(to)
+            if to == gateway:
+                self.cant_communicate_with_node(gateway)
+            else:
+                self.other_cant_communicate_with_node(to, gateway)
+
+    def gateway_taken(self, neighbour: int, gateway: int) -> None:
+        """This node has no gateway; `neighbour` uses this one, and routes so far did not work."""
+        self.gateway_lost(gateway)
+        self.other_can_communicate_with_node(neighbour, gateway)
+
+    def circulated(self, node: int, used: int) -> None:
+        """A packet for `node` that was handed to `used` came round."""
+        if used not in (node, NO_ROUTE):
+            self.other_cant_communicate_with_node(used, node)
+
+    def extension(self, kind: int, room: int) -> bytes:
+        """Up to `room` bytes to send behind the body of a PRESENT or HEARTBEAT of this node."""
+        return b""
+
+    def on_time(self, now_s: float) -> None:  # noqa: B027 (only some techniques need it)
+        """The time asked for with `IRoutingEssentials.wake_at` has come."""
+
+    def on_packet(  # noqa: B027 (only some techniques need it)
+        self, creator: int, from_: int, kind: int, body: bytes
+    ) -> None:
+        """A packet of the technique's own types 8..63 arrived; `body` has 27 bytes."""

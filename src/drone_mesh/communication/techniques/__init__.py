@@ -1,0 +1,1 @@
+"""Routing techniques beside ChildTableTree (docs/techniques.md)."""

@@ -1,0 +1,91 @@
+"""Flooding: every packet to every neighbour, once. The baseline of all routing studies."""
+
+from __future__ import annotations
+
+import struct
+from collections import OrderedDict
+from typing import Sequence
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.child_table_tree import ChildTableTree
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.messages import MessageType
+
+REMEMBERED = 512  # our choice: packets that a node recognises; a heartbeat lives a second
+SEQUENCE = struct.Struct("<H")
+SAME_PACKET_S = 0.5  # docs/protocol.md, "Circulating packets": after that it is another packet
+
+
+class Flooding(ChildTableTree):
+    """Needs no routes: knows neighbours, and recognises the copies of a packet."""
+
+    FLOODS = True
+    TAKES_SHORTCUTS = False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._seen_s: OrderedDict[bytes, float] = OrderedDict()
+        self._hops: dict[int, int] = {}  # of neighbours, to their gateway
+        self._sequence = 0
+
+    def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
+        """Only the first copy of a packet counts."""
+        self.can_communicate_with_node(from_)
+        if kind == MessageType.PRESENT:
+            self._hops[from_] = messages.hops(payload)
+            return True
+        assert self._essentials is not None
+        now_s, copy = self._essentials.now_s(), _identity(payload, kind)
+        is_first = now_s - self._seen_s.get(copy, -SAME_PACKET_S) >= SAME_PACKET_S
+        if is_first:
+            self._seen_s[copy] = now_s
+            self._seen_s.move_to_end(copy)
+            if len(self._seen_s) > REMEMBERED:
+                self._seen_s.popitem(last=False)
+        return is_first
+
+    def directions(self, node: int, came_from: int, creator: int) -> Sequence[int]:
+        """The node itself if it is a neighbour, else all neighbours but the one it came from."""
+        children = self.get_set_of_children()
+        if node in children:
+            return (node,)
+        return tuple(sorted(children - {came_from, creator}))
+
+    def get_direction_to_node(self, node: int) -> int:
+        """For people and for repair: the neighbour with the fewest hops to its gateway."""
+        children = self.get_set_of_children()
+        if node in children or not children:
+            return node if children else NO_ROUTE
+        return min(children, key=lambda child: (self._hops.get(child, NO_ROUTE), child))
+
+    def extension(self, kind: int, room: int) -> bytes:
+        """A number that tells heartbeats apart."""
+        if kind != MessageType.HEARTBEAT:
+            return b""
+        self._sequence = (self._sequence + 1) % 2**16
+        return SEQUENCE.pack(self._sequence)
+
+    def proven_path_to_node(self, other: int, node: int) -> None:
+        """There are no routes to prove."""
+
+    def other_can_communicate_with_node(self, other: int, node: int) -> None:
+        """`other` is a neighbour; what is behind it does not matter."""
+        self.can_communicate_with_node(other)
+
+    def gateway_lost(self, gateway: int) -> bool:
+        """There is no route to drop, and nothing that neighbours should know."""
+        return False
+
+    def cant_communicate_with_node(self, node: int) -> int:
+        """A neighbour is gone, but that does not make it unreachable."""
+        self._hops.pop(node, None)
+        super().cant_communicate_with_node(node)
+        return 0
+
+
+def _identity(payload: bytes, kind: int) -> bytes:
+    """What all copies of a packet share: for a heartbeat its sequence number, not its hops."""
+    if kind == MessageType.HEARTBEAT:
+        creator, _from, _kind, _to, forward = messages.header(payload)
+        return bytes((creator, forward, kind)) + messages.extension(payload)[: SEQUENCE.size]
+    return messages.identity(payload)

@@ -1,0 +1,15 @@
+"""SteadyTree: a tree that keeps a route for as long as it works."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.child_table_tree import ChildTableTree
+from drone_mesh.communication.interfaces import NO_ROUTE
+
+
+class SteadyTree(ChildTableTree):
+    """Keeps the route it knows until that fails; ChildTableTree follows the latest heartbeat."""
+
+    def proven_path_to_node(self, other: int, node: int) -> None:
+        """`node` was just reached through `other`: a new route only if there was none."""
+        if self.get_direction_to_node(node) == NO_ROUTE:
+            self.other_can_communicate_with_node(other, node)
