@@ -10,6 +10,7 @@ from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCo
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing import DEFAULT_ROUTING, create_routing_technique
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
 
@@ -21,17 +22,17 @@ def assemble_component(
     rng: random.Random,
     *,
     internet: IInternetConnection | None = None,
-    routing: str = DEFAULT_ROUTING,
+    routing: str | IRoutingTechnique = DEFAULT_ROUTING,
     timing: MeshTiming | None = None,
     observer: MeshObserver = ignore_events,
     debug: bool = True,
 ) -> MeshnetworkComponent:
     """A gateway if it has an `internet` side, else a router; not started yet.
 
-    `routing` names the routing technique. Raises ConfigurationError for an unknown technique and
-    ValueError for a node id outside 0..253.
+    `routing` is a routing technique or the name of one. Raises ConfigurationError for an unknown
+    technique and ValueError for a node id outside 0..253.
     """
-    technique = create_routing_technique(routing)
+    technique = create_routing_technique(routing) if isinstance(routing, str) else routing
     if internet is None:
         return MeshnetworkRouter(node_id, antenna, engine, technique, rng, timing, observer, debug)
     return MeshnetworkGateway(

@@ -18,6 +18,7 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.routing import DEFAULT_ROUTING
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.interfaces import Location
@@ -28,6 +29,7 @@ from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
+from drone_mesh.inprocess.shortest_path import SHORTEST_PATH, LinkMap, ShortestPath
 from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
@@ -125,7 +127,8 @@ class Network:
         rate: str = "250k",
         links: LinkModel | None = None,
     ) -> None:
-        """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file.
+        """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file, or
+        "shortest_path", which knows all links: the bound for every other technique.
 
         `radio`: "disc", on which packets never meet, or "shared", the channel of nRF24L01+ radios
         at `rate` (250k, 1M or 2M) with the space between them as `links` says (default: an ideal
@@ -152,6 +155,7 @@ class Network:
             )
         else:
             raise ConfigurationError(f"invalid radio {radio!r}: use disc or shared")
+        self._links = LinkMap(self)
         self.nodes: dict[int, Node] = {}
         self.events: list[MeshEvent] = []
 
@@ -194,12 +198,17 @@ class Network:
             node.drone,
             random.Random(self._rng.random()),
             internet=NoInternet() if gateway else None,
-            routing=self._routing,
+            routing=self._technique(node_id),
             timing=self._timing,
             observer=self._observe,
         )
         self.nodes[node_id] = node
         self.clock.call_at(start_s, Node.start, node)
+
+    def _technique(self, node_id: int) -> str | IRoutingTechnique:
+        if self._routing == SHORTEST_PATH:
+            return ShortestPath(self._links, node_id)
+        return self._routing
 
     # Acting ----------------------------------------------------------------------------------
 
@@ -259,6 +268,10 @@ class Network:
         if among is None:
             among = [n for n, node in self.nodes.items() if node.antenna.powered]
         return all(map(self.connected, among))
+
+    def is_on(self, node_id: int) -> bool:
+        """Whether a node exists and its antenna has power."""
+        return node_id in self.nodes and self.nodes[node_id].antenna.powered
 
     def hops(self, node_id: int) -> int:
         """What a node believes its distance to the gateway to be."""

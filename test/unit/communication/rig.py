@@ -107,12 +107,12 @@ class AlwaysHalf(random.Random):
 class Rig:
     """A started component, its antenna and its drone, and the time they live in."""
 
-    def __init__(self, node_id=1, gateway=False, timing=None, debug=True):
+    def __init__(self, node_id=1, gateway=False, timing=None, debug=True, routing=None):
         self.now_s = 0.0
         self.antenna = RecordingAntenna()
         self.engine = RigEngine()
         self.internet = RigInternet()
-        self.routing = ChildTableTree()
+        self.routing = routing or ChildTableTree()
         self.events = []
         carried = (self.antenna, self.engine, self.routing)
         if gateway:

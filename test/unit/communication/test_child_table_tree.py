@@ -5,30 +5,11 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from routing_rig import RecordingEssentials
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
-
-
-class Essentials(IRoutingEssentials):
-    """A component that keeps what it was asked for; neighbours in `gone` take no heartbeat."""
-
-    def __init__(self, tree=None, gone=()):
-        self.asked = []
-        self._tree = tree
-        self._gone = gone
-
-    def search_other_nodes_in_range(self):
-        self.asked.append("search")
-
-    def send_heartbeat(self, other):
-        self.asked.append(other)
-        if other in self._gone:
-            for node in self._gone:
-                self._tree.cant_communicate_with_node(node)
-            return False
-        return True
+from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 
 
 def tree_with(*pairs):
@@ -125,13 +106,13 @@ def test_moving_forgets_everything():
 
 
 def test_starting_searches_others_and_sends_no_heartbeat():
-    tree, essentials = tree_with((1, 4)), Essentials()
+    tree, essentials = tree_with((1, 4)), RecordingEssentials()
     tree.start_routing(essentials)
     assert essentials.asked == ["search"]
 
 
 def test_maintaining_searches_again_and_sends_a_heartbeat_to_each_child():
-    tree, essentials = tree_with((3, 4), (1, 4)), Essentials()
+    tree, essentials = tree_with((3, 4), (1, 4)), RecordingEssentials()
     tree.start_routing(essentials)
     tree.maintain_routing()
     assert essentials.asked == ["search", "search", 1, 3]
@@ -139,7 +120,7 @@ def test_maintaining_searches_again_and_sends_a_heartbeat_to_each_child():
 
 def test_maintaining_asks_for_all_children_together_even_if_one_heartbeat_costs_two_of_them():
     tree = tree_with((1, 4), (2, 5), (3, 6))
-    essentials = Essentials(tree, gone=(1, 2))
+    essentials = RecordingEssentials(technique=tree, gone=(1, 2))
     tree.start_routing(essentials)
     tree.maintain_routing()
     assert essentials.asked == ["search", "search", 1, 2, 3]

@@ -1,0 +1,65 @@
+"""ShortestPath: the routing bound. It sees all links of a network; no packet tells it of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from drone_mesh.communication.child_table_tree import ChildTableTree
+from drone_mesh.communication.interfaces import NO_ROUTE
+
+if TYPE_CHECKING:
+    from drone_mesh.inprocess.network import Network
+
+SHORTEST_PATH = "shortest_path"
+LOOK_EVERY_S = 0.1  # our choice: links change when drones fly, and are then looked up again
+
+
+class LinkMap:
+    """The next hops of all shortest paths of a network, as its links are now."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._next_hops: dict[int, dict[int, int]] = {}  # by destination, by node
+        self._looked_s = -LOOK_EVERY_S
+
+    def next_hop(self, node: int, destination: int) -> int:
+        """The neighbour of `node` on a shortest path, the lowest id of several, or NO_ROUTE."""
+        now_s = self._network.clock.now_s
+        if now_s - self._looked_s >= LOOK_EVERY_S:
+            self._next_hops.clear()
+            self._looked_s = now_s
+        if destination not in self._next_hops:
+            self._next_hops[destination] = self._paths_to(destination)
+        return self._next_hops[destination].get(node, NO_ROUTE)
+
+    def _paths_to(self, destination: int) -> dict[int, int]:
+        next_hops: dict[int, int] = {}
+        edge = [destination] if self._network.is_on(destination) else []
+        while edge:
+            reached: dict[int, int] = {}
+            for node in sorted(edge):
+                for other in self._network.air.in_range(node):
+                    if other != destination and self._network.is_on(other):
+                        reached.setdefault(other, node)
+            edge = [node for node in reached if node not in next_hops]
+            next_hops.update((node, reached[node]) for node in edge)
+        return next_hops
+
+
+class ShortestPath(ChildTableTree):
+    """Hands each packet to the next hop of a shortest path."""
+
+    TAKES_SHORTCUTS = False
+
+    def __init__(self, links: LinkMap, node_id: int) -> None:
+        super().__init__()
+        self._links = links
+        self._node_id = node_id
+
+    def get_direction_to_node(self, node: int) -> int:
+        """As the links are now."""
+        return self._links.next_hop(self._node_id, node)
+
+    def gateway_lost(self, gateway: int) -> bool:
+        """There is nothing to forget, and nothing that neighbours should know."""
+        return False

@@ -1,0 +1,100 @@
+"""Every routing technique keeps a mesh; what each gains on links that lose packets."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from drone_mesh.communication.routing import ROUTING_TECHNIQUES
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.shortest_path import SHORTEST_PATH
+
+ALL = [*ROUTING_TECHNIQUES, SHORTEST_PATH]
+FOR_CROWDS = [name for name in ALL if name != "flooding"]  # its packets grow with the square
+
+
+def grid(technique, nodes, loss=0.0, seed=1):
+    network = Network(seed=seed, routing=technique, loss=loss)
+    network.add_fleet(gateways=1, routers=nodes - 1, gridsize=round(nodes**0.5), spacing=6.0)
+    return network
+
+
+def connected_share(network, seconds):
+    """The mean share of nodes that are connected, sampled each second."""
+    shares = []
+    for _ in range(seconds):
+        network.run_for(1.0)
+        shares.append(sum(map(network.connected, network.nodes)) / len(network.nodes))
+    return sum(shares) / len(shares)
+
+
+@pytest.mark.parametrize("technique", ALL)
+def test_a_mesh_connects_and_orders_reach_every_drone(technique):
+    network = grid(technique, nodes=17)
+    assert network.run_until(network.all_connected, within_s=5.0)
+    network.run_for(30.0)
+    for node in range(1, 17):
+        place = network.location(node)
+        assert network.order(node, place.longitude, place.latitude, height=1)
+    network.run_for(5.0)
+    assert [network.location(node).height for node in range(1, 17)] == [1.0] * 16
+
+
+@pytest.mark.parametrize("technique", ALL)
+def test_it_stays_connected_without_a_flight_or_a_circulating_packet(technique):
+    network = grid(technique, nodes=17)
+    network.run_for(20.0)
+    assert connected_share(network, seconds=60) == 1.0
+    assert not any(event.kind.name == "FLIGHT_DECIDED" for event in network.events)
+    for node in network.nodes.values():
+        assert not any("circulates" in reason for reason in node.component.complaints.counts)
+
+
+@pytest.mark.parametrize("technique", FOR_CROWDS)
+def test_of_100_nodes_30_die_and_all_that_have_a_path_stay_or_come_back(technique):
+    network = grid(technique, nodes=100)
+    assert network.run_until(network.all_connected, within_s=15.0)
+    network.run_for(20.0)
+    for node in random.Random(2).sample(range(1, 100), 30):
+        network.power(node, False)
+    network.run_for(20.0)
+    with_path = network.shortest_hops()
+    assert network.run_until(lambda: network.all_connected(with_path), within_s=40.0)
+
+
+@pytest.fixture(scope="module")
+def share_of_tree():
+    """How ChildTableTree fares: 100 nodes, links that lose a fifth of all packets."""
+    network = grid("child_table_tree", nodes=100, loss=0.2)
+    network.run_for(30.0)
+    return connected_share(network, seconds=60)
+
+
+@pytest.mark.parametrize("technique", ["etx_tree", "babel", "batman", SHORTEST_PATH])
+def test_on_links_that_lose_a_fifth_more_nodes_are_connected_than_with_the_tree(
+    technique, share_of_tree
+):
+    network = grid(technique, nodes=100, loss=0.2)
+    network.run_for(30.0)
+    assert connected_share(network, seconds=60) > share_of_tree + 0.1
+
+
+def test_flooding_survives_links_that_lose_a_fifth():
+    network = grid("flooding", nodes=17, loss=0.2)
+    network.run_for(10.0)
+    assert connected_share(network, seconds=60) == 1.0
+
+
+@pytest.mark.parametrize("technique", FOR_CROWDS)
+def test_the_same_seed_gives_the_same_run(technique):
+    one, other = (grid(technique, nodes=26, loss=0.1) for _ in range(2))
+    for network in (one, other):
+        network.run_for(60.0)
+    assert one.events == other.events
+
+
+def test_no_technique_knows_a_shorter_path_than_the_bound():
+    network = grid(SHORTEST_PATH, nodes=50)
+    network.run_for(30.0)
+    assert {n: network.hops(n) for n in network.nodes} == network.shortest_hops()
