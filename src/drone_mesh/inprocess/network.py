@@ -155,7 +155,7 @@ class Network:
             )
         else:
             raise ConfigurationError(f"invalid radio {radio!r}: use disc or shared")
-        self._links = LinkMap(self)
+        self._link_map = LinkMap(self.clock, self.links)
         self.nodes: dict[int, Node] = {}
         self.events: list[MeshEvent] = []
 
@@ -207,7 +207,7 @@ class Network:
 
     def _technique(self, node_id: int) -> str | IRoutingTechnique:
         if self._routing == SHORTEST_PATH:
-            return ShortestPath(self._links, node_id)
+            return ShortestPath(self._link_map, node_id)
         return self._routing
 
     # Acting ----------------------------------------------------------------------------------
@@ -269,9 +269,11 @@ class Network:
             among = [n for n, node in self.nodes.items() if node.antenna.powered]
         return all(map(self.connected, among))
 
-    def is_on(self, node_id: int) -> bool:
-        """Whether a node exists and its antenna has power."""
-        return node_id in self.nodes and self.nodes[node_id].antenna.powered
+    def links(self, node_id: int) -> list[int]:
+        """The nodes that a node can send to now; none while its antenna has no power."""
+        if not self.nodes[node_id].antenna.powered:
+            return []
+        return [n for n, antenna in self.air.in_range(node_id).items() if antenna.powered]
 
     def hops(self, node_id: int) -> int:
         """What a node believes its distance to the gateway to be."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Callable, Iterable
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
-
-if TYPE_CHECKING:
-    from drone_mesh.inprocess.network import Network
+from drone_mesh.inprocess.clock import VirtualClock
 
 SHORTEST_PATH = "shortest_path"
 LOOK_EVERY_S = 0.1  # our choice: links change when drones fly, and are then looked up again
@@ -17,14 +15,16 @@ LOOK_EVERY_S = 0.1  # our choice: links change when drones fly, and are then loo
 class LinkMap:
     """The next hops of all shortest paths of a network, as its links are now."""
 
-    def __init__(self, network: Network) -> None:
-        self._network = network
+    def __init__(self, clock: VirtualClock, links: Callable[[int], Iterable[int]]) -> None:
+        """`links` lists the nodes that a node can send to now, in both directions alike."""
+        self._clock = clock
+        self._links = links
         self._next_hops: dict[int, dict[int, int]] = {}  # by destination, by node
         self._looked_s = -LOOK_EVERY_S
 
     def next_hop(self, node: int, destination: int) -> int:
         """The neighbour of `node` on a shortest path, the lowest id of several, or NO_ROUTE."""
-        now_s = self._network.clock.now_s
+        now_s = self._clock.now_s
         if now_s - self._looked_s >= LOOK_EVERY_S:
             self._next_hops.clear()
             self._looked_s = now_s
@@ -34,12 +34,12 @@ class LinkMap:
 
     def _paths_to(self, destination: int) -> dict[int, int]:
         next_hops: dict[int, int] = {}
-        edge = [destination] if self._network.is_on(destination) else []
+        edge = [destination]
         while edge:
             reached: dict[int, int] = {}
             for node in sorted(edge):
-                for other in self._network.air.in_range(node):
-                    if other != destination and self._network.is_on(other):
+                for other in self._links(node):
+                    if other != destination:
                         reached.setdefault(other, node)
             edge = [node for node in reached if node not in next_hops]
             next_hops.update((node, reached[node]) for node in edge)
