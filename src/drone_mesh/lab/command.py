@@ -90,6 +90,16 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    report = commands.add_parser("report", help="write tables and figures as one HTML file")
+    report.add_argument("results", type=Path)
+    report.add_argument("--out", type=Path, help="the page (default: RESULTS/report.html)")
+    report.add_argument(
+        "--export", metavar="FORMAT", action="append", default=[],
+        choices=("png", "pdf", "svg", "csv", "latex"),
+        help="also write each figure or table as a file: png, pdf, svg, csv or latex; repeatable",
+    )  # fmt: skip
+    report.set_defaults(run=_report)
+
     show = commands.add_parser("show", help="repeat one run, with all its events")
     show.add_argument("results", type=Path)
     show.add_argument("run_id", metavar="RUN", help="its id, or the beginning of it")
@@ -194,6 +204,15 @@ def _merge(options: argparse.Namespace) -> int:
     count = merge(options.into, options.shards)
     print(f"{count} runs from {len(options.shards)} shards added")
     print(describe_folder(options.into))
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    # Here and below: only the analysis needs scipy, matplotlib and jinja2.
+    from drone_mesh.lab.report import write_report
+
+    for path in write_report(options.results, options.out, options.export):
+        print(f"wrote {path}")
     return 0
 
 

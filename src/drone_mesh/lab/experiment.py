@@ -52,6 +52,7 @@ class Experiment(BaseModel):
     stop: Optional[Stop] = None
     metrics: List[str] = []
     compare: Optional[Compare] = None
+    draws: Literal["all", "split"] = "all"  # which runs the report counts
     timeout_s: Annotated[float, Field(gt=0)] = 600.0  # wall time of one run
     output: Literal["runs", "runs_and_outages"] = "runs_and_outages"
 

@@ -31,6 +31,7 @@ class Results(NamedTuple):
     loaded: LoadedExperiment
     plan: Sequence[PlannedRun]
     rows: Mapping[str, Row]  # by run id
+    by_cell: Mapping[int, dict[int, Row]]  # the same by cell and repetition
     failures: Sequence[Row]
     sessions: Sequence[Mapping[str, object]]
 
@@ -41,12 +42,24 @@ class Results(NamedTuple):
         return [extensions.own_column(name) if ":" in name else name for name in wanted]
 
     def of_cell(self, cell: int) -> dict[int, Row]:
-        """The rows of one cell, by repetition."""
-        return {
-            planned.spec.repetition: self.rows[planned.spec.run]
-            for planned in self.plan
-            if planned.cell == cell and planned.spec.run in self.rows
-        }
+        """The rows of one cell that the report counts, by repetition."""
+        return {r: row for r, row in self.drawn(cell).items() if self.counts(row)}
+
+    def drawn(self, cell: int) -> dict[int, Row]:
+        """All rows of one cell, by repetition."""
+        return self.by_cell.get(cell, {})
+
+    def counts(self, row: Row) -> bool:
+        """Whether the report counts this run: `draws: split` leaves out what did not split."""
+        return self.loaded.experiment.draws == "all" or row.get("split") == "1"
+
+    @property
+    def axis_names(self) -> dict[str, str]:
+        """Axes as tables and figures call them: by their last words, where these are unique."""
+        short = {axis: _last_words(axis) for axis in self.loaded.axes}
+        if len(set(short.values())) < len(short):
+            return {axis: axis for axis in short}
+        return short
 
     def find_cell(self, text: str) -> int:
         """The one cell that fits axis=value[,axis=value...]. Raises ConfigurationError."""
@@ -84,7 +97,12 @@ def load_results(folder: Path) -> Results:
     rows = {row["run"]: row for row in read_rows(folder / RUNS)}
     seeds = _seeds(loaded, rows)
     plan = list(Plan(loaded, seeds))
-    return Results(folder, loaded, plan, rows, read_rows(folder / FAILURES), sessions)
+    by_cell: dict[int, dict[int, Row]] = {}
+    for planned in plan:
+        if planned.spec.run in rows:
+            by_cell.setdefault(planned.cell, {})[planned.spec.repetition] = rows[planned.spec.run]
+    failures = read_rows(folder / FAILURES)
+    return Results(folder, loaded, plan, rows, by_cell, failures, sessions)
 
 
 def number(row: Row, column: str) -> float | None:
@@ -96,6 +114,11 @@ def number(row: Row, column: str) -> float | None:
 def is_share(column: str) -> bool:
     """Whether every run has 0 or 1 here."""
     return column in METRICS and METRICS[column].is_share
+
+
+def _last_words(axis: str) -> str:
+    words = axis.split(".")
+    return ".".join(words[-2:] if words[0] == "faults" else words[-1:])
 
 
 def _fits(cell: Cell, wanted: Mapping[str, str]) -> bool:

@@ -7,6 +7,7 @@ more packages for these two.
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Callable, NamedTuple, Sequence
 
 import numpy as np
@@ -15,6 +16,11 @@ from scipy import stats
 RESAMPLES = 2000
 CONFIDENCE = 0.95
 SEED = 1  # of the resampling: the same rows give the same report
+
+
+def plain(value: float) -> str:
+    """Three significant digits, and no powers of ten below a million."""
+    return f"{value:.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 class Interval(NamedTuple):
@@ -30,8 +36,8 @@ class Interval(NamedTuple):
         if math.isnan(self.value):
             return "-"
         if math.isnan(self.low):
-            return f"{self.value:.3g}"
-        return f"{self.value:.3g} [{self.low:.3g}, {self.high:.3g}]"
+            return plain(self.value)
+        return f"{plain(self.value)} [{plain(self.low)}, {plain(self.high)}]"
 
 
 def mean_interval(values: Sequence[float]) -> Interval:
@@ -54,7 +60,8 @@ def _bootstrap(values: Sequence[float], statistic: Callable[..., float]) -> Inte
     if min(values) == max(values):
         return Interval(value, value, value, n, "all runs are equal")
     for method in ("BCa", "percentile"):
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # scipy warns of what the loop deals with
             found = stats.bootstrap(
                 (np.asarray(values, float),),
                 statistic,

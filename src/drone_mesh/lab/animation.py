@@ -1,0 +1,155 @@
+"""A repair as a moving picture: inline SVG that plays by itself in any browser."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.roles import Role
+from drone_mesh.lab.record import RunRecord
+from drone_mesh.state.model import MeshStatus, NodeStatus
+
+SHOWN_BEFORE_S = 3.0
+SHOWN_AFTER_S = 4.0
+MOST_FRAMES = 90
+FRAME_S = 0.25  # of the viewer's time
+WIDTH = 720
+MARGIN = 24
+HIGHEST = 500  # of the drawing, without its margins
+SERVED, LOST, OFF, GATEWAY = "#009E73", "#D55E00", "#c5cad3", "#6d3fd1"
+
+
+def animate_repair(states: Sequence[MeshStatus], record: RunRecord) -> str:
+    """SVG text of the time around the repair; empty when there was none to show."""
+    if record.fault_s is None:
+        return ""
+    end_s = record.end_s if record.healed_at_s is None else record.healed_at_s
+    shown = [
+        state
+        for state in states
+        if record.fault_s - SHOWN_BEFORE_S <= state.stamp_s <= end_s + SHOWN_AFTER_S
+    ]
+    if len(shown) < 2:
+        return ""
+    stride = -(-len(shown) // MOST_FRAMES)
+    frames = [*shown[::stride], shown[-1]]
+    served = {look.now_s: look.served for look in record.looks}
+    scale = _Scale(frames)
+    seconds = FRAME_S * len(frames)
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {scale.height:.0f}" '
+        'class="animation" role="img">',
+        f'<rect width="{WIDTH}" height="{scale.height:.0f}" fill="#ffffff"/>',
+    ]
+    parts += _links(frames, scale, seconds)
+    for index in range(len(frames[0].nodes)):
+        parts.append(
+            _drone([frame.nodes[index] for frame in frames], frames, served, scale, seconds)
+        )
+    texts = [f"{state.stamp_s - record.fault_s:+.0f} s" for state in frames]
+    for start, stop, text in _runs(texts):
+        parts.append(
+            f'<text x="{MARGIN}" y="18" font-size="13" font-family="sans-serif" fill="#333" '
+            f'visibility="hidden">{text}{_visible(start, stop, len(frames), seconds)}</text>'
+        )
+    parts.append("</svg>")
+    return "\n".join(parts)
+
+
+class _Scale:
+    def __init__(self, frames: Sequence[MeshStatus]) -> None:
+        xs = [node.position[0] for frame in frames for node in frame.nodes]
+        ys = [node.position[1] for frame in frames for node in frame.nodes]
+        self._x0, self._y1 = min(xs), max(ys)
+        width, height = max(max(xs) - min(xs), 1.0), max(max(ys) - min(ys), 1.0)
+        self._factor = min((WIDTH - 2 * MARGIN) / width, HIGHEST / height)
+        self._left = (WIDTH - width * self._factor) / 2
+        self.height = height * self._factor + 2 * MARGIN
+
+    def at(self, node: NodeStatus) -> tuple[float, float]:
+        return (
+            self._left + (node.position[0] - self._x0) * self._factor,
+            MARGIN + (self._y1 - node.position[1]) * self._factor,
+        )
+
+
+def _links(frames: Sequence[MeshStatus], scale: _Scale, seconds: float) -> list[str]:
+    """The routes in use; frames with the same ones share them."""
+    pictures = []
+    for frame in frames:
+        nodes = {node.id: node for node in frame.nodes}
+        lines = []
+        for node in frame.nodes:
+            if node.on and node.connected and node.role == Role.ROUTER:
+                to = nodes.get(node.next_hop) if node.next_hop != NO_ROUTE else None
+                if to is not None and to.on:
+                    (x1, y1), (x2, y2) = scale.at(node), scale.at(to)
+                    lines.append(f"M{x1:.0f} {y1:.0f}L{x2:.0f} {y2:.0f}")
+        pictures.append("".join(lines))
+    return [
+        f'<path d="{path}" stroke="#9bb0c9" stroke-width="1.4" fill="none" visibility="hidden">'
+        f"{_visible(start, stop, len(frames), seconds)}</path>"
+        for start, stop, path in _runs(pictures)
+        if path
+    ]
+
+
+def _drone(
+    states: Sequence[NodeStatus],
+    frames: Sequence[MeshStatus],
+    served: dict[float, frozenset[int]],
+    scale: _Scale,
+    seconds: float,
+) -> str:
+    colours = []
+    for node, frame in zip(states, frames):
+        if not node.on:
+            colours.append(OFF)
+        elif node.role == Role.GATEWAY:
+            colours.append(GATEWAY)
+        else:
+            colours.append(SERVED if node.id in served.get(frame.stamp_s, ()) else LOST)
+    points = [scale.at(node) for node in states]
+    x, y = points[0]
+    radius = 7 if states[0].role == Role.GATEWAY else 5
+    inside = ""
+    if len(set(colours)) > 1:
+        inside += _animate("fill", colours, seconds, "discrete")
+    if len(set(points)) > 1:
+        inside += _animate("cx", [f"{x:.1f}" for x, _ in points], seconds, "linear")
+        inside += _animate("cy", [f"{y:.1f}" for _, y in points], seconds, "linear")
+    title = f"<title>node {states[0].id}</title>"
+    return (
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" fill="{colours[0]}" stroke="#fff" '
+        f'stroke-width="1">{title}{inside}</circle>'
+    )
+
+
+def _animate(attribute: str, values: Sequence[str], seconds: float, mode: str) -> str:
+    return (
+        f'<animate attributeName="{attribute}" values="{";".join(values)}" dur="{seconds:g}s" '
+        f'calcMode="{mode}" repeatCount="indefinite"/>'
+    )
+
+
+def _visible(start: int, stop: int, frames: int, seconds: float) -> str:
+    """Shown in the frames start..stop-1."""
+    values = ["visible" if start <= frame < stop else "hidden" for frame in range(frames)]
+    changes = [0, *(i for i in range(1, frames) if values[i] != values[i - 1])]
+    times = ";".join(f"{change / frames:.4f}" for change in changes)
+    words = ";".join(values[change] for change in changes)
+    return (
+        f'<animate attributeName="visibility" values="{words}" keyTimes="{times}" '
+        f'dur="{seconds:g}s" calcMode="discrete" repeatCount="indefinite"/>'
+    )
+
+
+def _runs(items: Sequence[str]) -> list[tuple[int, int, str]]:
+    """Stretches of equal items: first, behind the last, item."""
+    found: list[tuple[int, int, str]] = []
+    for index, item in enumerate(items):
+        if found and found[-1][2] == item:
+            found[-1] = (found[-1][0], index + 1, item)
+        else:
+            found.append((index, index + 1, item))
+    return found

@@ -1,0 +1,116 @@
+"""The report of an experiment: one HTML file with everything in it, and files for a paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Sequence
+
+import jinja2
+
+from drone_mesh.errors import MeshError
+from drone_mesh.lab.animation import animate_repair
+from drone_mesh.lab.figures import Drawing, axis_drawings, phases_drawing, survival_drawing
+from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.results import Results, load_results, number
+from drone_mesh.lab.show import replay
+from drone_mesh.lab.store import EXPERIMENT
+from drone_mesh.lab.tables import Table, cells_table, healing_table, paired_table, worst_table
+
+_TEMPLATE = Path(__file__).resolve().parent / "report.html"
+PNG_DPI = 200
+EXPORTS = "exports"
+
+
+class ReportError(MeshError):
+    """There is nothing to report, or the page cannot be written."""
+
+
+def write_report(folder: Path, out: Path | None, formats: Sequence[str]) -> list[Path]:
+    """Write the page and the exports; returns what was written. Raises MeshError."""
+    results = load_results(folder)
+    if not results.rows:
+        raise ReportError(f"{folder}: no run is done yet")
+    tables = [
+        table
+        for table in (
+            cells_table(results), healing_table(results), paired_table(results),
+            worst_table(results),
+        )
+        if table is not None
+    ]  # fmt: skip
+    drawings = axis_drawings(results)
+    drawings += [d for d in (phases_drawing(results), survival_drawing(results)) if d is not None]
+    page = out or folder / "report.html"
+    try:
+        page.write_text(_render(results, tables, drawings), encoding="utf-8")
+        return [page, *_export(folder, tables, drawings, formats)]
+    except OSError as error:
+        raise ReportError(f"cannot write {error.filename or page}: {error.strerror}") from error
+
+
+def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawing]) -> str:
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
+    experiment = results.loaded.experiment
+    done = sum(planned.spec.run in results.rows for planned in results.plan)
+    codes = sorted({row["code"] for row in results.rows.values()})
+    run, animation = _animation(results)
+    return template.render(
+        title=experiment.title or experiment.name,
+        name=experiment.name,
+        done=done,
+        planned=len(results.plan),
+        cells=len(results.loaded.cells),
+        seeds=len({planned.spec.repetition for planned in results.plan}),
+        failures=results.failures,
+        draws=experiment.draws,
+        tables={table.name: table for table in tables},
+        drawings=[(drawing, drawing.to_svg()) for drawing in drawings],
+        animation=animation,
+        animated_run=run,
+        folder=results.folder,
+        definitions=[(name, METRICS[name]) for name in results.metrics if name in METRICS],
+        codes=codes,
+        sessions=results.sessions,
+        experiment_text=(results.folder / EXPERIMENT).read_text(encoding="utf-8"),
+    )
+
+
+def _animation(results: Results) -> tuple[str, str]:
+    """(run id, SVG) of the healed run with the median time among those in which a drone flew."""
+    flown = [
+        (total_s, row["run"])
+        for planned in results.plan
+        if (row := results.rows.get(planned.spec.run)) is not None
+        and row.get("model") == "mesh"
+        and (number(row, "flights") or 0) > 0
+        and (total_s := number(row, "t_total_s")) is not None
+    ]
+    if not flown:
+        return "", ""
+    run = sorted(flown)[len(flown) // 2][1]
+    shown = replay(results, run)
+    return run, animate_repair(shown.states, shown.record)
+
+
+def _export(
+    folder: Path, tables: Sequence[Table], drawings: Sequence[Drawing], formats: Sequence[str]
+) -> list[Path]:
+    written: list[Path] = []
+    target = folder / EXPORTS
+    if formats:
+        target.mkdir(exist_ok=True)
+    for kind in dict.fromkeys(formats):
+        if kind in ("png", "pdf", "svg"):
+            metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
+            for drawing in drawings:
+                path = target / f"{drawing.name}.{kind}"
+                drawing.figure.savefig(path, format=kind, dpi=PNG_DPI, metadata=metadata)
+                written.append(path)
+        else:
+            for table in tables:
+                path = target / f"{table.name}.{'tex' if kind == 'latex' else 'csv'}"
+                text = table.to_latex() if kind == "latex" else table.to_csv()
+                path.write_text(text, encoding="utf-8")
+                written.append(path)
+    return written

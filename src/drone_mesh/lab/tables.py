@@ -1,0 +1,268 @@
+"""The tables of a report, and their forms for a paper: CSV and LaTeX."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from typing import Any, Mapping, Sequence
+
+from drone_mesh.lab.experiment import as_text
+from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.results import Results, Row, is_share, number
+from drone_mesh.lab.statistics import (
+    Interval,
+    Survival,
+    holm,
+    mean_interval,
+    paired_difference,
+    share_interval,
+    survival,
+)
+
+HEALED_BY_S = (30.0, 60.0, 120.0, 300.0)
+WORST_SHOWN = 8
+
+_LATEX = {
+    "\\": r"\textbackslash ", "%": r"\%", "_": r"\_", "&": r"\&", "#": r"\#",
+    "<": r"\textless ", ">": r"\textgreater ",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Table:
+    """Header and rows of text; `name` names its file."""
+
+    name: str
+    title: str
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    def to_csv(self) -> str:
+        """With the header as the first line."""
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([self.header, *self.rows])
+        return text.getvalue()
+
+    def to_latex(self) -> str:
+        """A table for the booktabs package."""
+        lines = [
+            r"\begin{table}",
+            rf"\caption{{{_latex(self.caption)}}}",
+            rf"\begin{{tabular}}{{{'l' * len(self.header)}}}",
+            r"\toprule",
+            " & ".join(map(_latex, self.header)) + r" \\",
+            r"\midrule",
+            *(" & ".join(map(_latex, row)) + r" \\" for row in self.rows),
+            r"\bottomrule",
+            r"\end{tabular}",
+            r"\end{table}",
+        ]
+        return "\n".join(lines) + "\n"
+
+
+def summary_of(rows: Mapping[int, Row], metric: str) -> Interval:
+    """A metric over the runs of a cell: a share with Wilson, else a mean with BCa."""
+    values = [value for row in rows.values() if (value := number(row, metric)) is not None]
+    if is_share(metric):
+        return share_interval(round(sum(values)), len(values))
+    return mean_interval(values)
+
+
+def survival_of(rows: Mapping[int, Row]) -> Survival:
+    """Time to heal over the runs of a cell; what did not heal is censored at its end."""
+    times: list[float] = []
+    seen: list[bool] = []
+    for row in rows.values():
+        healed_s, observed_s = number(row, "t_total_s"), number(row, "observed_s")
+        if observed_s is not None:
+            times.append(observed_s if healed_s is None else healed_s)
+            seen.append(healed_s is not None)
+    return survival(times, seen)
+
+
+def cells_table(results: Results) -> Table:
+    """One row per cell, one column per metric of the experiment."""
+    metrics = [name for name in results.metrics if not _is_censored(name)]
+    rows = []
+    for index, cell in enumerate(results.loaded.cells):
+        counted, drawn = results.of_cell(index), results.drawn(index)
+        split = sum(row.get("split") == "1" for row in drawn.values())
+        rows.append(
+            [
+                *map(as_text, cell.values.values()),
+                f"{len(counted)}",
+                f"{split} of {len(drawn)}",
+                *(_shown(summary_of(counted, metric), metric) for metric in metrics),
+            ]
+        )
+    header = [*results.axis_names.values(), "n", "split", *map(_with_unit, metrics)]
+    caption = (
+        "Means with 95 % BCa bootstrap intervals; shares with Wilson intervals. n: runs that "
+        "count; split: draws whose fault left a live router without any path to a gateway."
+    )
+    return Table("cells", "Results by cell", caption, header, rows)
+
+
+def healing_table(results: Results) -> Table | None:
+    """Share healed by certain times, and the time to heal as censored data; None without faults."""
+    rows = []
+    for index, cell in enumerate(results.loaded.cells):
+        counted = results.of_cell(index)
+        if not any(number(row, "observed_s") is not None for row in counted.values()):
+            continue
+        found = survival_of(counted)
+        n = found.events + found.censored
+        watched = [number(row, "observed_s") or 0.0 for row in counted.values()]
+        shares = []
+        for by_s in HEALED_BY_S:
+            if by_s > min(watched):
+                shares.append("-")  # the runs end before that
+                continue
+            healed = sum(
+                (t := number(row, "t_total_s")) is not None and t <= by_s
+                for row in counted.values()
+            )
+            shares.append(_percent(share_interval(healed, n)))
+        rows.append(
+            [
+                *map(as_text, cell.values.values()),
+                str(n),
+                *shares,
+                _percent(share_interval(found.events, n)),
+                "-" if math.isnan(found.median) else f"{found.median:.3g}",
+                f"{found.restricted_mean} to {found.until:.3g}",
+            ]
+        )
+    if not rows:
+        return None
+    header = [
+        *results.axis_names.values(), "n", *(f"healed in {by_s:g} s" for by_s in HEALED_BY_S),
+        "healed at all", "median, s", "restricted mean, s",
+    ]  # fmt: skip
+    unwatched = [
+        place
+        for place, word in enumerate(header)
+        if word.startswith("healed in") and all(row[place] == "-" for row in rows)
+    ]
+    header = [word for place, word in enumerate(header) if place not in unwatched]
+    rows = [[word for place, word in enumerate(row) if place not in unwatched] for row in rows]
+    caption = (
+        "Shares with Wilson intervals. Runs that did not heal are censored at their end and never "
+        "averaged in: median of Kaplan-Meier (- if less than half healed), and the mean time up "
+        "to the moment at which the first unhealed run ends."
+    )
+    return Table("healing", "Time to heal", caption, header, rows)
+
+
+def paired_table(results: Results) -> Table | None:
+    """Each value of the compared axis against its baseline, per seed."""
+    compare = results.loaded.experiment.compare
+    if compare is None:
+        return None
+    found = []
+    for index, cell in enumerate(results.loaded.cells):
+        if cell.values[compare.over] == compare.baseline:
+            continue
+        base = _baseline_of(results, cell.values, compare.over, compare.baseline)
+        if base is None:
+            continue
+        for metric in results.metrics:
+            pairs = _pairs(results.of_cell(base), results.of_cell(index), metric)
+            paired = paired_difference([a for a, _ in pairs], [b for _, b in pairs])
+            found.append((cell.values, metric, len(pairs), paired))
+    adjusted = holm([paired.p for *_, paired in found])
+    rows = [
+        [
+            *map(as_text, values.values()), _with_unit(metric), str(n), str(paired.difference),
+            _verdict(paired.difference, p, metric), "-" if math.isnan(p) else f"{p:.2g}",
+        ]
+        for (values, metric, n, paired), p in zip(found, adjusted)
+    ]  # fmt: skip
+    header = [*results.axis_names.values(), "metric", "seeds", "difference", "", "p (Holm)"]
+    caption = (
+        f"Difference to {compare.over} = {as_text(compare.baseline)}, per seed (common random "
+        "numbers): mean with 95 % BCa bootstrap interval; Wilcoxon signed-rank test, Holm over "
+        "the table. A time to heal counts where both healed."
+    )
+    return Table("paired", "Paired comparison", caption, header, rows)
+
+
+def worst_table(results: Results) -> Table | None:
+    """The runs that healed last, or not at all, with the command that repeats each."""
+    ranked = []
+    for index, cell in enumerate(results.loaded.cells):
+        for repetition, row in results.of_cell(index).items():
+            total_s = number(row, "t_total_s")
+            if number(row, "observed_s") is None:
+                continue
+            share = number(row, "connected_share") or 0.0
+            key = (math.inf if total_s is None else total_s, -share)
+            words = zip(results.axis_names.values(), map(as_text, cell.values.values()))
+            ranked.append((key, ", ".join(f"{a} {v}" for a, v in words), repetition, row))
+    if not ranked:
+        return None
+    ranked.sort(key=lambda item: (item[0], item[1], item[2]), reverse=True)
+    rows = [
+        [
+            label, str(repetition),
+            "not healed" if math.isinf(key[0]) else f"{key[0]:.3g} s",
+            f"{-key[1]:.1%}",
+            row["run"],
+        ]
+        for key, label, repetition, row in ranked[:WORST_SHOWN]
+    ]  # fmt: skip
+    header = ["cell", "seed", "healed after", "connected at the end", "run"]
+    caption = (
+        "The runs that took longest. To repeat one with all its events: python3 -m drone_mesh.lab "
+        f"show {results.folder} RUN, with --page FILE for a page about it."
+    )
+    return Table("worst", "Worst seeds", caption, header, rows)
+
+
+def _baseline_of(
+    results: Results, values: Mapping[str, Any], over: str, baseline: Any
+) -> int | None:
+    wanted = {**values, over: baseline}
+    cells = results.loaded.cells
+    return next((i for i, cell in enumerate(cells) if dict(cell.values) == wanted), None)
+
+
+def _pairs(a: Mapping[int, Row], b: Mapping[int, Row], metric: str) -> list[tuple[float, float]]:
+    pairs = ((number(a[r], metric), number(b[r], metric)) for r in sorted(a.keys() & b.keys()))
+    return [(x, y) for x, y in pairs if x is not None and y is not None]
+
+
+def _verdict(difference: Interval, p: float, metric: str) -> str:
+    better = METRICS[metric].better if metric in METRICS else ""
+    if math.isnan(p) or p >= 0.05 or not better:
+        return ""
+    return "better" if (difference.value < 0) == (better == "less") else "worse"
+
+
+def _is_censored(metric: str) -> bool:
+    return metric in METRICS and METRICS[metric].censored
+
+
+def _with_unit(metric: str) -> str:
+    unit = METRICS[metric].unit if metric in METRICS else ""
+    ends_with_unit = unit == metric or metric.endswith(f"_{unit}")
+    return metric if not unit or unit == "0/1" or ends_with_unit else f"{metric}, {unit}"
+
+
+def _shown(interval: Interval, metric: str) -> str:
+    return _percent(interval) if is_share(metric) else str(interval)
+
+
+def _percent(interval: Interval) -> str:
+    if math.isnan(interval.value):
+        return "-"
+    return f"{interval.value:.0%} [{interval.low:.0%}, {interval.high:.0%}]"
+
+
+def _latex(text: str) -> str:
+    for plain, escaped in _LATEX.items():
+        text = text.replace(plain, escaped)
+    return text

@@ -1,0 +1,134 @@
+"""The report: one file with everything in it, and the same tables for a paper."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+
+from drone_mesh.lab.command import main
+from drone_mesh.lab.metrics import METRICS
+from drone_mesh.lab.results import load_results
+from drone_mesh.lab.tables import cells_table, healing_table, paired_table
+
+HEALING = """\
+name: healing
+title: A line that breaks
+seeds: 4
+base:
+  layout: {kind: line, drones: 5}
+  duration_s: 90
+  faults: [{at_s: 12, kill: {number: 1, pick: cut_vertex}}]
+sweep:
+  timing.connection_lost_after_s: [30, 5]
+  layout.drones: [5, 6]
+metrics: [healed, t_total_s, packets]
+compare: {over: timing.connection_lost_after_s, baseline: 30}
+"""
+
+
+@pytest.fixture(scope="module")
+def results_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "healing.yaml").write_text(HEALING)
+    out = folder / "results"
+    assert main(["run", str(folder / "healing.yaml"), "--out", str(out), "--workers", "0"]) == 0
+    return out
+
+
+def test_the_page_needs_nothing_but_itself(results_folder: Path) -> None:
+    assert main(["report", str(results_folder)]) == 0
+    page = (results_folder / "report.html").read_text()
+    assert not re.search(r'(src|href)="(?!#)', page)
+    assert "A line that breaks" in page
+    assert page.count("<svg") >= 4  # one axis, phases, healed over time, the repair
+    assert "<animate " in page
+    assert "p (Holm)" in page
+    assert "connection_lost_after_s" in page
+
+
+def test_the_same_rows_give_the_same_page(results_folder: Path, tmp_path: Path) -> None:
+    pages = []
+    for name in ("a", "b"):
+        main(["report", str(results_folder), "--out", str(tmp_path / name)])
+        text = (tmp_path / name).read_text()
+        pages.append(re.sub(r'(id="|#|url\(#)\w+', "", text))  # matplotlib draws ids at random
+    assert pages[0] == pages[1]
+
+
+def test_every_figure_and_table_is_exported(results_folder: Path) -> None:
+    formats = [word for kind in ("png", "pdf", "csv", "latex") for word in ("--export", kind)]
+    assert main(["report", str(results_folder), *formats]) == 0
+    names = {path.name for path in (results_folder / "exports").iterdir()}
+    for name in ("axis_layout_drones", "phases", "healed_over_time"):
+        assert {f"{name}.png", f"{name}.pdf"} <= names
+    for name in ("cells", "healing", "paired", "worst"):
+        assert {f"{name}.csv", f"{name}.tex"} <= names
+    assert (results_folder / "exports/phases.png").read_bytes().startswith(b"\x89PNG")
+    assert r"\toprule" in (results_folder / "exports/cells.tex").read_text()
+
+
+def test_the_tables_hold_what_runs_csv_holds(results_folder: Path) -> None:
+    results = load_results(results_folder)
+    table = cells_table(results)
+    assert table.header[:4] == ["connection_lost_after_s", "drones", "n", "split"]
+    assert [row[:4] for row in table.rows][0] == ["30", "5", "4", "4 of 4"]
+    rows = list(csv.DictReader((results_folder / "runs.csv").open()))
+    times = sorted(
+        float(row["t_total_s"]) for row in rows
+        if row["timing.connection_lost_after_s"] == "5.0" and row["layout.drones"] == "5"
+    )  # fmt: skip
+    healing = healing_table(results)
+    assert healing is not None
+    row = next(row for row in healing.rows if row[:2] == ["5", "5"])
+    median = healing.header.index("median, s")
+    assert float(row[median]) in times
+
+
+def test_less_patience_is_better_and_the_paired_table_says_so(results_folder: Path) -> None:
+    table = paired_table(load_results(results_folder))
+    assert table is not None
+    row = next(row for row in table.rows if row[1] == "5" and row[2] == "t_total_s")
+    assert row[4].startswith("-")  # seconds less
+
+
+def test_compare_prints_the_paired_difference(
+    results_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cells = [f"timing.connection_lost_after_s={n},layout.drones=5" for n in (30, 5)]
+    assert main(["compare", str(results_folder), *cells]) == 0
+    printed = capsys.readouterr().out
+    assert "A: timing.connection_lost_after_s=30 layout.drones=5" in printed
+    assert "t_total_s" in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["layout.drones=5", "layout.drones=6"], "2 cells fit, expected one"),
+        (["layout.dron=5", "layout.drones=6"], "expected axis=value with one of"),
+        (
+            ["timing.connection_lost_after_s=5,layout.drones=5"] * 2 + ["--metric", "x"],
+            "no column x",
+        ),
+    ],
+)
+def test_compare_names_what_is_wrong(
+    results_folder: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", str(results_folder), *words]) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_a_page_about_one_run_can_be_written(results_folder: Path, tmp_path: Path) -> None:
+    run = next(csv.DictReader((results_folder / "runs.csv").open()))["run"]
+    page = tmp_path / "run.html"
+    assert main(["show", str(results_folder), run, "--page", str(page)]) == 0
+    assert "<svg" in page.read_text()
+
+
+def test_metrics_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics"]) == 0
+    assert capsys.readouterr().out.count("\n") == len(METRICS)
