@@ -67,7 +67,7 @@ class CtrlCTest(unittest.TestCase):
         self.run_and_interrupt("started 31 nodes", "routers:=30")
 
     def test_while_the_nodes_are_being_started(self) -> None:
-        self.run_and_interrupt("1 gateways and 30 routers", "routers:=30")
+        self.run_and_interrupt("fleet: gateways 1, routers 30", "routers:=30")
 
     def test_while_emulated_radios_are_in_each_others_way(self) -> None:
         self.run_and_interrupt("started 18 nodes", "radio:=nrf24")

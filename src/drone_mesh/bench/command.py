@@ -99,7 +99,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="also write all figures to this file"
     )
-    parser.add_argument("--port", type=int, help="of the ROS master; default: a free one")
+    parser.add_argument("--port", type=int, help="port of the ROS master; default: a free port")
     return parser
 
 

@@ -24,26 +24,39 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="drone_mesh.inprocess.emulated_benchmark",
         description="Runs a mesh of real drivers on emulated chips, one gateway and routers on a "
-        "grid, and says how fast that goes.",
+        "grid, and prints how fast the emulation is.",
     )
-    parser.add_argument("--nodes", type=int, default=17, help="in all, 2..254 (default 17)")
-    parser.add_argument("--spacing", type=float, default=6.0, help="of the grid, m (default 6)")
     parser.add_argument(
-        "--rate", choices=DATA_RATES, default="250k", help="bits per second (default 250k)"
+        "--nodes", type=int, default=17, help="number of nodes, 2..254 (default 17)"
     )
-    parser.add_argument("--seconds", type=float, default=60.0, help="of the mesh (default 60)")
-    parser.add_argument("--seed", type=int, default=1, help="of everything random (default 1)")
+    parser.add_argument(
+        "--spacing", type=float, default=6.0, help="spacing of the grid in metres (default 6)"
+    )
+    parser.add_argument(
+        "--rate",
+        choices=DATA_RATES,
+        default="250k",
+        help="data rate in bits per second (default 250k)",
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=60.0, help="simulated seconds (default 60)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=1, help="seed of all random choices (default 1)"
+    )
     parser.add_argument(
         "--links",
         choices=("disc", "distance", "measured"),
         default="disc",
-        help="loss: none within 9 m, by distance with its edge at 9 m, or as measured in 2019, "
-        "shrunk to 9 m (default disc)",
+        help="loss: disc: none within 9 m; distance: growing with distance, edge at 9 m; measured: "
+        "as measured in 2019, scaled to 9 m (default disc)",
     )
     parser.add_argument(
-        "--wall", action="store_true", help="in real time; shows how late the emulator is"
+        "--wall", action="store_true", help="run in real time and print how late the emulator is"
     )
-    parser.add_argument("--trace", type=Path, help="write the last 100000 frames as pcapng")
+    parser.add_argument(
+        "--trace", type=Path, help="write the last 100000 frames to this pcapng file"
+    )
     arguments = parser.parse_args(argv)
     if not 2 <= arguments.nodes <= 254:
         parser.error("--nodes must be 2 to 254")

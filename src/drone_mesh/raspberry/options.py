@@ -198,9 +198,15 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     place = parser.add_argument_group(
         "place", "Position of the node, in metres, in the common frame of the drones."
     )
-    place.add_argument("--latitude", type=float, default=0.0, help="y (default: %(default)g)")
-    place.add_argument("--longitude", type=float, default=0.0, help="x (default: %(default)g)")
-    place.add_argument("--height", type=float, default=0.0, help="(default: %(default)g)")
+    place.add_argument(
+        "--latitude", type=float, default=0.0, help="y in metres (default: %(default)g)"
+    )
+    place.add_argument(
+        "--longitude", type=float, default=0.0, help="x in metres (default: %(default)g)"
+    )
+    place.add_argument(
+        "--height", type=float, default=0.0, help="z in metres (default: %(default)g)"
+    )
     add_flight_options(parser)
     add_fleet_options(parser)
     parser.add_argument(

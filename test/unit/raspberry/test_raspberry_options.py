@@ -112,7 +112,10 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --check-period 0", "check_period 0.0: must be above 0 seconds"),
         ("--id 3 --check-period nan", "check_period nan: must be above 0 seconds"),
         ("--id 3 --connection-lost-after x", "invalid float value: 'x'"),
-        ("--id 3 --routing gossip", "technique 'gossip': use one of babel, batman, child_table_tree"),
+        (
+            "--id 3 --routing gossip",
+            "technique 'gossip': use one of babel, batman, child_table_tree",
+        ),
         ("--id 3 --latitude 5001", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --longitude inf", "longitude inf is not a finite number"),
         ("--id 3 --drone mavlink:/dev/serial0,57600", "--drone mavlink: needs --origin"),

@@ -35,15 +35,15 @@ _log = logging.getLogger(__name__)
 
 
 class DroneManager:
-    """Sends drones to places.
+    """Passes orders from users and layouts to the gateways.
 
     Parameters (private): ~casus (a YAML file with layouts; config/casus.yaml by default)
     Publishes:  /gateway (RequestGatewayDroneFlight)
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
                 (Casus)
-
-    It has no state but the layouts, which never change: the handlers may run side by side.
     """
+
+    # Its only state, the layouts, never changes, so the handlers may run in parallel.
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts = layouts

@@ -94,7 +94,7 @@ class _Listener(rospy.SubscribeListener):
 
 
 class WirelessSignalSimulator:
-    """Knows the position of each antenna, and delivers packets to those in range.
+    """The simulated air: knows the position of each antenna and delivers packets within range.
 
     Parameters (private): ~max_distance (float, metres), ~config (the YAML file that has it
                 otherwise; config/factory.yaml by default)
@@ -104,10 +104,10 @@ class WirelessSignalSimulator:
                 (AreaScan), /SignalSimulator/messages (WirelessMessages),
                 /SignalSimulator/broadcast (Broadcast)
     Figures:    delivered, lost in range, on /diagnostics
-
-    The handlers run in the threads of rospy's connections. `_lock` guards the node table and the
-    counts, and is never held while something is sent; `_opening` guards the set of topics.
     """
+
+    # The handlers run in the threads of rospy's connections. `_lock` guards the node table and the
+    # counts, and is never held during a send; `_opening` guards the set of topics.
 
     def __init__(self, max_distance_m: float) -> None:
         """Raises AirError for an invalid distance."""

@@ -22,11 +22,13 @@ _UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # x y z w
 
 
 class MeshMarkers:
-    """Subscribes: /mesh/state (MeshState)
-    Publishes:  /mesh/markers (MarkerArray), /tf (TFMessage); both at most as often as the state
+    """Shows the mesh in rviz.
 
-    The subscriber's thread does the work; rospy's others only set `_newcomer`.
+    Subscribes: /mesh/state (MeshState)
+    Publishes:  /mesh/markers (MarkerArray), /tf (TFMessage); both at most as often as the state
     """
+
+    # The subscriber's thread does the work; the other threads of rospy only set `_newcomer`.
 
     def __init__(self) -> None:
         self._maker = MarkerMaker()

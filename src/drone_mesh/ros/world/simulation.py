@@ -37,7 +37,7 @@ class Simulation:
             configuration.debug,
         ).drones
         _log.info(
-            "%d gateways and %d routers, %g m apart",
+            "fleet: gateways %d, routers %d, spacing %g m",
             configuration.gateways,
             configuration.routers,
             configuration.spacing,
