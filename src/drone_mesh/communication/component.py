@@ -384,7 +384,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         elif kind == MessageType.MISSING:
             missing = messages.MissingMessage.from_payload(payload).missing
             if missing != self._node_id:
-                self._delivery.forget_route(creator, missing, told_by=from_)
+                self._on_missing(creator, missing, told_by=from_)
         elif kind == MessageType.MOVE_TO_LOCATION:
             self._on_order(messages.GoToLocationMessage.from_payload(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
@@ -393,6 +393,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._routing.on_packet(creator, from_, kind, messages.body(payload))
         else:
             self._drop("a type that is not processed", payload)
+
+    def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
+        """`creator` says that it cannot reach the node `missing`."""
+        self._delivery.forget_route(creator, missing, told_by)
 
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._deadlines.now_s)

@@ -56,7 +56,7 @@ class Forwarding:
             directions = routing.directions(forward, from_, creator)
             to = directions[0] if directions else NO_ROUTE
             if to in (NO_ROUTE, from_):
-                self._stranded(kind, forward, now_s)
+                self.stranded(payload, now_s)
                 if to == from_ or lost != forward:  # else all were informed when it was lost
                     self._delivery.tell_missing(forward, first=from_)
                 return
@@ -69,11 +69,7 @@ class Forwarding:
                     self._circulation.passed(identity, from_, to, now_s)
                 return
             lost = to
-        self._stranded(kind, forward, now_s)
-
-    def stranded(self, payload: bytes, now_s: float) -> None:
-        """The antenna gave a packet up, and there is no other route for it."""
-        self._stranded(messages.type_of(payload), messages.addressee(payload), now_s)
+        self.stranded(payload, now_s)
 
     def _flood(self, payload: bytes, next_hops: Sequence[int], now_s: float) -> None:
         forwarded = messages.next_hop(payload, self._node_id, self._node_id)
@@ -83,14 +79,20 @@ class Forwarding:
             self._delivery.send_to_each(forwarded, next_hops)
 
     def _drop_circulating(self, payload: bytes, used: int, now_s: float) -> None:
-        kind, forward = messages.type_of(payload), messages.addressee(payload)
+        forward = messages.addressee(payload)
         self._complaints.dropped("a packet that circulates", payload, now_s)
         self._routing.circulated(forward, used)
-        self._stranded(kind, forward, now_s)
+        self.stranded(payload, now_s)
 
-    def _stranded(self, kind: int, forward: int, now_s: float) -> None:
-        """Report an order that goes no further although its gateway had a route."""
-        if kind == MessageType.MOVE_TO_LOCATION:
-            reason = f"no route to drone {forward}"
-            self._complaints.add(reason, "an order for it ends here", now_s)
-            self._report(MeshEventKind.NO_ROUTE, forward)
+    def stranded(self, payload: bytes, now_s: float) -> None:
+        """A packet goes no further. An order is reported, also to the gateway that sent it."""
+        creator, _from, kind, _to, forward = messages.header(payload)
+        if kind != MessageType.MOVE_TO_LOCATION:
+            return
+        reason = f"no route to drone {forward}"
+        self._complaints.add(reason, "an order for it ends here", now_s)
+        self._report(MeshEventKind.NO_ROUTE, forward)
+        me = self._node_id
+        if creator != me:
+            missing = messages.MissingMessage(me, me, creator, creator, forward)
+            self._delivery.send_own(missing.to_payload())

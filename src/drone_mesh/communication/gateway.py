@@ -26,6 +26,8 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused
 
+_ORDER_UNDER_WAY_S = 10.0  # our choice: a relay that cannot forward an order reports by then
+
 _log = logging.getLogger(__name__)
 
 
@@ -48,6 +50,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
+        self._ordered_s: dict[int, float] = {}  # drones with an order under way: when it left
 
     def stop(self) -> None:
         """Internet, antenna and debugging off."""
@@ -84,10 +87,10 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             return True
         me = self._node_id
         order = GoToLocationMessage(me, me, node_id, node_id, latitude, longitude, int(height))
+        self._ordered_s[node_id] = now_s
         if self._delivery.send_own(order.to_payload()):
             return True
-        _log.warning("gateway %d: no route to drone %d, it stays", self._node_id, node_id)
-        self._report(MeshEventKind.NO_ROUTE, node_id)
+        self._order_lost(node_id)
         return False
 
     def get_known_nodes(self) -> list[KnownNode]:
@@ -102,6 +105,18 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             if next_hop != NO_ROUTE or heard_s > -math.inf:
                 nodes.append(KnownNode(node, next_hop, hops, heard_s))
         return nodes
+
+    def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
+        """A relay that can take an order no further says so to the gateway."""
+        super()._on_missing(creator, missing, told_by)
+        ordered_s = self._ordered_s.get(missing, -math.inf)
+        if self._deadlines.now_s - ordered_s < _ORDER_UNDER_WAY_S:
+            self._order_lost(missing)
+
+    def _order_lost(self, node: int) -> None:
+        del self._ordered_s[node]
+        _log.warning("gateway %d: no route to drone %d, it stays", self._node_id, node)
+        self._report(MeshEventKind.NO_ROUTE, node)
 
     def _begin(self) -> None:
         self._internet.connect(self)

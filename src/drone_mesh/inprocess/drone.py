@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Callable
+from typing import Any, Callable, Protocol
 
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
-from drone_mesh.inprocess.clock import VirtualClock
+
+
+class Time(Protocol):
+    """What a drone needs of a clock."""
+
+    @property
+    def now_s(self) -> float: ...
+
+    def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None: ...
 
 
 class InProcessDrone(IDroneEngine):
     """Where one drone is. It flies like the drones of the world."""
 
-    def __init__(
-        self, clock: VirtualClock, start: Location, on_flight: Callable[[bool], None]
-    ) -> None:
+    def __init__(self, clock: Time, start: Location, on_flight: Callable[[bool], None]) -> None:
         """`on_flight` is told when a flight starts (True) and when it is over (False)."""
         self._clock = clock
         self._place = start

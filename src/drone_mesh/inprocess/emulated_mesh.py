@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from typing import Callable
+from typing import Any, Callable
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.ground import GroundEngine
 from drone_mesh.drone.interfaces import Location
+from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import NoInternet
+from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import Air, Position
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
@@ -29,6 +32,21 @@ from drone_mesh.nrf24.settings import RadioSettings
 Work = Callable[[float], None]
 
 _STEP_S = 0.1  # how closely run_until looks
+_FLIGHT_STEP_S = 0.1  # a flying antenna moves in steps of this
+
+
+class _AirTime:
+    """The clock of the air, as drones in one process see it."""
+
+    def __init__(self, clock: EmulatorClock) -> None:
+        self._clock = clock
+
+    @property
+    def now_s(self) -> float:
+        return self._clock.runtime.now_s()
+
+    def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
+        self._clock.call_at(round(at_s * NS_PER_S), function, argument)
 
 
 class EmulatedNode:
@@ -44,6 +62,8 @@ class EmulatedNode:
     ) -> None:
         self.node_id = node_id
         self.chip = EmulatedChip(air, f"node {node_id}", place)
+        self._time = _AirTime(air.clock)
+        self.drone = InProcessDrone(self._time, Location.from_vector(place), self._moves)
         self.radio = NRF24LowLevelInterface(
             self.chip.spi,
             self.chip.ce,
@@ -65,6 +85,12 @@ class EmulatedNode:
         """Have something done by the working thread."""
         self._queue.append(work)
         self._news.notify()
+
+    def _moves(self, started: bool) -> None:
+        """Have the antenna follow the drone: with each step of a flight, and at its end."""
+        self.chip.position = self.drone.get_location().to_vector()
+        if started or self.drone.path is not None:
+            self._time.call_at(self._time.now_s + _FLIGHT_STEP_S, self._moves, False)
 
     def start(self) -> None:
         """Start the mesh software."""
@@ -107,6 +133,7 @@ class EmulatedMesh:
         self.clock = clock
         self.air = Air(self.clock, links, random.Random(f"{seed} air"))
         self.nodes: dict[int, EmulatedNode] = {}
+        self.events: list[MeshEvent] = []  # appended by the nodes' threads
         self._seed = seed
         self._settings = settings
         self._timing = timing or MeshTiming()
@@ -122,14 +149,14 @@ class EmulatedMesh:
     def _add(self, node_id: int, place: Position, *, gateway: bool) -> None:
         rng = random.Random(f"{self._seed} radio {node_id}")
         node = EmulatedNode(self.air, node_id, place, self._settings, rng)
-        engine = GroundEngine(node_id, Location.from_vector(place))
         node.component = assemble_component(
             node_id,
             node.antenna,
-            engine,
+            node.drone,
             random.Random(f"{self._seed} mesh {node_id}"),
             internet=NoInternet() if gateway else None,
             timing=self._timing,
+            observer=self.events.append,
         )
         self.nodes[node_id] = node
         node.start()
@@ -155,6 +182,21 @@ class EmulatedMesh:
         """Switch a node's antenna, by that node's own thread."""
         antenna = self.nodes[node_id].antenna
         self.nodes[node_id].submit(lambda _now_s: antenna.switch_power(on))
+
+    def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> None:
+        """Order a drone to (x, y, height) metres through a gateway, by that gateway's thread."""
+        component = self.nodes[gateway].component
+        if not isinstance(component, MeshnetworkGateway):
+            raise ValueError(f"node {gateway} is a router: orders go through a gateway")
+
+        def send(now_s: float) -> None:
+            component.send_goal_request_to_drone(node_id, y, x, height, now_s)
+
+        self.nodes[gateway].submit(send)
+
+    def connected(self, node_id: int) -> bool:
+        """Whether a node is connected to a gateway."""
+        return self.nodes[node_id].component.get_connected_to_gateway()
 
     def hops(self, node_id: int) -> int:
         """Hops to the gateway; 255 while not connected."""

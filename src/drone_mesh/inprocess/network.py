@@ -249,6 +249,10 @@ class Network:
             self.clock.run_until(min(deadline_s, self.clock.now_s + STEP_S))
         return True
 
+    def now_s(self) -> float:
+        """Simulated seconds since the start."""
+        return self.clock.now_s
+
     # Looking ---------------------------------------------------------------------------------
 
     def status(self) -> MeshStatus:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 from typing import Callable
 
 from drone_mesh.communication.interfaces import (
@@ -21,6 +22,7 @@ from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
 from drone_mesh.nrf24.medium_access import EVERYBODY, Fate, MediumAccess, Outgoing
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
+from drone_mesh.nrf24.statistics import RadioStatistics
 from drone_mesh.nrf24.transceiver import TX_DELAY_S
 
 SETTLING_S = SETTLING_NS / NS_PER_S
@@ -64,8 +66,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         self._answered = False
         self._last_taken: Outgoing | None = None  # the packet that came last on the own address
         self._unread = 0  # payloads in the FIFO
-        self.given_up = 0
-        self.packets = 0
+        self._radio = RadioStatistics()
 
     # IWirelessCommunication ------------------------------------------------------------------
 
@@ -111,6 +112,10 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         """Whether it has power."""
         return self.powered
 
+    def statistics(self) -> RadioStatistics:
+        """The counters as they are now."""
+        return replace(self._radio, **self.access.figures())
+
     def switch_power(self, on: bool) -> None:
         """Power on or off; what waits to be sent is dropped."""
         self.powered = on
@@ -144,6 +149,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
 
     def _send_frame(self, packet: Outgoing) -> None:
         if packet is self._trying:
+            self._radio.airtime_s += self._settings.frame_s
             self._air.transmit(self, packet)
 
     def frame_left(self, frame: Transmission) -> None:
@@ -163,6 +169,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         self.listening_since_s = None
         if self._retransmits > 0:
             self._retransmits -= 1
+            self._radio.retries += 1
             self._clock.call_at(self._clock.now_s + SETTLING_S, self._send_frame, frame.packet)
         else:
             self._finish(False)
@@ -185,7 +192,6 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
             return
         fate = self.access.tried(packet, acknowledged, now_s)
         if fate is Fate.GIVEN_UP and self._mesh is not None:
-            self.given_up += 1
             mesh = self._mesh
             self._submit(lambda now_s: mesh.on_undelivered(packet.payload, now_s))
         self._plan()
@@ -213,10 +219,12 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
             self._clock.call_at(now_s + SETTLING_S, self._answer, frame)
 
     def _answer(self, frame: Transmission) -> None:
+        self._radio.airtime_s += self._settings.answer_frame_s
         self._air.transmit(self, frame.packet, answers=frame.sender)
 
     def _read(self, arrived: tuple[int, Outgoing]) -> None:
         self._unread -= 1
+        self._radio.received += 1
         sender_id, packet = arrived
         mesh = self._mesh
         if mesh is None or not self.powered:

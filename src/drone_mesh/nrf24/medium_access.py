@@ -27,6 +27,7 @@ import math
 import random
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 from drone_mesh.errors import ConfigurationError
 
@@ -215,9 +216,9 @@ class MediumAccess:
         packet.not_before_s = now_s + self._pause_s(packet.tries)
         return Fate.WAITS
 
-    def figures(self) -> dict[str, int]:
-        """Packets by what became of them, as RadioStatistics names them."""
-        return dict(self._counts)
+    def figures(self) -> dict[str, Any]:
+        """Packets by what became of them, and the state of the queue, as in RadioStatistics."""
+        return {**self._counts, "waiting": self._waiting, "contention": self.contention}
 
     @property
     def patience(self) -> float:

@@ -19,4 +19,12 @@ class RadioStatistics:
     corrupt: int = 0  # damaged frames that passed the CRC; dropped
     restarts: int = 0  # the chip had lost its settings, or hung, and was set up again
     irq_fallbacks: int = 0  # the IRQ pin failed; polling instead
+    airtime_s: float = 0.0  # of the frames that it sent, acknowledgements included
+    waiting: int = 0  # packets in the queue now
+    contention: float = 0.0  # share of first tries that failed lately, as the sender estimates it
     duplicates: int = 0  # seen by the antenna: the same packet from the same node again, at once
+
+    @property
+    def tries_per_packet(self) -> float:
+        """Of packets that were delivered or given up; 1 while there are none."""
+        return 1.0 + self.tries / self.sent if self.sent else 1.0

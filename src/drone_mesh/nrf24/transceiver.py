@@ -28,6 +28,7 @@ from drone_mesh.nrf24.registers import (
 )
 from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import (
+    OWN_PIPE,
     BroadcastMode,
     DataRate,
     RadioSettings,
@@ -168,6 +169,7 @@ class Transceiver:
         flags = self._pulse(self._settings.acknowledged_s)
         retransmits = ARC_CNT.get(self._link.read_byte(Register.OBSERVE_TX))
         self._statistics.retries += retransmits
+        self._statistics.airtime_s += (retransmits + 1) * self._settings.frame_s
         self._link.write_byte(Register.STATUS, TX_DS.mask | MAX_RT.mask)
         if not flags & TX_DS.mask:
             return None
@@ -184,6 +186,7 @@ class Transceiver:
         self.drop()
         self._write_payload(payload, Command.W_TX_PAYLOAD_NO_ACK)
         self._pulse(settings.broadcast_s)
+        self._statistics.airtime_s += settings.frame_s
         self._link.write_byte(Register.STATUS, TX_DS.mask)
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes)
@@ -212,6 +215,8 @@ class Transceiver:
                 payload = self._link.command(Command.R_RX_PAYLOAD, bytes(PAYLOAD_BYTES))
                 self.inbox.append(Received(pipe, payload))
                 self._statistics.received += 1
+                if pipe == OWN_PIPE:
+                    self._statistics.airtime_s += self._settings.answer_frame_s
             self._link.write_byte(Register.STATUS, RX_DR.mask)
         return found
 

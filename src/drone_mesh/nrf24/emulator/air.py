@@ -12,6 +12,7 @@ import math
 import random
 from typing import Callable, Protocol, Sequence, Tuple
 
+from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
@@ -81,6 +82,7 @@ class Air:
         self._distances: dict[tuple[Antenna, Antenna], float] = {}
         self._observers: list[FlightObserver] = []
         self.frames = 0  # that have been on the air
+        self.airtime_s = 0.0  # of all frames together
         self.collisions = 0  # frames that a receiver lost because of another frame
 
     def observe(self, observer: FlightObserver) -> None:
@@ -161,6 +163,7 @@ class Air:
         if flight.aborted:
             return
         self.frames += 1
+        self.airtime_s += (flight.end_ns - flight.start_ns) / NS_PER_S
         self._on_channel[flight.channel].remove(flight)
         # First the sender: it must be listening when the answer to its frame begins.
         flight.sender.frame_left()

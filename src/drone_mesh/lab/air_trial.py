@@ -1,0 +1,350 @@
+"""One mesh on a shared channel, on emulated chips or on the fast model, and its figures."""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+from dataclasses import dataclass, replace
+from typing import Iterable, Protocol
+
+from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.inprocess.network import Network
+from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
+from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
+from drone_mesh.nrf24.settings import RadioSettings, data_rate
+
+CHIPS, MODEL = "chips", "model"
+SAMPLE_S = 0.1  # how closely the connection of the nodes is looked at
+SETTLE_S = 20.0  # from "all connected" to what the trial is about
+GATEWAY = 0
+
+
+@dataclass(frozen=True)
+class AirTrial:
+    """A gateway and routers on a grid, or at given places."""
+
+    nodes: int
+    rate: str = "250k"
+    spacing_m: float = 6.0
+    links: str = "disc"  # or "distance": the power falls with it, the edge of the range at 9 m
+    loss: float = 0.0  # share of all frames that get lost by decision
+    seed: int = 1
+    places: tuple[tuple[float, float], ...] = ()  # x, y of the routers 1, 2, ...; none: a grid
+
+    def router_places(self) -> tuple[tuple[float, float], ...]:
+        """x, y in metres of the routers 1, 2, ..."""
+        if self.places:
+            return self.places
+        columns = max(1, round((self.nodes - 1) ** 0.5))
+        grid = (divmod(index, columns) for index in range(self.nodes - 1))
+        return tuple((self.spacing_m * column, self.spacing_m * row) for row, column in grid)
+
+
+class AirMesh(Protocol):
+    """What both kinds of mesh offer."""
+
+    events: list[MeshEvent]
+
+    def now_s(self) -> float: ...
+    def run_for(self, seconds: float) -> None: ...
+    def all_connected(self) -> bool: ...
+    def connected(self, node_id: int) -> bool: ...
+    def power(self, node_id: int, on: bool) -> None: ...
+    def next_hop(self, node_id: int) -> int: ...
+    def place(self, node_id: int) -> Location: ...
+    def order(self, node_id: int, x: float, y: float) -> object: ...
+    def stop(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What one trial showed."""
+
+    connected_s: float  # when all were connected for the first time; infinity: never
+    share: float  # of node-seconds connected after that, gateway left out
+    frames: int
+    collided: float  # receptions that another frame destroyed, per frame
+    airtime: float  # of all frames together, share of the time
+    lost: int  # packets that were given up
+    tries: float  # per delivered packet
+    simulated_s: float
+    cpu_s: float
+    warnings: int  # misuse of chips
+
+
+class ChipMesh:
+    """The mesh on emulated chips."""
+
+    def __init__(self, trial: AirTrial) -> None:
+        settings = RadioSettings(data_rate=data_rate(trial.rate))
+        self.mesh = EmulatedMesh(VirtualClock(), _links(trial), trial.seed, settings=settings)
+        self.mesh.add_gateway(GATEWAY, (-1.0, 0.0, 0.0))
+        for index, (x, y) in enumerate(trial.router_places()):
+            self.mesh.add_router(index + 1, (x, y, 0.0))
+        self.events = self.mesh.events
+        self.now_s, self.run_for = self.mesh.now_s, self.mesh.run_for
+        self.all_connected, self.connected = self.mesh.all_connected, self.mesh.connected
+        self.power, self.order, self.stop = self.mesh.power, self.mesh.order, self.mesh.stop
+
+    def next_hop(self, node_id: int) -> int:
+        """Of a node towards its gateway."""
+        return self.mesh.nodes[node_id].component.get_route_to_gateway()
+
+    def place(self, node_id: int) -> Location:
+        """Where a drone is."""
+        return self.mesh.nodes[node_id].drone.get_location()
+
+    def figures(self) -> dict[str, float]:
+        """Of the air and of all radios."""
+        air, nodes = self.mesh.air, self.mesh.nodes.values()
+        radios = [node.antenna.statistics() for node in nodes]
+        return _totals(
+            air.frames,
+            air.collisions,
+            air.airtime_s,
+            [(radio.acknowledged, radio.lost, radio.tries) for radio in radios],
+            sum(len(node.chip.warnings) for node in nodes),
+        )
+
+
+class ModelMesh:
+    """The mesh on the fast model."""
+
+    def __init__(self, trial: AirTrial) -> None:
+        self.network = Network(
+            seed=trial.seed, radio="shared", rate=trial.rate, links=_links(trial)
+        )
+        self.network.add_gateway(GATEWAY, -1.0, 0.0)
+        for index, (x, y) in enumerate(trial.router_places()):
+            self.network.add_router(index + 1, x, y)
+        self.events = self.network.events
+        self.now_s, self.run_for = self.network.now_s, self.network.run_for
+        self.all_connected, self.connected = self.network.all_connected, self.network.connected
+        self.power, self.order, self.place = (
+            self.network.power,
+            self.network.order,
+            self.network.location,
+        )
+
+    def next_hop(self, node_id: int) -> int:
+        """Of a node towards its gateway."""
+        return self.network.nodes[node_id].component.get_route_to_gateway()
+
+    def stop(self) -> None:
+        """Nothing to end."""
+
+    def figures(self) -> dict[str, float]:
+        """Of the air and of all radios."""
+        air = self.network.air
+        radios = [node.antenna.statistics() for node in self.network.nodes.values()]
+        return _totals(
+            air.frames,
+            air.collisions,
+            air.airtime_s,
+            [(radio.acknowledged, radio.lost, radio.tries) for radio in radios],
+            0,
+        )
+
+
+def make_mesh(trial: AirTrial, kind: str) -> ChipMesh | ModelMesh:
+    """The mesh of a trial on CHIPS or on the MODEL; all its nodes start at once."""
+    return ChipMesh(trial) if kind == CHIPS else ModelMesh(trial)
+
+
+def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> Figures:
+    """Wait until all are connected, at most `within_s`, and watch them for `after_s` more."""
+    cpu_s = time.process_time()
+    mesh = make_mesh(trial, kind)
+    connected_s = connect(mesh, within_s)
+    share = 0.0
+    if connected_s < math.inf:
+        share = share_connected(mesh, range(1, trial.nodes), after_s)
+    figures = mesh.figures()
+    simulated_s = mesh.now_s()
+    mesh.stop()
+    return Figures(
+        connected_s,
+        share,
+        int(figures["frames"]),
+        figures["collided"],
+        figures["airtime_s"] / simulated_s,
+        int(figures["lost"]),
+        figures["tries"],
+        simulated_s,
+        time.process_time() - cpu_s,
+        int(figures["warnings"]),
+    )
+
+
+def connect(mesh: AirMesh, within_s: float) -> float:
+    """When all were connected; infinity if that took longer than `within_s`."""
+    until_s = mesh.now_s() + within_s
+    while not mesh.all_connected():
+        if mesh.now_s() >= until_s:
+            return math.inf
+        mesh.run_for(SAMPLE_S)
+    return mesh.now_s()
+
+
+def share_connected(mesh: AirMesh, nodes: Iterable[int], seconds: float) -> float:
+    """Share of node-seconds that these nodes are connected."""
+    nodes = list(nodes)
+    samples = round(seconds / SAMPLE_S)
+    connected = 0
+    for _ in range(samples):
+        mesh.run_for(SAMPLE_S)
+        connected += sum(map(mesh.connected, nodes))
+    return connected / (samples * len(nodes))
+
+
+@dataclass(frozen=True)
+class Losses:
+    """What became of a mesh in which nodes died."""
+
+    back_s: float  # after the deaths: the last moment at which a node with a path was unconnected
+    cut_off: int  # survivors without any path to the gateway
+    flights: int  # by decision of a node that had a path: congestion is the only reason for those
+    flown: tuple[int, ...]  # all that flew by decision
+
+
+def kill(
+    trial: AirTrial, kind: str, dead: Iterable[int], seconds: float, repair: bool = False
+) -> Losses:
+    """Connect, switch nodes off, and watch the survivors that still have a path.
+
+    `repair`: watch all survivors, for a drone is expected to fly for the others.
+    """
+    mesh = make_mesh(trial, kind)
+    connect(mesh, 120.0)
+    mesh.run_for(SETTLE_S)
+    dead = frozenset(dead)
+    for node in sorted(dead):
+        mesh.power(node, False)
+    died_s = mesh.now_s()
+    alive = [node for node in range(trial.nodes) if node not in dead]
+    reachable = with_a_path({node: mesh.place(node) for node in alive})
+    watched = [node for node in alive if node != GATEWAY] if repair else reachable
+    last_s = 0.0
+    while mesh.now_s() < died_s + seconds:
+        mesh.run_for(SAMPLE_S)
+        if not all(map(mesh.connected, watched)):
+            last_s = mesh.now_s() - died_s
+    flown = [
+        event.node
+        for event in mesh.events
+        if event.kind is MeshEventKind.FLIGHT_DECIDED and event.now_s >= died_s
+    ]
+    mesh.stop()
+    return Losses(
+        last_s,
+        len(alive) - len(reachable) - 1,
+        sum(node in reachable for node in flown),
+        tuple(sorted(set(flown))),
+    )
+
+
+def with_a_path(places: dict[int, Location]) -> frozenset[int]:
+    """The nodes, gateway left out, that a chain of links of the ideal disc leads to it."""
+    found, edge = {GATEWAY}, [GATEWAY]
+    while edge:
+        here = places[edge.pop()]
+        for node, place in places.items():
+            if node not in found and here.distance_m(place) < MAX_DISTANCE_M:
+                found.add(node)
+                edge.append(node)
+    return frozenset(found - {GATEWAY})
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What became of orders."""
+
+    sent: int
+    in_time: int  # reached their drone within two seconds
+    later: int
+    reported: int  # of the rest: the gateway that sent them said so
+
+
+def give_orders(trial: AirTrial, kind: str, count: int, relays: bool) -> Orders:
+    """One order a second to a random drone, to stay where it is.
+
+    A drone that gets an order forgets its routes, as the protocol wants it, and all behind it have
+    to find others. `relays`: also such drones get orders that others depend on.
+    """
+    mesh = make_mesh(trial, kind)
+    connect(mesh, 120.0)
+    mesh.run_for(SETTLE_S)
+    rng = random.Random(f"{trial.seed} orders")
+    sent: list[tuple[float, int]] = []
+    for _ in range(count):
+        nodes = range(1, trial.nodes)
+        used = set() if relays else {mesh.next_hop(node) for node in nodes}
+        used |= {node for _, node in sent[-10:]}  # the same order twice in a row changes nothing
+        node = rng.choice([node for node in nodes if node not in used and mesh.connected(node)])
+        place = mesh.place(node)
+        sent.append((mesh.now_s(), node))
+        mesh.order(node, place.longitude, place.latitude)
+        mesh.run_for(1.0)
+    mesh.run_for(10.0)
+    mesh.stop()
+    took = [_first_s(mesh.events, MeshEventKind.FLIGHT_ORDERED, node, at_s) for at_s, node in sent]
+    missed = [order for order, took_s in zip(sent, took) if took_s > 10.0]
+    return Orders(
+        len(sent),
+        sum(took_s <= 2.0 for took_s in took),
+        sum(2.0 < took_s <= 10.0 for took_s in took),
+        sum(_reported(mesh.events, node, at_s) for at_s, node in missed),
+    )
+
+
+def _first_s(events: list[MeshEvent], kind: MeshEventKind, node: int, since_s: float) -> float:
+    """How long after `since_s` that happened to the node first; infinity: not at all."""
+    after = (e.now_s - since_s for e in events if e.kind is kind and e.node == node)
+    return min((passed_s for passed_s in after if passed_s >= 0), default=math.inf)
+
+
+def _reported(events: list[MeshEvent], node: int, since_s: float) -> bool:
+    return any(
+        event.kind is MeshEventKind.NO_ROUTE
+        and event.node == GATEWAY
+        and event.peer == node
+        and 0.0 <= event.now_s - since_s <= 10.0
+        for event in events
+    )
+
+
+def with_seed(trial: AirTrial, seed: int) -> AirTrial:
+    """The same trial with another seed."""
+    return replace(trial, seed=seed)
+
+
+def _links(trial: AirTrial) -> LinkModel:
+    links: LinkModel = IdealDisc(MAX_DISTANCE_M)
+    if trial.links == "distance":
+        links = LogDistance.with_edge_at(MAX_DISTANCE_M, random.Random(f"{trial.seed} links"))
+    if trial.loss:
+        rng = random.Random(f"{trial.seed} loss")
+        return ScriptedLoss(links, lambda _hop: rng.random() < trial.loss)
+    return links
+
+
+def _totals(
+    frames: int,
+    collisions: int,
+    airtime_s: float,
+    packets: list[tuple[int, int, int]],
+    warnings: int,
+) -> dict[str, float]:
+    acknowledged, lost, tries = (sum(column) for column in zip(*packets))
+    return {
+        "frames": frames,
+        "collided": collisions / max(frames, 1),
+        "airtime_s": airtime_s,
+        "lost": lost,
+        "tries": 1 + tries / max(acknowledged, 1),
+        "warnings": warnings,
+    }
