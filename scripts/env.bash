@@ -16,6 +16,10 @@ if [ -e "$drone_mesh_root/build/devel/setup.bash" ]; then
   if [ -z "$ROS_HOSTNAME$ROS_IP" ] && ! getent hosts "$(uname -n)" >/dev/null; then
     export ROS_HOSTNAME=localhost
   fi
+  if [[ $- == *i* && -n $BASH_VERSION ]]; then
+    # shellcheck source=scripts/completion.bash
+    . "$drone_mesh_root/scripts/completion.bash"
+  fi
   unset drone_mesh_root
 else
   unset drone_mesh_root
