@@ -11,7 +11,7 @@ simulation_requirements=(requirements/{console,http,report,simulation}.txt)
 if [ -e "$noetic" ]; then
   ros_packages=(
     cmake g++ make python3-setuptools
-    ros-noetic-{catkin,diagnostic-msgs,geometry-msgs,message-generation,message-runtime,rosbag}
+    ros-noetic-{catkin,diagnostic-msgs,diagnostic-updater,geometry-msgs,message-generation,message-runtime,rosbag}
     ros-noetic-{rosbash,rosgraph-msgs,roslaunch,rosmsg,rosnode,rosparam,rospy,rosservice,rostest}
     ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
   )
@@ -24,7 +24,8 @@ else
     libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev librostest-dev
     libstd-msgs-dev libtf2-msgs-dev libvisualization-msgs-dev
     ros-{diagnostic,geometry,rosgraph,std,tf2,visualization}-msgs
-    python3-{diagnostic,geometry,tf2,visualization}-msgs python3-rospy python3-rostest
+    python3-{diagnostic,geometry,tf2,visualization}-msgs python3-diagnostic-updater
+    python3-rospy python3-rostest
   )
   screen_packages=(chromium libgl1 libxtst6 tshark xvfb)
   rviz_package=rviz

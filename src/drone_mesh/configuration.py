@@ -19,6 +19,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
 MAX_DRONES = MAX_NODE_ID + 1
+MIN_REAL_TIME_FACTOR = 0.001  # our choice: one step of the world in 10 s
 MAX_REAL_TIME_FACTOR = 1000.0  # our choice: beyond it the clock's steps are no longer seen
 MAX_SEED = 2**32 - 1
 RANDOM_SEED = "random"  # asks for a new seed where the file has a fixed one
@@ -42,7 +43,11 @@ class FactoryConfiguration:
     spacing: float = Field(1.0, gt=0, le=1000, description="metres")  # between routers
     gui: bool = Field(False)
     real_time_factor: float = Field(
-        1.0, ge=0, le=MAX_REAL_TIME_FACTOR, description="a factor (0: as fast as possible)"
+        1.0,
+        description=(
+            f"a factor, {MIN_REAL_TIME_FACTOR:g}..{MAX_REAL_TIME_FACTOR:g}, "
+            "or 0 for as fast as possible"
+        ),
     )
     max_distance: float = Field(MAX_DISTANCE_M, gt=0, le=10_000, description="metres")
     radio: Literal["virtual", "nrf24"] = Field("virtual")  # nrf24: the driver on emulated chips
@@ -59,6 +64,13 @@ class FactoryConfiguration:
     def _not_a_switch_for_a_number(cls, value: object, info: Any) -> object:
         if isinstance(value, bool) and info.field_name not in _SWITCHES:
             raise ValueError("true and false are not numbers")
+        return value
+
+    @field_validator("real_time_factor")
+    @classmethod
+    def _zero_or_in_bounds(cls, value: float) -> float:
+        if value != 0 and not MIN_REAL_TIME_FACTOR <= value <= MAX_REAL_TIME_FACTOR:
+            raise ValueError("out of bounds")
         return value
 
 

@@ -21,7 +21,7 @@ class SubscribeListener:
 
 class Publisher:
     name: str
-    impl: TopicImpl
+    impl: TopicImpl | None  # None once it is closed
     def __init__(
         self,
         name: str,

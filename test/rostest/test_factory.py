@@ -57,9 +57,22 @@ class FactoryTest(unittest.TestCase):
         stopped_s = rospy.get_time()
         time.sleep(0.5)  # in which nothing may happen
         self.assertEqual(rospy.get_time(), stopped_s)
-        self.assertFalse(call("/DroneFactory/setSpeed", SetSpeed, False, math.nan).success)
         self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 0.0).success)
         wait_for("the clock did not go on", 10, lambda: rospy.get_time() > stopped_s + 1.0)
+
+    def test_a_speed_out_of_bounds_is_refused_with_the_bounds(self) -> None:
+        for factor in (math.nan, math.inf, -1.0, 1e-300, 1e-5, 100_000.0):
+            answer = call("/DroneFactory/setSpeed", SetSpeed, False, factor)
+            self.assertFalse(answer.success, factor)
+            self.assertIn("want 0.001..1000", answer.message)
+
+    def test_a_new_speed_takes_effect_during_the_wait_for_a_step_at_the_old_one(self) -> None:
+        self.addCleanup(call, "/DroneFactory/setSpeed", SetSpeed, False, 4.0)
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 0.001).success)
+        stood_s = rospy.get_time()
+        self.assertTrue(call("/DroneFactory/setSpeed", SetSpeed, False, 4.0).success)
+        # At 0.001 the world makes one step in 10 s.
+        wait_for("the clock to go on", 5, lambda: rospy.get_time() > stood_s + 1.0)
 
     def test_drones_start_where_the_protocol_says(self) -> None:
         self.assertEqual(self.start_places, [(-1.0, 0.0, 0), (0.0, 0.0, 0), (1.0, 0.0, 0)])

@@ -37,7 +37,7 @@ _log = logging.getLogger(__name__)
 class DroneManager:
     """Passes orders from users and layouts to the gateways.
 
-    Parameters (private): ~casus (a YAML file with layouts; config/casus.yaml by default)
+    Parameters (private): ~casus (a YAML file of layouts; config/casus.yaml by default)
     Publishes:  /gateway (RequestGatewayDroneFlight)
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
                 (Casus)
@@ -57,7 +57,7 @@ class DroneManager:
         rospy.Service(names.SET_TO_CASUS_SERVICE, Casus, self._set_to_casus)
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
-        """Status 1: at least one gateway got the order; 0: there is none."""
+        """Status 1: at least one gateway received the order; 0: there is no gateway."""
         goal = location_of(request)
         try:
             check_goal(*goal)
@@ -90,7 +90,8 @@ class DroneManager:
         """Whether a gateway subscribes; waits for one, since it may be starting."""
         deadline_s = time.monotonic() + WAIT_FOR_GATEWAY_S
         while not rospy.is_shutdown():
-            self._gateways.impl.check()  # a killed gateway leaves its connection behind
+            if self._gateways.impl is not None:
+                self._gateways.impl.check()  # drops what a killed gateway left behind
             if self._gateways.get_num_connections() > 0:
                 return True
             if time.monotonic() >= deadline_s:

@@ -6,13 +6,9 @@ docs/protocol.md, "Wireless signal simulator".
 from __future__ import annotations
 
 import logging
-import socket
-import struct
 import threading
-import warnings
 
 import rospy
-from rospy.impl.transport import Transport
 
 from drone_mesh.air.node import AirError
 from drone_mesh.air.node_table import NodeTable
@@ -24,6 +20,7 @@ from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.figures import Figures
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import factory_configuration, or_stop
+from drone_mesh.ros.services.antenna_topic import AntennaTopic
 from drone_mesh.srv import (
     AreaScan,
     AreaScanRequest,
@@ -40,66 +37,16 @@ from drone_mesh.srv import (
 )
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE
 
-STUCK_RECEIVER_S = 0.2  # our choice: a receiver that does not read for so long is disconnected
-
 _log = logging.getLogger(__name__)
-
-
-class _Listener(rospy.SubscribeListener):
-    """The topic of one antenna. `deliver` reports whether a receiver is connected."""
-
-    def __init__(self, topic: str) -> None:
-        self.has_listened = False  # set by rospy's thread: the first receiver has connected
-        with warnings.catch_warnings():
-            # No queue on purpose: it costs a thread and two switches per packet, and hides that a
-            # receiver has gone. peer_subscribe limits how long a stuck receiver can block.
-            warnings.simplefilter("ignore", SyntaxWarning)
-            self._publisher = rospy.Publisher(
-                topic, NRF24, subscriber_listener=self, tcp_nodelay=True, queue_size=None
-            )
-
-    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
-        """Limit how long a stuck receiver can block a sender; then it is disconnected."""
-        self.has_listened = True
-        timeval = struct.pack("@ll", 0, int(STUCK_RECEIVER_S * 1e6))
-        for connection in self._connections():
-            if connection.socket is not None:
-                connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
-
-    def deliver(self, message: NRF24) -> bool:
-        """Publish; False if there is no receiver."""
-        if not self.has_receiver():
-            return False
-        try:
-            self._publisher.publish(message)
-        except rospy.ROSException:  # the topic was closed meanwhile
-            return False
-        return bool(self._connections())
-
-    def has_receiver(self) -> bool:
-        """Whether the topic has a subscriber that is still there."""
-        implementation = self._publisher.impl  # None once it is closed
-        if implementation is None or not implementation.has_connections():
-            return False
-        # A killed process leaves its connection behind; rospy notices only at the second write.
-        implementation.check()
-        return bool(implementation.has_connections())
-
-    def close(self) -> None:
-        self._publisher.unregister()
-
-    def _connections(self) -> list[Transport]:
-        implementation = self._publisher.impl
-        return [] if implementation is None else implementation.connections
 
 
 class WirelessSignalSimulator:
     """The simulated air: knows the position of each antenna and delivers packets within range.
 
-    Parameters (private): ~max_distance (float, metres), ~config (the YAML file that has it
-                otherwise; config/factory.yaml by default)
+    Parameters (private): ~max_distance (float, metres), overriding the YAML file in ~config
+                (config/factory.yaml by default)
     Subscribes: /WirelessSignalSimulator (DroneInfo)
-    Publishes:  the topic that each antenna announced, usually /Node/<id> (NRF24)
+    Publishes:  the topic in each antenna's DroneInfo, usually /Node/<id> (NRF24)
     Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
                 (AreaScan), /SignalSimulator/messages (WirelessMessages),
                 /SignalSimulator/broadcast (Broadcast)
@@ -114,11 +61,11 @@ class WirelessSignalSimulator:
         self._nodes = NodeTable(max_distance_m)
         self._lock = threading.Lock()
         self._opening = threading.Lock()
-        self._listeners: dict[str, _Listener] = {}
+        self._antenna_topics: dict[str, AntennaTopic] = {}
         self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
         self._complaints = ThrottledLog(_log)
         self._delivered = self._lost = 0
-        # The services first: an antenna that sees our subscription may call at once.
+        # The services first: a host that sees the subscription may call at once.
         rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
         rospy.Service(names.MESSAGES_SERVICE, WirelessMessages, self._messages)
         rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
@@ -137,33 +84,37 @@ class WirelessSignalSimulator:
             self._complaints.warning("DroneInfo dropped", str(error))
             return
         if info.sub and (known is None or known.topic != info.sub):
-            self._listen_on(info.nodeID, info.sub)
+            if known is not None and known.topic:
+                self._complaints.warning(
+                    "topic changed", f"node {info.nodeID}: from {known.topic} to {info.sub}"
+                )
+            self._open(info.nodeID, info.sub)
 
-    def _listen_on(self, node_id: int, topic: str) -> None:
+    def _open(self, node_id: int, topic: str) -> None:
         with self._opening:
             old_topic = self._topics.get(node_id)
             self._topics[node_id] = topic
-            if topic not in self._listeners:
-                self._listeners[topic] = _Listener(topic)
+            if topic not in self._antenna_topics:
+                self._antenna_topics[topic] = AntennaTopic(topic)
             if old_topic is not None and old_topic not in self._topics.values():
-                self._listeners.pop(old_topic).close()
+                self._antenna_topics.pop(old_topic).close()
         _log.debug("node %d listens on %s", node_id, topic)
 
     def _check_topic_type(self, info: DroneInfo) -> None:
-        """Raise AirError for a topic of another type, such as /clock."""
-        if info.sub in self._listeners or info.sub == names.node_topic(info.nodeID):
+        """Refuse to publish packets on a topic of another type, such as /clock."""
+        if info.sub in self._antenna_topics or info.sub == names.node_topic(info.nodeID):
             return
         for topic, kind in rospy.get_published_topics():
             if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
-                raise AirError(f"node {info.nodeID}: topic {info.sub[:60]} has type {kind}")
+                raise AirError(f"node {info.nodeID}: {info.sub[:60]} is a topic of type {kind}")
 
     def _message(self, request: WirelessMessageRequest) -> WirelessMessageResponse:
         with self._lock:
             topic = self._nodes.link(request.from_, request.to)
         if topic is None:
             return WirelessMessageResponse(False)
-        if request.from_ == request.to:  # the probe of an antenna: is it registered?
-            listener = self._listeners.get(topic)
+        if request.from_ == request.to:  # an antenna's probe for its own registration
+            listener = self._antenna_topics.get(topic)
             return WirelessMessageResponse(
                 listener is not None and listener.deliver(request.message)
             )
@@ -173,7 +124,7 @@ class WirelessSignalSimulator:
         joined = request.packets
         if len(joined) % PAYLOAD_BYTES:
             raise rospy.ServiceException(
-                f"invalid length of packets {len(joined)}: must be a multiple of {PAYLOAD_BYTES}"
+                f"packets: {len(joined)} bytes, want {PAYLOAD_BYTES} per packet"
             )
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:
@@ -213,17 +164,17 @@ class WirelessSignalSimulator:
             raise rospy.ServiceException(str(error)) from None
 
     def _is_heard(self, topic: str | None) -> bool:
-        listener = None if topic is None else self._listeners.get(topic)
+        listener = None if topic is None else self._antenna_topics.get(topic)
         return listener is not None and listener.has_receiver()
 
     def _carry(self, topic: str, message: NRF24) -> bool:
-        listener = self._listeners.get(topic)
+        listener = self._antenna_topics.get(topic)
         delivered = listener is not None and listener.deliver(message)
         with self._lock:
             if delivered:
                 self._delivered += 1
             elif listener is not None and listener.has_listened:
-                self._lost += 1  # before that the node is still starting and loses nothing
+                self._lost += 1  # before that, it has not joined the air yet
         return delivered
 
     def _figures(self) -> dict[str, float]:
@@ -238,5 +189,5 @@ def main() -> None:
     max_distance_m = or_stop(lambda: factory_configuration("max_distance")).max_distance
     show_library_logs_on_rosout()
     WirelessSignalSimulator(max_distance_m)
-    _log.info("range of the radios: %g m", max_distance_m)
+    _log.info("nodes closer than %g m hear each other", max_distance_m)
     rospy.spin()

@@ -7,10 +7,9 @@ from typing import Mapping, Sequence
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from drone_mesh.ros.graph.conversions import ros_time
+from drone_mesh.ros.graph.figures import HARDWARE_ID
 from drone_mesh.state.model import MeshStatus, NodeStatus
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
-
-HARDWARE_ID = "drone_mesh"
 
 
 def diagnostics_msg(mesh: MeshStatus) -> DiagnosticArray:

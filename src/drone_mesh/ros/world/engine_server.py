@@ -35,7 +35,9 @@ class PositionReporter(rospy.SubscribeListener):
             names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
         )
         # Added once the publisher exists; the report below is for earlier subscribers.
-        self._publisher.impl.add_subscriber_listener(self)
+        implementation = self._publisher.impl
+        assert implementation is not None  # it is not closed yet
+        implementation.add_subscriber_listener(self)
         self._report_all()
 
     def report(self, info: DroneInfo) -> None:
