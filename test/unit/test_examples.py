@@ -1,11 +1,17 @@
 """The examples do what the documents say they do."""
 
 import os
+import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+
+from drone_mesh.drone.engines import FlightOptions, create_engine
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import LocationUnknown
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -45,3 +51,28 @@ def test_two_routing_techniques_are_compared_and_one_run_is_drawn(run_example, t
     assert [row[0] for row in rows] == ["child_table_tree", "__main__:SteadyTree"]
     assert all(row[1] == "100.0%" for row in rows)
     assert "</html>" in (tmp_path / "run.html").read_text(encoding="utf-8")
+
+
+def test_an_engine_of_ones_own_is_chosen_by_name_and_flies(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        monkeypatch.setenv("DRONE_PORT", str(listener.getsockname()[1]))
+        monkeypatch.syspath_prepend(str(ROOT / "examples"))
+        engine = create_engine(3, Location(0, 0, 0), FlightOptions(drone="own_engine:OwnEngine"))
+        drone, _ = listener.accept()
+        with drone, drone.makefile("rw") as line:
+            with pytest.raises(LocationUnknown):
+                engine.get_location()
+            engine.set_goal(2.5, 1.5, 4)
+            assert line.readline() == "goto 1.5 2.5 4\n"
+            line.write("at 1.5 2.5 4.0\n")
+            line.flush()
+            deadline = time.monotonic() + 10.0
+            while engine._location is None:
+                assert time.monotonic() < deadline, "the place never arrived"
+                time.sleep(0.01)
+            assert engine.get_location() == Location(latitude=2.5, longitude=1.5, height=4.0)
+
+
+def test_an_engine_of_ones_own_takes_forty_lines():
+    lines = (ROOT / "examples" / "own_engine.py").read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= 40

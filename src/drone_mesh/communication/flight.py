@@ -8,7 +8,7 @@ from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
 from drone_mesh.drone.interfaces import IDroneEngine, Location
-from drone_mesh.errors import LocationUnknown
+from drone_mesh.errors import GoalRefused, LocationUnknown
 
 STANDS_STILL_WITHIN_M = 1e-3  # our choice: far below what a drone flies in a second
 ASKS_WITHOUT_ANSWER = 10  # our choice: then the position stays unknown, and the mesh goes on
@@ -64,11 +64,15 @@ class Pilot:
             self._complaints.add("own location unknown", str(error), self._deadlines.now_s)
             return None
 
-    def fly_to(self, goal: Location) -> None:
-        """Start a flight, or change the goal of the present one."""
+    def fly_to(self, goal: Location, step_back: bool = False) -> None:
+        """Start a flight, or change the goal of the present one; `step_back`: for a repair."""
         self._flight = Flight(goal)
         self._ask_position_later()
-        self._engine.set_goal(*goal)
+        fly = self._engine.step_back_to if step_back else self._engine.set_goal
+        try:
+            fly(*goal)
+        except GoalRefused as error:  # the flight is then over at the first look
+            self._complaints.add("goal refused", str(error), self._deadlines.now_s)
 
     def watch(self) -> bool:
         """Look where the drone is; whether the flight is over now."""

@@ -84,7 +84,7 @@ class ConnectionRepair:
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, node)
         self._parts.neighbours.forget_all()
         self._parts.routing.node_moved_location()
-        self._parts.pilot.fly_to(place)
+        self._parts.pilot.fly_to(place, step_back=True)
         self.on_take_off()
 
     def _step_back(self) -> tuple[Location, int] | None:

@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import logging
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from drone_mesh.drone.engines import GROUND, MAVLINK, FlightOptions, create_engine
 from drone_mesh.drone.geodesy import Origin
@@ -13,6 +14,9 @@ from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.drone.mavlink.limits import Permissions
 from drone_mesh.errors import ConfigurationError, LocationUnknown
 from drone_mesh.raspberry.emulated_air import EmulatedAir
+
+if TYPE_CHECKING:  # pymavlink takes a second to load on a Raspberry Pi
+    from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 
 DEMONSTRATION_ORIGIN = Origin(52.0907, 5.1214, 3.0)  # Utrecht; only without --origin
 ALL_PERMISSIONS = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)
@@ -102,6 +106,11 @@ class EmulatedFleet:
             place = _place(engine)
             if place is not None:
                 self.air.move(node_id, place)
+
+    @property
+    def vehicles(self) -> list[MavlinkVehicle]:
+        """The simulated vehicles, by node id; none on the ground."""
+        return self._server.vehicles if self._server is not None else []
 
     def close(self) -> None:
         """End the simulated vehicles; the engines belong to their nodes."""

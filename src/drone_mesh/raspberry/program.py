@@ -142,7 +142,7 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
             fleet.air.radio(node_id, options.radio),
             fleet.engine(node_id),
             options,
-            None if node_id else (_internet(options) or _without_internet),
+            None if node_id else (_internet(options) or without_internet),
         )
         for node_id in range(options.emulated)
     ]
@@ -165,7 +165,8 @@ class _NoInternet(IInternetConnection):
         pass
 
 
-def _without_internet(_submit: Callable[[Work], None]) -> IInternetConnection:
+def without_internet(_submit: Callable[[Work], None]) -> IInternetConnection:
+    """For a gateway that takes no orders."""
     return _NoInternet()
 
 

@@ -67,6 +67,7 @@ class Telemetry:
         self.failsafe = False
         self.home: EarthPlace | None = None
         self.foreign = 0  # messages of other systems
+        self._other_vehicle = False  # its autopilot was heard, and cannot be flown
         self._place: EarthPlace | None = None
         self._place_s = -math.inf
         self._fix = 0
@@ -96,8 +97,11 @@ class Telemetry:
     def on_message(self, message: Message, now_s: float) -> bool:
         """Take note; False for a message of another system, or of an autopilot not known yet."""
         is_heartbeat = message.get_type() == "HEARTBEAT"
-        if is_heartbeat and self.autopilot is None and message.type in MULTIROTORS:
-            self.autopilot = autopilot_of(message.autopilot)
+        if is_heartbeat and self.autopilot is None:
+            if message.type in MULTIROTORS:
+                self.autopilot = autopilot_of(message.autopilot)
+            if message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
+                self._other_vehicle = self.autopilot is None
             self.system_id = message.get_srcSystem()
             self.component_id = message.get_srcComponent()
         sender = (message.get_srcSystem(), message.get_srcComponent())
@@ -114,6 +118,8 @@ class Telemetry:
     def link_trouble(self, now_s: float) -> str:
         """Why the autopilot cannot be relied on now; empty if it can."""
         if self.autopilot is None:
+            if self._other_vehicle:
+                return "the vehicle is no multirotor with ArduPilot or PX4"
             return "no heartbeat from an ArduPilot or PX4 autopilot yet"
         silence_s = now_s - self.heartbeat_s
         if silence_s > HEARTBEAT_LOST_S:
