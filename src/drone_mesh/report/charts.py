@@ -15,6 +15,8 @@ from drone_mesh.report.story import RunStory
 from drone_mesh.view.palette import LIGHT
 
 MOST_NAMED = 12  # events of one kind that are labelled; more would overlap
+LABEL_POINTS = (8, 18)  # above their marks; labels close to each other alternate
+CLOSE_SHARE = 0.07  # of the run: labels closer than this would overlap
 MOST_BARS_NAMED = 40  # nodes whose ids all fit below their bars
 
 
@@ -38,7 +40,7 @@ def timeline_figure(story: RunStory) -> str:
     hops.set_ylabel("hops")
     hops.set_ylim(bottom=0)
     hops.yaxis.set_major_locator(MaxNLocator(4, integer=True))
-    hops.legend(loc="lower right", frameon=False, ncols=2)
+    hops.legend(loc="lower right", frameon=False, ncols=2, labelcolor=LIGHT.ink)
     hops.set_xlabel("simulated time, s")
     for axes in (share, hops):
         axes.set_xlim(times[0], max(times[-1], times[0] + 1))
@@ -67,12 +69,17 @@ def _mark_events(axes: Axes, story: RunStory) -> None:
         (MeshEventKind.POWER_ON, LIGHT.off, "^", lambda node: f"{node} on"),
         (MeshEventKind.FLIGHT_DECIDED, LIGHT.flying, "D", lambda node: f"{node} flies"),
     )
+    length_s = story.samples[-1].stamp_s - story.samples[0].stamp_s
     for kind, colour, shape, words in marks:
         found = [event for event in story.events if event.kind == kind.value]
+        height, before_s = LABEL_POINTS[0], -math.inf
         for event in found:
             axes.plot([event.stamp_s], [104], marker=shape, color=colour, ms=6, clip_on=False)
             if len(found) <= MOST_NAMED:
+                close = event.stamp_s - before_s < CLOSE_SHARE * length_s
+                height = LABEL_POINTS[close and height == LABEL_POINTS[0]]
+                before_s = event.stamp_s
                 axes.annotate(
-                    words(event.node), (event.stamp_s, 104), (4, 8), textcoords="offset points",
-                    size=8, color=colour, annotation_clip=False,
+                    words(event.node), (event.stamp_s, 104), (4, height), size=8, color=colour,
+                    textcoords="offset points", annotation_clip=False,
                 )  # fmt: skip

@@ -18,16 +18,36 @@ MOST_LINKS = 2000  # our choice, per use: a picture of a crowd has no room for m
 LINK_WIDTH = {LinkUse.KNOWN: 0.8, LinkUse.ROUTE: 2.2, LinkUse.LOST: 0.8}  # points
 MOST_WITH_LARGE_DOTS, MOST_WITH_IDS = 40, 100
 POINTS_PER_INCH = 72
+MAP_WIDTH_IN, TITLE_IN, TALLEST_IN = 4.5, 0.9, 6.5
+ROOM_SHARE, LEAST_ROOM_M = 0.08, 3.0
 
 
 def maps_figure(story: RunStory) -> str:
     """Positions before the first loss and at the end, and the paths flown between."""
-    figure, (before, after) = figure_with_columns(5.2, 2)
+    (west, east), (south, north) = (_limits(story, axis) for axis in (0, 1))
+    height_in = MAP_WIDTH_IN * (north - south) / (east - west) + TITLE_IN
+    figure, (before, after) = figure_with_columns(min(height_in, TALLEST_IN), 2)
+    before.set_xlim(west, east)
+    before.set_ylim(south, north)
     _draw_map(before, story.before, f"before, at {story.before.stamp_s:.0f} s")
     _draw_map(after, story.after, f"after, at {story.after.stamp_s:.0f} s")
     for track in story.tracks.values():
         after.plot([p[0] for p in track], [p[1] for p in track], color=LIGHT.path, lw=1.2, ls=":")
     return svg_of(figure)
+
+
+def _limits(story: RunStory, axis: int) -> tuple[float, float]:
+    """What both maps show along one axis, in metres: all nodes and paths with room around them."""
+    positions = [
+        node.position[axis]
+        for mesh in (story.before, story.after)
+        for node in mesh.nodes
+        if position_is_known(node)
+    ]
+    positions += [point[axis] for track in story.tracks.values() for point in track]
+    low, high = min(positions, default=0.0), max(positions, default=0.0)
+    room_m = max(LEAST_ROOM_M, ROOM_SHARE * (high - low))
+    return low - room_m, high + room_m
 
 
 def _draw_map(axes: Axes, mesh: MeshStatus, title: str) -> None:
@@ -57,9 +77,8 @@ def _draw_map(axes: Axes, mesh: MeshStatus, title: str) -> None:
             axes.text(
                 node.position[0], node.position[1], str(node.id), transform=to_page,
                 ha="center", va="center_baseline", zorder=5, weight="bold",
-                size=8 if node.id < 100 else 6.5, color=colour if hollow else LIGHT.card,
+                size=8 if node.id < 100 else 5.8, color=colour if hollow else LIGHT.card,
             )  # fmt: skip
     axes.set_title(title, loc="left", size=10)
     axes.set_aspect("equal")
-    axes.margins(0.12)
     axes.set_xlabel("x, m")

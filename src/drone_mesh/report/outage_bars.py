@@ -37,7 +37,7 @@ def outages_figure(story: RunStory) -> str:
     axes.set_yticks(range(len(nodes)), [f"node {node}" for node in nodes])
     axes.invert_yaxis()
     axes.set_xlabel("simulated time, s")
-    figure.legend(loc="outside upper left", ncols=4, frameon=False)
+    figure.legend(loc="outside upper left", ncols=4, frameon=False, labelcolor=LIGHT.ink)
     return svg_of(figure)
 
 

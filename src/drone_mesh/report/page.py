@@ -1,4 +1,4 @@
-"""The report's page: one HTML file with everything in it (jinja2)."""
+"""The report's page: one self-contained HTML file (jinja2)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TEMPLATE = Path(__file__).resolve().parent / "page.html"
 
 
 def render_page(story: RunStory, title: str) -> str:
-    """HTML text."""
+    """The page as HTML text."""
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
     return template.render(
@@ -34,4 +34,5 @@ def render_page(story: RunStory, title: str) -> str:
         maps=maps_figure(story),
         messages=messages_figure(story),
         events=[event for event in story.events if event.kind not in EVENT_KINDS_LEFT_OUT],
+        recorded=len(story.events),
     )

@@ -1,4 +1,4 @@
-"""RunStory: what a run was like, gathered in one pass over its states."""
+"""RunStory: what happened in a run, gathered in one pass over its states."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from drone_mesh.errors import MeshError
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.outages import MeshSample, Outage, find_outages, take_sample
 
-BLIP_S = 1.0  # our choice: a node that is back sooner was only waiting for an answer
+BLIP_S = 1.0  # our choice: a shorter outage was only the wait for an answer
 
 
 class NothingRecorded(MeshError):
-    """There is no state of a mesh to tell about."""
+    """The recording contains no state of a mesh."""
 
 
 @dataclass(frozen=True)
 class RunStory:
-    """A run, ready to be drawn and written down. Seconds are simulated ones."""
+    """A run, ready to be drawn and written. Seconds are simulated seconds."""
 
     samples: Sequence[MeshSample]
     events: Sequence[EventRecord]
     outages: Sequence[Outage]  # without blips, and without nodes that were switched off themselves
     blips: int  # how many outages were shorter than BLIP_S
-    before: MeshStatus  # the last one before the first power-off or loss, or else the first one
+    before: MeshStatus  # the last state before the first power-off or loss, else the first one
     after: MeshStatus  # the last state
     tracks: Mapping[int, Sequence[tuple[float, float]]]  # x, y in metres, of nodes that moved
     messages_of: Mapping[int, int]  # sent per node during the recording
@@ -54,7 +54,7 @@ def tell_story(states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> R
         for node in mesh.nodes:
             _follow(tracks, node)
     if first is None or before is None or after is None:  # all, or none
-        raise NothingRecorded("there is no state of a mesh in it: was /mesh/state recorded?")
+        raise NothingRecorded("no states of a mesh: was /mesh/state recorded?")
     sent_before = {node.id: node.total_messages for node in first.nodes}
     return RunStory(
         samples,
@@ -80,7 +80,7 @@ def _first_loss_s(events: Sequence[EventRecord], outages: Sequence[Outage]) -> f
 
 
 def _follow(tracks: dict[int, list[tuple[float, float]]], node: NodeStatus) -> None:
-    place = (round(node.position[0], 2), round(node.position[1], 2))
-    track = tracks.setdefault(node.id, [place])
-    if track[-1] != place:
-        track.append(place)
+    position = (round(node.position[0], 2), round(node.position[1], 2))
+    track = tracks.setdefault(node.id, [position])
+    if track[-1] != position:
+        track.append(position)

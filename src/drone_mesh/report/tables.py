@@ -88,7 +88,7 @@ def _cell(value: object) -> object:
 
 
 def _stood_s(outage: Outage) -> float:
-    """When it could be connected at all: it had landed, or was lost and stayed where it was."""
+    """The earliest time it could reconnect: its landing, or its loss if it did not fly."""
     if outage.landed_s is None:
         return outage.lost_s
     return (

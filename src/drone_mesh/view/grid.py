@@ -25,7 +25,7 @@ def draw_ground(sketch: Sketch, drones: Sequence[DronePicture], scale: float) ->
     for y in _multiples(south, north, step_m):
         sketch.line([(west, y, 0.0), (east, y, 0.0)], AXIS if y == 0 else GRID, 1)
     for drone in drones:
-        x, y, _ = drone.position
+        x, y, _ = drone.centre(scale)
         half_x, half_y = (edge_m / 2 for edge_m in drone.size_m(scale)[:2])
         sketch.area(
             [
@@ -39,7 +39,7 @@ def draw_ground(sketch: Sketch, drones: Sequence[DronePicture], scale: float) ->
             ],
             SHADOW,
         )
-        sketch.line([(x, y, 0.0), drone.position], SHADOW, 1.5)
+        sketch.line([(x, y, 0.0), drone.centre(scale)], SHADOW, 1.5)
     _number_grid(sketch, step_m, (west, south, east, north))
 
 

@@ -12,9 +12,11 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
+from drone_mesh.view.fan import Slot, fan_offset
 from drone_mesh.view.palette import LIGHT, Colour
 
 DRONE_WIDTH_M = max(Role.ROUTER.size_m)
+HALF_DIAGONAL_M = DRONE_WIDTH_M / math.sqrt(2)
 WIDEST_OF_CROWDING = 0.3  # a drone is drawn at most so wide, as a share of the drones' distance
 
 
@@ -27,6 +29,7 @@ class DronePicture:
     position: Vector  # of the underside, metres, world frame; finite
     condition: Condition = Condition.CONNECTED
     path: Sequence[Vector] = ()  # what is left of its flight, the goal last; empty: not flying
+    slot: Slot | None = None  # among the drones at its position; None: it is alone there
 
     @property
     def colour(self) -> Colour:
@@ -39,9 +42,13 @@ class DronePicture:
         return (x * scale, y * scale, z * scale)
 
     def centre(self, scale: float = 1.0) -> Vector:
-        """The centre of its box when that is drawn `scale` times as large on the same ground."""
+        """Where the centre of its box is drawn, `scale` times as large and on the same ground.
+
+        Drones at one position are fanned out around it.
+        """
         x, y, z = self.position
-        return (x, y, z + self.size_m(scale)[2] / 2)
+        aside_m, ahead_m = fan_offset(self.slot, HALF_DIAGONAL_M * scale) if self.slot else (0, 0)
+        return (x + aside_m, y + ahead_m, z + self.size_m(scale)[2] / 2)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from drone_mesh.state.links import Link, links_by_use, shortest
 from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.roster import DroneView
 from drone_mesh.state.trouble import find_trouble, summarise
+from drone_mesh.view.fan import Slot, fan_out
 from drone_mesh.view.picture import DronePicture, LinkPicture, Scene
 
 MOST_LINKS = 600  # our choice, per use: more are one blot
@@ -23,9 +24,10 @@ def scene_of(mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneV
     """
     newer = {view.id: view for view in views}
     shown = [node for node in mesh.nodes if position_is_known(node)]
+    slots = fan_out(shown)
     summary = summarise(mesh.nodes, find_trouble(mesh.nodes))
     return Scene(
-        drones=[_drone(node, newer.get(node.id, node)) for node in shown],
+        drones=[_drone(node, newer.get(node.id, node), slots.get(node.id)) for node in shown],
         links=[
             LinkPicture(*link, use)
             for use, links in links_by_use(shown, lost).items()
@@ -35,13 +37,14 @@ def scene_of(mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneV
     )
 
 
-def _drone(node: NodeStatus, seen: NodeStatus | DroneView) -> DronePicture:
+def _drone(node: NodeStatus, seen: NodeStatus | DroneView, slot: Slot | None) -> DronePicture:
     return DronePicture(
         node_id=node.id,
         role=Role(node.role),
         position=_vector(seen.position),
         condition=condition_of(node),
         path=[_vector(seen.path[i : i + 3]) for i in range(0, len(seen.path), 3)],
+        slot=slot,
     )
 
 

@@ -81,9 +81,10 @@ class WindowItems:
                 box = add_box(self._client, drone, scale)
             else:
                 box, before = self._boxes[drone.node_id]
-                if before.position != drone.position:
+                centre = drone.centre(scale)
+                if before.centre(scale) != centre:
                     pybullet.resetBasePositionAndOrientation(
-                        box, drone.centre(scale), (0, 0, 0, 1), physicsClientId=self._client
+                        box, centre, (0, 0, 0, 1), physicsClientId=self._client
                     )
                 if before.colour != drone.colour:
                     pybullet.changeVisualShape(

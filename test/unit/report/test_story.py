@@ -121,7 +121,7 @@ def test_the_page_is_one_file_that_needs_nothing_from_elsewhere():
 
 def test_a_run_without_losses_makes_a_page_as_well():
     page = render_page(tell_story([state(1.0)], []), "quiet")
-    assert "Nobody was without a gateway" in page
+    assert "No node was without a gateway" in page
     assert page.count("<svg") == 3
 
 
@@ -146,3 +146,24 @@ def test_tables_are_written_as_csv(tmp_path):
         events = list(csv.DictReader(file))
     assert events[8]["kind"] == "flight decided"
     assert events[8]["peers"] == "1"
+
+
+def test_the_page_counts_the_events_it_shows_of_all_events():
+    events = [*EVENTS, EventRecord(0.4, 1, "neighbour found", (0,)), EventRecord(0.3, 1, "started")]
+    page = render_page(tell_story(STATES, events), "counts")
+    assert f"Events ({len(EVENTS)} of {len(EVENTS) + 2})" in page
+
+
+def test_the_colours_of_figures_follow_the_theme_of_the_page():
+    page = render_page(tell_story(STATES, EVENTS), "colours")
+    style, _end, body = page.partition("</style>")
+    assert "prefers-color-scheme: dark" in style
+    assert "stroke: var(--connected)" in body
+    assert not re.search(r"(fill|stroke): #(?!000000)", body)
+
+
+def test_a_moment_without_routers_is_a_gap_and_not_all_connected():
+    starting = MeshStatus(0.5, [NodeStatus(1, on=False)])
+    story = tell_story([starting, *STATES], EVENTS)
+    assert [sample.connected_share for sample in story.samples][:2] == [None, 1.0]
+    assert render_page(story, "starting").count("<svg") == 4

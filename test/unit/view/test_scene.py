@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
@@ -36,3 +38,11 @@ def test_a_scene_shows_drones_of_known_position_with_conditions_links_and_paths(
         (1, 2): LinkUse.KNOWN,
     }
     assert scene.title.startswith("3.0 s: 1 of 3 routers connected, 1 switched off, 1 silent")
+
+
+def test_drones_at_one_position_stand_side_by_side():
+    nodes = [NodeStatus(node, position=(4.0, 4.0, 0.0)) for node in (1, 2, 3)]
+    drones = scene_of(MeshStatus(3.0, nodes)).drones
+    centres = [drone.centre(scale=2.0) for drone in drones]
+    gaps = [math.dist(a, b) for i, a in enumerate(centres) for b in centres[:i]]
+    assert min(gaps) > 2.0 * 0.2 * math.sqrt(2)

@@ -40,10 +40,10 @@ class Probe:
         self._watching: rospy.Subscriber | None = None
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event)
         rospy.Subscriber(names.DIAGNOSTICS_TOPIC, DiagnosticArray, self._diagnostics)
-        self._tell(Figures(PROBE, time.monotonic()))
+        self._print(Figures(PROBE, time.monotonic()))
 
     def obey(self, order: str) -> None:
-        """Watch the state from now on, or rest."""
+        """Start or stop watching the state."""
         if order == WATCH and self._watching is None:
             self._watching = rospy.Subscriber(names.STATE_TOPIC, MeshState, self._state)
         elif order == REST and self._watching is not None:
@@ -53,7 +53,7 @@ class Probe:
     def _state(self, mesh: MeshState) -> None:
         on = [node for node in mesh.nodes if node.on]
         routers = [node for node in on if node.role == NodeState.ROUTER]
-        self._tell(
+        self._print(
             Look(
                 wall_s=time.monotonic(),
                 sim_s=mesh.header.stamp.to_sec(),
@@ -66,7 +66,7 @@ class Probe:
 
     def _event(self, event: MeshEvent) -> None:
         if event.kind in _KINDS:
-            self._tell(Happening(event.stamp.to_sec(), event.node, event.kind))
+            self._print(Happening(event.stamp.to_sec(), event.node, event.kind))
 
     def _diagnostics(self, array: DiagnosticArray) -> None:
         for status in array.status:
@@ -76,9 +76,9 @@ class Probe:
                     values[pair.key] = float(pair.value)
                 except ValueError:
                     continue  # words, for people
-            self._tell(Figures(status.name, time.monotonic(), values))
+            self._print(Figures(status.name, time.monotonic(), values))
 
-    def _tell(self, sight: Sight) -> None:
+    def _print(self, sight: Sight) -> None:
         with self._lock:
             print(to_line(sight), flush=True)
 

@@ -1,4 +1,4 @@
-"""RosControls: carries out the console's orders over the ordinary services."""
+"""RosControls: carries out the console's orders through the same services as anyone else."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class RosControls:
         answer = _call(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request)
         if not answer.status:
             raise OrderRefused("no gateway is running to take the order")
-        return f"ordered drone {node} to ({x:g}, {y:g}, {round(z)}) m"
+        return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
 
     def layout(self, case: int) -> str:
-        """Order all drones of a layout to their places."""
+        """Order all drones of a layout to their positions."""
         _call(names.SET_TO_CASUS_SERVICE, Casus, CasusRequest(caseID=case))
         return f"ordered layout {case}"
 

@@ -26,8 +26,8 @@ from drone_mesh.ros.graph.parameters import manager_layouts
 from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.web.access import access_for, is_loopback
 
-LOOK_PERIOD_S = 1.0  # wall time between two looks at the master
-OLD_NEWS_S = 3.0  # wall time without a state after which the page shows a warning
+CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
+OLD_STATE_S = 3.0  # wall time without a state after which the page shows a warning
 TOKEN_BYTES = 18
 EVERYWHERE = ("0.0.0.0", "::")  # addresses that mean all addresses of this machine
 
@@ -53,17 +53,17 @@ class MeshFeed:
 
     def watch_master(self, stopped: threading.Event) -> None:
         """Keep the subscriptions alive until `stopped`; for the main thread."""
-        while not stopped.wait(LOOK_PERIOD_S) and not rospy.is_shutdown():
+        while not stopped.wait(CHECK_PERIOD_S) and not rospy.is_shutdown():
             try:
                 run_id = rosgraph.Master(rospy.get_name()).getParam("/run_id")
             except (OSError, rosgraph.MasterException):
-                self._tell("no ROS master: waiting for the simulation to start")
+                self._report("no ROS master: waiting for the simulation to start")
                 continue
             if run_id != self._run_id:
                 self._run_id = run_id
                 self._subscribe()
-            elif time.monotonic() - self._heard_s > OLD_NEWS_S:
-                self._tell("no data from the simulation")
+            elif time.monotonic() - self._heard_s > OLD_STATE_S:
+                self._report("no data from the simulation")
 
     def _subscribe(self) -> None:
         for subscriber in self._subscribers:
@@ -73,7 +73,7 @@ class MeshFeed:
             rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._on_event),
         ]
 
-    def _tell(self, text: str) -> None:
+    def _report(self, text: str) -> None:
         self._runner.in_loop(partial(self._store.set_link, text))
 
     def _on_state(self, message: MeshState) -> None:
@@ -92,7 +92,7 @@ class MeshFeed:
 
 
 def layout_names(layouts: Layouts) -> list[tuple[int, str]]:
-    """(case, name) of each layout: whole fleets first, then those that move one drone."""
+    """(case, name) of each layout: those of several drones first, then those of one."""
     known = {FIELD_CASE: "field case", GRID_CASE: "10 x 10 grid"}
     named = []
     for case in layouts.cases:

@@ -14,7 +14,7 @@ from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.views.bag import BagUnusable, read_states
 from drone_mesh.state.model import MeshStatus
 
-WAIT_S = 5.0  # wall time for a live state; it is latched, so it comes at once or not at all
+WAIT_S = 5.0  # wall time for a live state: it is latched, so it arrives at once or not at all
 
 
 class NoState(MeshError):
@@ -33,7 +33,10 @@ def parse_with_bag(parser: argparse.ArgumentParser) -> argparse.Namespace:
         "--bag", type=Path, help="read the state from a bag instead of the live one"
     )
     parser.add_argument(
-        "--at", type=float, metavar="S", help="with --bag: at this simulated time (default: end)"
+        "--at",
+        type=float,
+        metavar="S",
+        help="with --bag: the state at this simulated time (default: the last one)",
     )
     options = parser.parse_args(rospy.myargv()[1:])
     if options.at is not None and options.bag is None:
@@ -54,6 +57,11 @@ def state_in_bag(path: Path, at_s: float | None) -> MeshStatus:
     found = None
     for mesh in read_states(path):
         if at_s is not None and mesh.stamp_s > at_s:
+            if found is None:
+                raise BagUnusable(
+                    f"{path}: no state up to {at_s:g} s; the recording starts at "
+                    f"{mesh.stamp_s:.1f} s of simulated time"
+                )
             break
         found = mesh
     if found is None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+import math
+from typing import Dict, Sequence, Tuple
 
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
@@ -14,14 +15,18 @@ from drone_mesh.ros.graph import names
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use, shortest
 from drone_mesh.state.model import NodeStatus, position_is_known
+from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 
 MOST_LINKS = 1500  # our choice, per use: 254 drones on 1 m have 18,000, which are one blot
 TIMES_LARGER = 2.5  # than life: the size of the boxes
+BOX_RADIUS_M = TIMES_LARGER * Role.ROUTER.size_m[0] / math.sqrt(2)
 LABEL_M = 0.5
 LINK_WIDTH_M = {LinkUse.ROUTE: 0.08, LinkUse.KNOWN: 0.03, LinkUse.LOST: 0.05}
 LINK_OPACITY = {LinkUse.ROUTE: 1.0, LinkUse.KNOWN: 0.6, LinkUse.LOST: 1.0}
 PATH_WIDTH_M = 0.06
+
+_Positions = Dict[int, Tuple[float, float, float]]
 
 
 class MarkerMaker:
@@ -38,30 +43,34 @@ class MarkerMaker:
     def markers(self, state: MeshState, wall_s: float) -> MarkerArray:
         """What changed since the last call."""
         nodes = [node for node in state.nodes if position_is_known(node)]
+        positions = _fanned_positions(nodes)
         lost = self._lost.update(known_links(nodes), wall_s)
         array = MarkerArray()
         for role in Role:
-            self._add_boxes(array, [node for node in nodes if node.role == role], role)
-        positions = {node.id: tuple(node.position) for node in nodes}
+            self._add_boxes(array, [node for node in nodes if node.role == role], role, positions)
         for use, links in links_by_use(nodes, lost).items():
             lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
             colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
             self._add_lines(array, f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
-        self._add_lines(array, "flight paths", _path_lines(nodes), _colour(DARK.path), PATH_WIDTH_M)
-        self._add_ids(array, nodes)
+        self._add_lines(
+            array, "flight paths", _path_lines(nodes, positions), _colour(DARK.path), PATH_WIDTH_M
+        )
+        self._add_ids(array, nodes, positions)
         for marker in array.markers:
             marker.header.stamp, marker.header.frame_id = state.header.stamp, names.MAP_FRAME
         return array
 
-    def _add_boxes(self, array: MarkerArray, nodes: Sequence[NodeStatus], role: Role) -> None:
+    def _add_boxes(
+        self, array: MarkerArray, nodes: Sequence[NodeStatus], role: Role, positions: _Positions
+    ) -> None:
         x_m, y_m, z_m = (TIMES_LARGER * edge_m for edge_m in role.size_m)
         colours = [DARK.of_node(role, condition_of(node)) for node in nodes]
-        content = [(tuple(node.position), colour) for node, colour in zip(nodes, colours)]
+        content = [(positions[node.id], colour) for node, colour in zip(nodes, colours)]
         marker = self._changed(array, f"{role.word}s", 0, content)
         if marker:
             marker.type = Marker.CUBE_LIST
             marker.scale.x, marker.scale.y, marker.scale.z = x_m, y_m, z_m
-            marker.points = [_point(node.position, up=z_m / 2) for node in nodes]
+            marker.points = [_point(positions[node.id], up=z_m / 2) for node in nodes]
             marker.colors = [_colour(colour) for colour in colours]
 
     def _add_lines(
@@ -75,16 +84,18 @@ class MarkerMaker:
             marker.color = colour
             marker.points = [_point(end, up=0.05) for line in lines for end in line]
 
-    def _add_ids(self, array: MarkerArray, nodes: Sequence[NodeStatus]) -> None:
+    def _add_ids(
+        self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions
+    ) -> None:
         for node in nodes:
-            marker = self._changed(array, "ids", node.id, [tuple(node.position)])
+            marker = self._changed(array, "ids", node.id, [positions[node.id]])
             if marker:
                 marker.type = Marker.TEXT_VIEW_FACING
                 marker.scale.z = LABEL_M
                 marker.color = _colour(DARK.ink)
                 marker.text = str(node.id)
                 height_m = TIMES_LARGER * Role(node.role).size_m[2]
-                marker.pose.position = _point(node.position, up=height_m + 1.2 * LABEL_M)
+                marker.pose.position = _point(positions[node.id], up=height_m + 1.2 * LABEL_M)
         present = {node.id for node in nodes}
         for name, number in [key for key in self._shown if key[0] == "ids"]:
             if number not in present:
@@ -108,10 +119,23 @@ class MarkerMaker:
         return marker
 
 
-def _path_lines(nodes: Sequence[NodeStatus]) -> list[tuple[Sequence[float], ...]]:
+def _fanned_positions(nodes: Sequence[NodeStatus]) -> _Positions:
+    """Where each node is drawn: nodes at one position are fanned out around it."""
+    slots = fan_out(nodes)
+    positions = {}
+    for node in nodes:
+        x, y, z = node.position
+        right, up = fan_offset(slots[node.id], BOX_RADIUS_M) if node.id in slots else (0.0, 0.0)
+        positions[node.id] = (x + right, y + up, z)
+    return positions
+
+
+def _path_lines(
+    nodes: Sequence[NodeStatus], positions: _Positions
+) -> list[tuple[Sequence[float], ...]]:
     lines: list[tuple[Sequence[float], ...]] = []
     for node in nodes:
-        waypoints = [tuple(node.position), *zip(*[iter(node.path)] * 3)]
+        waypoints = [positions[node.id], *zip(*[iter(node.path)] * 3)]
         lines += zip(waypoints, waypoints[1:])
     return lines
 

@@ -17,7 +17,7 @@ from drone_mesh.ros.views.bag import BagUnusable, read_events, read_states
 
 
 class CannotWrite(MeshError):
-    """A file of the report could not be written; the message says which and why."""
+    """A file of the report could not be written; the message names it and the reason."""
 
 
 def main() -> None:
@@ -34,7 +34,7 @@ def _parser() -> argparse.ArgumentParser:
         "per node, the map before and after. Needs no running simulation.",
         epilog="Exit code: 0 written, 2 failed.",
     )
-    parser.add_argument("bag", type=Path, help="the recorded run")
+    parser.add_argument("bag", type=Path, help="the bag of the recorded run")
     parser.add_argument(
         "-o",
         "--output",

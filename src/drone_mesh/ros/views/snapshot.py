@@ -1,4 +1,4 @@
-"""rosrun drone_mesh snapshot: a picture of the world, without any screen."""
+"""rosrun drone_mesh snapshot: a picture of the world, without a screen."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SMALLEST, LARGEST = 200, 8000  # pixels
 
 
 class CannotDraw(MeshError):
-    """The picture could not be written; the message says why."""
+    """The picture could not be written; the message is the reason."""
 
 
 def main() -> None:
@@ -31,15 +31,22 @@ def _parser() -> argparse.ArgumentParser:
         description="Draw the world with its drones, links and flights. Needs no screen.",
         epilog="Exit code: 0 written, 2 failed.",
     )
-    parser.add_argument("picture", type=Path, help="the PNG file to write")
+    parser.add_argument("picture", type=_png, help="the PNG file to write")
     parser.add_argument(
         "--size",
         type=_size,
         default=DEFAULT_SIZE,
         metavar="WxH",
-        help=f"pixels (default: {DEFAULT_SIZE[0]}x{DEFAULT_SIZE[1]})",
+        help=f"size in pixels (default: {DEFAULT_SIZE[0]}x{DEFAULT_SIZE[1]})",
     )
     return parser
+
+
+def _png(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() != ".png":
+        raise argparse.ArgumentTypeError(f"{text!r}: must end in .png, the only format written")
+    return path
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from drone_mesh.state.trouble import all_connected, find_trouble
 from drone_mesh.view.table import mesh_table
 
 WATCH_PERIOD_S = 1.0
-OLD_NEWS_S = 3.0  # wall time without a state after which --watch shows a warning
+OLD_STATE_S = 3.0  # wall time without a state after which --watch shows a warning
 CLEAR_SCREEN = "\x1b[H\x1b[2J"
 
 
@@ -42,7 +42,7 @@ def _parser() -> argparse.ArgumentParser:
         "--colour",
         choices=("auto", "always", "never"),
         default="auto",
-        help="auto: on a terminal, unless NO_COLOR is set",
+        help="auto (default): on a terminal, unless NO_COLOR is set",
     )
     return parser
 
@@ -65,7 +65,7 @@ def _show(mesh: MeshStatus, colours: bool) -> int:
 
 
 def _watch(colours: bool) -> int:
-    """Until Ctrl-C. The subscriber's thread only replaces `latest`."""
+    """Print until Ctrl-C. The subscriber's thread only replaces `latest`."""
     latest: list[tuple[MeshStatus, float]] = []
     came = threading.Event()
 
@@ -81,7 +81,7 @@ def _watch(colours: bool) -> int:
             mesh, came_s = latest[0]
             text = mesh_table(mesh, colours)
             age_s = time.monotonic() - came_s
-            if age_s > OLD_NEWS_S:
+            if age_s > OLD_STATE_S:
                 require_master()
                 text += f"\nno state for {age_s:.0f} s"
             print(f"{CLEAR_SCREEN if colours else ''}{text}", flush=True)
