@@ -38,7 +38,7 @@ def call(service: str, service_class: type, *arguments: object) -> object:
 
 
 def free_port() -> int:
-    """A TCP port that nobody listens on, for a master of one's own."""
+    """A free TCP port for a separate master."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -73,7 +73,7 @@ class LogWatch:
         return [line.msg for line in list(self._lines) if text in line.msg]
 
     def failures(self) -> list[str]:
-        """Lines that tell of an exception that nobody expected."""
+        """Lines of unexpected exceptions."""
         return self.lines("Traceback") + self.lines("bad callback") + self.lines("in a mesh node")
 
 
@@ -144,7 +144,7 @@ class MeshWatch:
         self.wait(f"{duration_s} s go by", 2 * duration_s, lambda: rospy.get_time() >= end_s)
 
     def place(self, node_id: int) -> tuple[float, float, int]:
-        """Longitude, latitude and height of the drone, as its gps tells."""
+        """Longitude, latitude and height of the drone, from its gps service."""
         answer = call(f"/Drones/{node_id}/gps", RequestGPS)
         return (answer.longitude, answer.latitude, answer.height)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Random packets from a stranger: nobody crashes, nobody moves, everybody still answers."""
+"""Random packets from a stranger: no node crashes or moves, and all still answer."""
 
 from __future__ import annotations
 

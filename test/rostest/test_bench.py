@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The benchmark starts a fleet by itself, tells plausible figures, and leaves nothing behind."""
+"""The benchmark starts a fleet, prints plausible figures, and leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class BenchTest(unittest.TestCase):
     def test_a_fleet_is_measured(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
             figures = Path(folder, "figures.json")
-            # More than a check period, or it may be that nobody has anything to say.
+            # More than a check period, or possibly no node sends anything.
             bench = start("--seconds", "11", "--json", str(figures))
             out, err = bench.communicate(timeout=120)
             self.assertEqual(bench.returncode, 0, err)

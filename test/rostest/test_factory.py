@@ -28,7 +28,7 @@ class FactoryTest(unittest.TestCase):
 
     def fly(self, node_id: int, latitude: float, longitude: float, height: int) -> None:
         publisher = rospy.Publisher(f"/Drones/{node_id}/goal", Location, queue_size=1)
-        wait_for("nobody takes goals", 10, lambda: publisher.get_num_connections() > 0)
+        wait_for("no subscriber for goals", 10, lambda: publisher.get_num_connections() > 0)
         publisher.publish(Location(latitude, longitude, height))
 
     def test_clock_goes_in_hundredths_of_a_second(self) -> None:
@@ -84,7 +84,7 @@ class FactoryTest(unittest.TestCase):
         def of_the_engine() -> list[DroneInfo]:
             return [info for info in list(told) if info.nodeID == 2 and not info.sub]
 
-        wait_for("what the engine tells a new subscriber", 10, of_the_engine)
+        wait_for("no DroneInfo of the engine for a new subscriber", 10, of_the_engine)
         told.clear()
         self.fly(2, latitude=3.0, longitude=5.0, height=2)
         goal = (5.0, 3.0, float(np.float32(2.05)))  # of the box's centre

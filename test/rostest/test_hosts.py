@@ -31,7 +31,7 @@ class HostsTest(unittest.TestCase):
         self.assertIn("node 3 is already served by another process", refused.stderr)
         self.assertNotIn("Traceback", refused.stderr)
 
-        # A node that starts anew counts from 0: it has to have sent enough to be told apart.
+        # A restarted node counts from 0: it must have sent enough to be recognised.
         mesh.wait("14 has sent 40 messages", 90, lambda: mesh.info(14).totalMessages >= 40)
         old_pid = pid_of("/mesh_host_3")
         os.kill(old_pid, signal.SIGKILL)
@@ -39,7 +39,7 @@ class HostsTest(unittest.TestCase):
         mesh.wait("the others stay connected", 1, lambda: mesh.connected(range(10)))
         wait_for("respawn", WALL_LIMIT_S, lambda: pid_of("/mesh_host_3") not in (None, old_pid))
         mesh.wait(
-            "the nodes of host 3 started anew and connected",
+            "the nodes of host 3 restarted and connected",
             60,
             lambda: mesh.info(14).totalMessages < sent and mesh.connected(),
         )

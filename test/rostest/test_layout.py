@@ -20,7 +20,7 @@ LONGEST_FLIGHT_S = 30.0
 
 
 class LayoutTest(unittest.TestCase):
-    def test_everybody_flies_to_its_place_and_is_connected_again(self) -> None:
+    def test_each_drone_flies_to_its_place_and_is_connected_again(self) -> None:
         rospy.init_node("test_layout")
         log = LogWatch()
         mesh = MeshWatch(18)

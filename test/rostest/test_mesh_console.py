@@ -111,9 +111,9 @@ class MeshConsoleTest(unittest.TestCase):
         unknown = page.order(do="layout", case=77)
         self.assertFalse(unknown["done"])
         self.assertIn("unknown case 77", unknown["text"])
-        nobody = page.order(do="power", node=200, on=False)
-        self.assertFalse(nobody["done"])
-        self.assertIn("no answer from /Nodes/200/powerSwitch", nobody["text"])
+        absent = page.order(do="power", node=200, on=False)
+        self.assertFalse(absent["done"])
+        self.assertIn("no answer from /Nodes/200/powerSwitch", absent["text"])
 
     def test_3_after_a_crash_of_the_console_a_page_finds_it_again(self) -> None:
         open_page()

@@ -62,7 +62,7 @@ class MeshMarkersTest(unittest.TestCase):
         shares = [getattr(self.markers["routers", 0].colors[1], c) for c in "rgb"]
         return max(shares) - min(shares) < 0.1
 
-    def test_1_everybody_has_a_frame_a_box_a_name_and_the_links_that_are_there(self) -> None:
+    def test_1_each_drone_has_a_frame_a_box_a_name_and_the_links_that_are_there(self) -> None:
         wait_for("frames", WALL_LIMIT_S, lambda: len(self.frames) == 3)
         self.assertEqual(self.frames["drone_2"], (6.0, 0.0, 0.0))
         wait_for(

@@ -50,7 +50,7 @@ class MeshStateTest(unittest.TestCase):
     def levels(self) -> dict[str, int]:
         return {s.name: s.level for s in self.diagnostics.status} if self.diagnostics else {}
 
-    def test_1_a_state_tells_what_the_mesh_knows_and_where_it_is(self) -> None:
+    def test_1_a_state_has_what_the_nodes_know_and_their_positions(self) -> None:
         wait_for("all connected", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])
         wait_for("routes and heartbeats", WALL_LIMIT_S, lambda: len(self.state.nodes[3].route) == 3)
         far = self.state.nodes[3]
@@ -100,7 +100,7 @@ class MeshStateTest(unittest.TestCase):
         self.assertEqual(self.state.real_time_factor, 8.0)
         self.assertEqual(self.log.failures(), [])
 
-    def test_4_viewers_that_nobody_asked_for_do_not_exist(self) -> None:
+    def test_4_viewers_are_not_started_unless_requested(self) -> None:
         publishers, subscribers, _services = rosgraph.Master("/test").getSystemState()
         nodes = {node for _topic, names in publishers + subscribers for node in names}
         self.assertFalse(nodes & {"/mesh_console", "/mesh_markers", "/mesh_rviz"})

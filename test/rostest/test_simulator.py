@@ -57,7 +57,7 @@ class SimulatorTest(unittest.TestCase):
         return True
 
     def figure(self, name: str) -> float:
-        """What the simulator tells of its work, told after this was called."""
+        """The figures that the simulator publishes after this call."""
         told: list[float] = []
         for _message in range(2):  # the first may have been on its way
             array = rospy.wait_for_message("/diagnostics", DiagnosticArray, WALL_LIMIT_S)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A node of somebody else joins the mesh, with literal bytes and on the first try."""
+"""A foreign node joins the mesh, with literal bytes and on the first try."""
 
 from __future__ import annotations
 

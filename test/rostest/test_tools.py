@@ -144,7 +144,7 @@ class ToolsTest(unittest.TestCase):
 
     def test_4_what_is_no_bag_is_refused_in_one_line(self) -> None:
         nonsense = self.folder / "nonsense.bag"
-        nonsense.write_bytes(b"\x89 this is no bag")
+        nonsense.write_bytes(b"\x89 this is not a bag")
         for path in (nonsense, self.folder / "missing.bag"):
             for arguments in (["status", "--bag"], ["report"]):
                 told = run(*arguments, str(path))

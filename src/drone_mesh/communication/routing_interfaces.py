@@ -1,4 +1,4 @@
-"""The routing seam: what a technique is told, and what it may do (docs/techniques.md).
+"""The routing seam: what a technique learns, and what it may do (docs/techniques.md).
 
 A technique has no thread, no clock and no randomness of its own: its component calls it, and it
 acts through IRoutingEssentials.

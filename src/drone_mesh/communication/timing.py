@@ -8,7 +8,7 @@ from drone_mesh.errors import ConfigurationError
 
 HEARTBEAT_ANSWER_S = 0.5  # one heartbeat to the gateway under way at a time
 CIRCULATION_S = 0.5  # within this time the same packet from elsewhere circulates
-FLIGHT_POSITION_PERIOD_S = 1.0  # a flying node asks where it is this often
+FLIGHT_POSITION_PERIOD_S = 1.0  # a flying node asks its position this often
 LANDED_WITHIN_M = 0.1  # docs/protocol.md, "Flight"
 
 
@@ -18,7 +18,7 @@ class MeshTiming:
 
     check_period_s: float = 10.0  # how often a node looks after its routes and its connection
     connection_lost_after_s: float = 30.0  # without a gateway for so long: emergency
-    send_attempts: int = 3  # a packet that nobody took is sent so often in all
+    send_attempts: int = 3  # transmissions of a packet without success, in all
 
     def __post_init__(self) -> None:
         """Raises ConfigurationError for a number outside its range."""

@@ -1,4 +1,4 @@
-"""ShortestPath: the routing bound. It sees all links of a network; no packet tells it of them."""
+"""ShortestPath: the routing bound. It sees all links of a network, without any packet."""
 
 from __future__ import annotations
 

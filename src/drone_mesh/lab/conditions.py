@@ -21,7 +21,7 @@ class Condition(NamedTuple):
 
 
 def parse_condition(text: str) -> Condition:
-    """Raises ValueError, with what is allowed, for a text that is no condition."""
+    """Raises ValueError, with what is allowed, for an invalid condition."""
     match = _PATTERN.fullmatch(text)
     event = " ".join(match.group("event").lower().split()) if match else ""
     if match is None or event not in EVENTS:

@@ -88,7 +88,7 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
 def _children_ignore_ctrl_c() -> Iterator[None]:
     """A terminal signals the workers too. Only this process answers; it ends the others."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # nobody's Ctrl-C arrives here
+        yield  # no Ctrl-C arrives here
         return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:

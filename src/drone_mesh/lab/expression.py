@@ -25,7 +25,7 @@ _ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 class ExpressionError(Exception):
-    """The text is no expression over the axes. The message says what is wrong with it."""
+    """Invalid expression over the axes. The message names the error."""
 
 
 class Where:

@@ -58,7 +58,7 @@ def axis_drawings(results: Results) -> list[Drawing]:
 
 
 def _series_axis(results: Results) -> str | None:
-    """The axis whose values are told apart by colour."""
+    """The axis whose values have different colours."""
     compare = results.loaded.experiment.compare
     if compare is not None:
         return compare.over

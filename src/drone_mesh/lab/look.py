@@ -1,4 +1,4 @@
-"""Looks at a network from outside: who could, and who really can, reach a gateway."""
+"""Observes a network from outside: the nodes that could reach a gateway, and that do."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def route_hops(network: Network, served: frozenset[int]) -> dict[int, int]:
 
 
 def physical_graph(network: Network) -> Graph:
-    """Who could hear whom now, of all nodes with power, whatever they know."""
+    """The pairs of nodes with power that could hear each other now, known or not."""
     powered = [node_id for node_id, node in network.nodes.items() if node.antenna.powered]
     alive = set(powered)
     return Graph(

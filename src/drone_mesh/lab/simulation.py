@@ -22,7 +22,7 @@ from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.timeline import Timeline
 from drone_mesh.state.model import MeshStatus
 
-FLIGHT_LOOK_S = 0.25  # how closely distances are watched while somebody flies: 0.5 m at 2 m/s
+FLIGHT_LOOK_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
 OnStatus = Callable[[MeshStatus], None]
 

@@ -16,7 +16,7 @@ ORIGIN = Origin(52.0, 5.0, 0.0)
 
 
 class OwnEngine(IDroneEngine):
-    """What somebody's own engine has to have."""
+    """The minimum of a user's own engine."""
 
     def __init__(self, node_id: int) -> None:
         self.node_id = node_id

@@ -50,7 +50,7 @@ def nowhere_to_fly(network, node):
     )
 
 
-def everybody_is_safe(network):
+def all_are_safe(network):
     """Each router is connected, in the end, or has nowhere to fly to."""
     return all(network.connected(n) or nowhere_to_fly(network, n) for n in alive(network))
 
@@ -95,7 +95,7 @@ def survive(seed):
         network.power(rng.choice(dead), True)
         happened["switched on again"] += 1
     network.run_for(NOTICED_S)
-    assert run_until(network, lambda: everybody_is_safe(network), PATIENCE_S, step_s=10.0), (
+    assert run_until(network, lambda: all_are_safe(network), PATIENCE_S, step_s=10.0), (
         f"seed {seed}: {[n for n in alive(network) if not network.connected(n)]} never came back"
     )
     sent_on = watch.most_often_sent_on()

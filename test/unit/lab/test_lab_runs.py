@@ -137,7 +137,7 @@ def test_the_busiest_relay_is_the_one_next_to_the_gateway_of_a_line() -> None:
     assert run(faults=[kill(number=1, pick="busiest")]).happened[0].nodes == (1,)
 
 
-def test_a_circle_takes_everybody_within_it() -> None:
+def test_a_circle_takes_all_nodes_within_it() -> None:
     record = run(faults=[kill(pick="circle", center=[24, 0], radius_m=7)])
     assert set(record.happened[0].nodes) == {3, 4}
 

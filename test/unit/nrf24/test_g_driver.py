@@ -59,10 +59,10 @@ def test_row_51_every_register_is_written_for_the_chip_was_not_reset(lab):
     assert bytes(values) == bytes.fromhex("3F 00 01 00 03 11")
 
 
-@pytest.mark.parametrize("somebody_there", [True, False])
-def test_row_52_after_every_send_it_listens_again_with_only_its_own_pipes(lab, somebody_there):
+@pytest.mark.parametrize("receiver_present", [True, False])
+def test_row_52_after_every_send_it_listens_again_with_only_its_own_pipes(lab, receiver_present):
     driver = lab.driver(5)
-    if somebody_there:
+    if receiver_present:
         lab.driver(10, 100.0)
     opened = set()
     write = driver.chip.registers.write
@@ -73,7 +73,7 @@ def test_row_52_after_every_send_it_listens_again_with_only_its_own_pipes(lab, s
         write(register, data)
 
     driver.chip.registers.write = watch
-    assert driver.send(10, PAYLOAD) == somebody_there
+    assert driver.send(10, PAYLOAD) == receiver_present
     assert registers_of(lab, driver, Register.CONFIG, Register.EN_RXADDR, Register.SETUP_RETR) == [
         0x0F,
         0x06,

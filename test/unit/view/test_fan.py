@@ -24,7 +24,7 @@ def test_nodes_at_one_position_get_a_slot_each_whatever_their_height():
     assert fan_out(nodes) == {0: (0, 3), 2: (1, 3), 3: (2, 3)}
 
 
-def test_the_edge_of_a_cell_separates_nobody():
+def test_the_edge_of_a_cell_separates_no_drones():
     assert set(fan_out(at((-0.01, -0.01), (0.01, 0.01)))) == {0, 1}
 
 

@@ -59,7 +59,7 @@ class Flooding(ChildTableTree):
         return min(children, key=lambda child: (self._hops.get(child, NO_ROUTE), child))
 
     def extension(self, kind: int, room: int) -> bytes:
-        """A number that tells heartbeats apart."""
+        """A number that distinguishes heartbeats."""
         if kind != MessageType.HEARTBEAT:
             return b""
         self._sequence = (self._sequence + 1) % 2**16

@@ -8,7 +8,7 @@ from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 
 ETX_GAIN = 0.1  # weight of a new sample; CTP (TEP 123) uses the same exponential average
-WORST_ETX = 16.0  # our choice: a link that is worse is not told apart from this one
+WORST_ETX = 16.0  # our choice: worse links count as this one
 
 
 class LinkCosts:

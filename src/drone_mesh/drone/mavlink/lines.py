@@ -24,7 +24,7 @@ class Line(Protocol):
         """Bring it onto the line."""
 
     def forget_peer(self) -> None:
-        """Listen to whoever speaks next, where a line can have several peers."""
+        """Accept the next peer that sends, if the line can have several."""
 
     def close(self) -> None:
         """Give it back."""
@@ -79,7 +79,7 @@ class UdpLine:
             return b""
         data, peer = self._socket.recvfrom(MOST_BYTES)
         if self._peer is None:
-            self._peer = peer  # the first that speaks; nobody else can take the drone over
+            self._peer = peer  # the first that sends; no other peer can take the drone over
         return data if peer == self._peer or self._is_peer(peer) else b""
 
     def send(self, data: bytes) -> None:
