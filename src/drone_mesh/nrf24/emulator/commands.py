@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from drone_mesh.nrf24.emulator.chip_core import ChipCore
 from drone_mesh.nrf24.emulator.fifos import Outgoing
 from drone_mesh.nrf24.emulator.states import ANSWERING, SENDING, State
+from drone_mesh.nrf24.emulator.transmitter import Transmitter
 from drone_mesh.nrf24.registers import (
     ARC_CNT,
     MAX_PAYLOAD_BYTES,
@@ -22,9 +22,6 @@ from drone_mesh.nrf24.registers import (
     Register,
 )
 
-if TYPE_CHECKING:
-    from drone_mesh.nrf24.emulator.chip import EmulatedChip
-
 _REGISTERS = {int(register): register for register in Register}
 _REGISTER_MASK = 0x1F
 _ACTIVATE_KEY = 0x73
@@ -35,8 +32,9 @@ _ACTIVE = SENDING | ANSWERING | {State.RX_SETTLING, State.RX}
 class CommandDecoder:
     """Executes an SPI command when CSN rises."""
 
-    def __init__(self, chip: EmulatedChip) -> None:
+    def __init__(self, chip: ChipCore, transmitter: Transmitter) -> None:
         self._chip = chip
+        self._transmitter = transmitter
         self._advanced_unlocked = chip.variant.plus
 
     def execute(self, mosi: bytes) -> bytes:
@@ -70,13 +68,13 @@ class CommandDecoder:
             self._push(Outgoing(data[:MAX_PAYLOAD_BYTES], ack_pipe=command & 7))
         elif command == Command.FLUSH_TX:
             chip.tx_fifo.flush()
-            chip.transmitter.flushed()
+            self._transmitter.flushed()
         elif command == Command.FLUSH_RX:
             if chip.state in ANSWERING:
                 chip.warn("FLUSH_RX while an acknowledgement is being sent")
             chip.rx_fifo.flush()
         elif command == Command.REUSE_TX_PL:
-            chip.transmitter.reuse = True
+            self._transmitter.reuse = True
         elif command == Command.ACTIVATE:
             if not chip.variant.plus and data == bytes((_ACTIVATE_KEY,)):
                 self._advanced_unlocked = not self._advanced_unlocked
@@ -90,8 +88,8 @@ class CommandDecoder:
             data = data[:MAX_PAYLOAD_BYTES]
         packet = Outgoing(data, no_ack=no_ack)
         if self._push(packet):
-            packet.pid = chip.transmitter.next_pid()
-            chip.transmitter.payload_written()
+            packet.pid = self._transmitter.next_pid()
+            self._transmitter.payload_written()
 
     def _push(self, packet: Outgoing) -> bool:
         if self._chip.tx_fifo.push(packet):
@@ -107,7 +105,7 @@ class CommandDecoder:
         if register is Register.STATUS:
             value = bytes((chip.status(),))
         elif register is Register.OBSERVE_TX:
-            sender = chip.transmitter
+            sender = self._transmitter
             value = bytes((PLOS_CNT.put(sender.packets_lost) | ARC_CNT.put(sender.retransmits),))
         elif register is Register.RPD:
             value = bytes((chip.rpd(),))
@@ -121,7 +119,7 @@ class CommandDecoder:
 
     def _fifo_status(self) -> int:
         chip = self._chip
-        value = TX_REUSE.mask if chip.transmitter.reuse else 0
+        value = TX_REUSE.mask if self._transmitter.reuse else 0
         if chip.tx_fifo.oldest is None:
             value |= TX_EMPTY.mask
         elif chip.tx_fifo.full:
@@ -152,6 +150,6 @@ class CommandDecoder:
         if register is Register.CONFIG:
             chip.config_written(was_powered, was_receiver)
         elif register is Register.RF_CH:
-            chip.transmitter.packets_lost = 0
+            self._transmitter.packets_lost = 0
         if was_tuned_to != (registers.channel, registers.bits_per_s):
             chip.retune()

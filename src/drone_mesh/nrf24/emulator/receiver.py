@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from drone_mesh.nrf24.airtime import SETTLING_NS
+from drone_mesh.nrf24.emulator.chip_core import ChipCore
 from drone_mesh.nrf24.emulator.fifos import Incoming, Outgoing
 from drone_mesh.nrf24.emulator.frames import Frame, Packet
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import PIPES, RX_DR, TX_DS
-
-if TYPE_CHECKING:
-    from drone_mesh.nrf24.emulator.chip import EmulatedChip
 
 _NOTHING_YET = (-1, -1)
 
@@ -19,7 +15,7 @@ _NOTHING_YET = (-1, -1)
 class Receiver:
     """Takes frames that are addressed to one of its pipes, and acknowledges them."""
 
-    def __init__(self, chip: EmulatedChip) -> None:
+    def __init__(self, chip: ChipCore) -> None:
         self._chip = chip
         self._last: list[tuple[int, int]] = [_NOTHING_YET] * PIPES  # PID and CRC
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from drone_mesh.nrf24.airtime import PREAMBLE_BITS, SETTLING_NS
+from drone_mesh.nrf24.emulator.chip_core import ChipCore
 from drone_mesh.nrf24.emulator.fifos import Incoming, Outgoing
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import MAX_RT, RX_DR, TX_DS
-
-if TYPE_CHECKING:
-    from drone_mesh.nrf24.emulator.chip import EmulatedChip
 
 _COUNTER_MAX = 15  # PLOS_CNT saturates there
 _LONGEST_TX_NS = 4_000_000  # [DS 6.1.5]
@@ -21,7 +17,7 @@ _ANSWER_WINDOW_NS = {250_000: 500_000, 1_000_000: 250_000, 2_000_000: 250_000}  
 class Transmitter:
     """Sends what is in the TX FIFO, waits for acknowledgements, and sends again."""
 
-    def __init__(self, chip: EmulatedChip) -> None:
+    def __init__(self, chip: ChipCore) -> None:
         self._chip = chip
         self._pid = 0
         self._current: Outgoing | None = None

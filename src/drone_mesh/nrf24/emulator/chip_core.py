@@ -1,0 +1,186 @@
+"""What the engines and the SPI commands of an emulated chip share.
+
+Registers, FIFOs, flags, the state, timers and the antenna. `chip.py` decides on power states; the
+receiver, the transmitter and the commands work on this, and do not know the whole chip.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import Callable
+
+from drone_mesh.nrf24.airtime import SETTLING_NS
+from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Flight, Position
+from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
+from drone_mesh.nrf24.emulator.frames import Frame
+from drone_mesh.nrf24.emulator.pins import EmulatedCe, EmulatedIrq
+from drone_mesh.nrf24.emulator.quirks import ChipVariant, Faults
+from drone_mesh.nrf24.emulator.register_bank import RegisterBank
+from drone_mesh.nrf24.emulator.states import State
+from drone_mesh.nrf24.registers import RX_FIFO_IS_EMPTY, RX_P_NO
+
+
+class ChipCore(abc.ABC):
+    """One chip at one place, as far as its engines need it. An `air.Antenna`."""
+
+    def __init__(self, air: Air, name: str, position: Position, variant: ChipVariant) -> None:
+        self.air = air
+        self.clock = air.clock
+        self.name = name
+        self.variant = variant
+        self.faults = Faults()
+        self.warnings: list[str] = []
+        self._warned: set[str] = set()
+        self._position = position
+        self.registers = RegisterBank()
+        self.rx_fifo = RxFifo(variant.partial_read_removes)
+        self.tx_fifo = TxFifo()
+        self.flags = 0  # RX_DR, TX_DS and MAX_RT, where they stand in STATUS
+        self.state = State.POWER_DOWN
+        self.listening_since_ns: int | None = None
+        self._listening_to = (0, 0)  # channel and rate
+        self.flight: Flight | None = None  # the own frame that is on the air
+        self.ce_rose_ns = -SETTLING_NS
+        self._epoch = 0  # timers of an earlier epoch are void
+        self._rpd_latched = False
+        self.ce = EmulatedCe(self.clock, self._ce_changed)
+        self.irq = EmulatedIrq(self.clock)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}: {self.state.value}>"
+
+    @property
+    def position(self) -> Position:
+        """Where its antenna is, in metres."""
+        return self._position
+
+    @position.setter
+    def position(self, position: Position) -> None:
+        with self.clock.access():
+            if position != self._position:
+                self._position = position
+                self.air.moved()
+
+    def warn(self, text: str) -> None:
+        """Record a misuse, once."""
+        if text not in self._warned:
+            self._warned.add(text)
+            self.warnings.append(text)
+
+    # -- what the whole chip decides ------------------------------------------------------------
+
+    @abc.abstractmethod
+    def settle(self) -> None:
+        """Start what CONFIG and CE request, now that the chip is idle."""
+
+    @abc.abstractmethod
+    def config_written(self, was_powered: bool, was_receiver: bool) -> None:
+        """CONFIG has changed."""
+
+    @abc.abstractmethod
+    def frame_arrived(self, frame: Frame, power_dbm: float) -> None:
+        """A frame that it recognises has ended, its bits perhaps damaged."""
+
+    @abc.abstractmethod
+    def frame_left(self) -> None:
+        """The own frame has ended."""
+
+    @abc.abstractmethod
+    def _ce_changed(self, high: bool) -> None:
+        """The CE pin has another level."""
+
+    # -- flags ---------------------------------------------------------------------------------
+
+    def status(self) -> int:
+        """The STATUS register as it is now."""
+        oldest = self.rx_fifo.oldest
+        pipe = RX_FIFO_IS_EMPTY if oldest is None else oldest.pipe
+        return self.flags | pipe << RX_P_NO.lsb | self.tx_fifo.full
+
+    def set_flags(self, flags: int) -> None:
+        """Raise some of RX_DR, TX_DS, MAX_RT."""
+        self.flags |= flags
+        self.update_irq()
+
+    def clear_flags(self, flags: int) -> None:
+        """Clear some of them."""
+        self.flags &= ~flags
+        self.update_irq()
+
+    def update_irq(self) -> None:
+        """The pin is low while a flag is set that CONFIG does not mask."""
+        stuck = self.faults.irq_stuck_at
+        high = not self.flags & self.registers.irq_sources if stuck is None else stuck
+        self.irq.set(high)
+
+    # -- timers ------------------------------------------------------------------------------
+
+    def after(self, delay_ns: int, step: Callable[[], None]) -> None:
+        """Schedule the next step of the current activity, unless it is overtaken."""
+        self.clock.call_at(self.clock.now_ns + delay_ns, self._step, self._epoch, step)
+
+    def _step(self, epoch: int, step: Callable[[], None]) -> None:
+        if epoch == self._epoch:
+            step()
+
+    def overtake(self) -> None:
+        """Void all pending steps."""
+        self._epoch += 1
+
+    # -- air -----------------------------------------------------------------------------------
+
+    def listen(self, state: State) -> None:
+        """The receiver has settled."""
+        self.state = state
+        self._rpd_latched = False
+        self._listening_to = (self.registers.channel, self.registers.bits_per_s)
+        self.air.listen(self, *self._listening_to)
+
+    def stop_listening(self) -> None:
+        """The receiver is switched off; RPD keeps what it saw last."""
+        if self.listening_since_ns is not None:
+            self._rpd_latched = self.rpd()
+            self.air.stop_listening(self, *self._listening_to)
+
+    def retune(self) -> None:
+        """Channel or rate changed: frames on the air now are lost."""
+        if self.listening_since_ns is not None:
+            self.stop_listening()
+            self.listen(self.state)
+
+    def rpd(self) -> bool:
+        """Received power detector: more than -64 dBm now, or when a packet came, or at the end."""
+        if self._rpd_latched or self.listening_since_ns is None:
+            return self._rpd_latched
+        channel = self._listening_to[0]
+        return self.air.energy_dbm(self, channel, self.listening_since_ns) > RPD_DBM
+
+    def transmit(self, frame: Frame, packet: object) -> None:
+        """Put a frame on the air; `frame_left` is called at its end."""
+        registers = self.registers
+        power_dbm = -300.0 if self.faults.dead_transmitter else float(registers.tx_dbm)
+        radio = (registers.channel, registers.bits_per_s, power_dbm)
+        self.flight = self.air.transmit(self, frame, radio, packet)
+        if self.faults.dead_transmitter:
+            self.flight.listeners = ()
+
+    def recognises(self, frame: Frame) -> bool:
+        registers = self.registers
+        if self.faults.dead_receiver:
+            return False
+        address = frame.address(registers.address_bytes)
+        if self.state is State.ACK_WAIT:
+            return registers.pipe_of_address.get(address) == 0  # acknowledgements
+        return address in registers.pipe_of_address
+
+    def abort(self) -> None:
+        """Stop whatever is going on, on the air too."""
+        self.overtake()
+        self.stop_listening()
+        if self.flight is not None:
+            self.air.abort(self.flight)
+            self.flight = None
+
+    def latch_rpd(self) -> None:
+        """A packet came with more than RPD_DBM: RPD stays set."""
+        self._rpd_latched = True
