@@ -27,13 +27,15 @@ class FlightPath:
     """One flight in straight lines: up, across, down.
 
     A flight over a straight distance d takes d / speed_m_s and climbs d / 2. The way flown is
-    longer than d, so a drone is faster than that for most of it.
+    longer than d, so a drone is faster than that for most of it. Climbing higher than d / 2, as
+    `across_m` asks, takes the time of the extra metres.
     """
 
     start: Vector
     goal: Vector
     start_s: float  # when it leaves `start`, simulated seconds
     speed_m_s: float = SPEED_M_S
+    across_m: float = -math.inf  # the way across is at least so high, to pass over something
     duration_s: float = field(init=False)
     above_start: Vector = field(init=False)  # where it is at 10 %
     above_goal: Vector = field(init=False)  # where it is at 90 %
@@ -41,10 +43,13 @@ class FlightPath:
     def __post_init__(self) -> None:
         distance_m = math.dist(self.start, self.goal)
         climb_m = distance_m / 2
+        usual = (self.start[2] + climb_m, self.goal[2] + climb_m)
+        heights = [max(height, self.across_m) for height in usual]
+        extra_m = sum(height - least for height, least in zip(heights, usual))
         derived = {
-            "duration_s": distance_m / self.speed_m_s,
-            "above_start": (self.start[0], self.start[1], self.start[2] + climb_m),
-            "above_goal": (self.goal[0], self.goal[1], self.goal[2] + climb_m),
+            "duration_s": (distance_m + extra_m) / self.speed_m_s,
+            "above_start": (self.start[0], self.start[1], heights[0]),
+            "above_goal": (self.goal[0], self.goal[1], heights[1]),
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)

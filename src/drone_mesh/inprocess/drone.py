@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Protocol
+from typing import Any, Callable, Optional, Protocol
 
-from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 
@@ -17,6 +17,9 @@ class Time(Protocol):
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None: ...
 
+PlanFlight = Callable[[Vector, Vector, float, float], Optional[FlightPath]]
+"""From start, goal, time and speed to a flight."""
+
 
 class InProcessDrone(IDroneEngine):
     """Where one drone is. It flies like the drones of the world."""
@@ -28,6 +31,8 @@ class InProcessDrone(IDroneEngine):
         self._path: FlightPath | None = None
         self._on_flight = on_flight
         self.speed_m_s = SPEED_M_S  # of its next flight; experiments change it: wind
+        # None from it: no way, and the drone stays. Obstacles put a planner of their own here.
+        self.plan_flight: PlanFlight = FlightPath
 
     @property
     def path(self) -> FlightPath | None:
@@ -41,9 +46,12 @@ class InProcessDrone(IDroneEngine):
         goal = Location(latitude, longitude, height).to_vector()
         if goal == (self._path.goal if self._path else here.to_vector()):
             return
+        plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
+        if plan is None:
+            return
         if self._path is None:
             self._on_flight(True)
-        self._path = FlightPath(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
+        self._path = plan
         self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
 
     def get_location(self) -> Location:

@@ -46,6 +46,8 @@ class InProcessAir:
         self._jitter_s = jitter_s
         self._antennas: dict[int, InProcessAntenna] = {}
         self._cut: set[frozenset[int]] = set()
+        # Whether two places within range hear each other: obstacles say so before the nodes start.
+        self.sees: Callable[[Location, Location], bool] | None = None
         # The links between nodes that stand still: looked up for each packet, and changed only when
         # a node appears, disappears or flies.
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
@@ -104,6 +106,8 @@ class InProcessAir:
             if math.dist(here, there) < reach_m
         }
         heard.pop(node, None)
+        if self.sees is not None:
+            heard = {n: heard[n] for n in heard if self.sees(here, others[n])}
         if self._cut:
             return {n: heard[n] for n in heard if frozenset((node, n)) not in self._cut}
         return heard

@@ -42,7 +42,6 @@ class Flights:
 
     def __init__(self, network: Network) -> None:
         self.legs: list[Leg] = []
-        self.refused = 0  # flights that an obstacle did not allow
         self._network = network
         self._current: dict[int, Leg] = {}
         self._flown_m: dict[int, float] = {}  # on legs that are over

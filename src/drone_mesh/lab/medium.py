@@ -9,6 +9,7 @@ from typing import Callable
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import IWirelessCommunication
+from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
 
@@ -45,6 +46,7 @@ class Medium:
     lost: int = 0
     jams: list[Jamming] = field(default_factory=list)
     sent_by: dict[int, int] = field(default_factory=dict)
+    arrives: Callable[[Location, Location], float] | None = None  # share, by fading
 
     def __post_init__(self) -> None:
         self._links: dict[tuple[int, int], random.Random] = {}
@@ -80,7 +82,7 @@ class Medium:
     def send(self, payload: bytes) -> bool:
         """As the air's."""
         sender, to = self._count(payload)
-        if (self.loss or self.jams) and self._is_lost(sender, to):
+        if (self.loss or self.jams or self.arrives) and self._is_lost(sender, to):
             self.lost += 1
             return False
         return self._send(payload)
@@ -103,6 +105,8 @@ class Medium:
         for jam in self.jams:
             if self._is_inside(jam, sender) or self._is_inside(jam, to):
                 loss = 1.0 - (1.0 - loss) * (1.0 - jam.loss)
+        if self.arrives is not None and to in self.network.nodes:
+            loss = 1.0 - (1.0 - loss) * self.arrives(*map(self.network.location, (sender, to)))
         if not loss:
             return False
         link = (sender, to)

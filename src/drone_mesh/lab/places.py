@@ -6,8 +6,9 @@ import csv
 import math
 import random
 from pathlib import Path
-from typing import Callable, NamedTuple
+from typing import Callable, List, NamedTuple, Tuple
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.fleet import MAX_DRONES, plan_fleet
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
@@ -20,6 +21,9 @@ MOST_DRAWS = 2000  # of a random layout that has to be connected
 PLACES_HEADER = ["id", "x", "y", "role"]
 
 
+Draw = Callable[[Layout, float, Callable[[], float]], List[Tuple[float, float]]]
+
+
 class StartPlace(NamedTuple):
     """Where one drone starts, in metres."""
 
@@ -29,8 +33,13 @@ class StartPlace(NamedTuple):
     gateway: bool
 
 
-def draw_places(layout: Layout, range_m: float, rng: random.Random) -> list[StartPlace]:
-    """All drones by id. Raises ConfigurationError for a layout that cannot be had."""
+def draw_places(
+    layout: Layout, range_m: float, rng: random.Random, obstacles: Obstacles | None = None
+) -> list[StartPlace]:
+    """All drones by id. Raises ConfigurationError for a layout that cannot be had.
+
+    Random places keep out of the obstacles; "connected" counts what these do to the links.
+    """
     if layout.kind == "file":
         return [StartPlace(int(i), x, y, bool(g)) for i, x, y, g in layout.places or ()]
     if layout.kind == "casus":
@@ -41,7 +50,7 @@ def draw_places(layout: Layout, range_m: float, rng: random.Random) -> list[Star
     elif layout.kind == "grid":
         places = _grid(layout)
     else:
-        points = _connected_points(layout, range_m, rng)
+        points = _connected_points(layout, range_m, rng, obstacles)
         places = _with_gateways(layout, points, rng)
     return _shuffled(places, rng) if layout.ids == "shuffled" else places
 
@@ -106,17 +115,52 @@ def _grid(layout: Layout) -> list[StartPlace]:
 
 
 def _connected_points(
-    layout: Layout, range_m: float, rng: random.Random
+    layout: Layout, range_m: float, rng: random.Random, obstacles: Obstacles | None
 ) -> list[tuple[float, float]]:
     draw = _clusters if layout.kind == "clusters" else _uniform
     for _ in range(MOST_DRAWS):
         points = draw(layout, range_m, rng.random)
-        if layout.require == "nothing" or Graph(within(points, range_m)).is_connected():
+        if obstacles is not None and not all(obstacles.is_free((x, y, 0.0)) for x, y in points):
+            points = _moved_out(points, obstacles, layout, range_m, draw, rng)
+        if layout.require == "nothing" or _graph(points, range_m, obstacles).is_connected():
             return points
     raise ConfigurationError(
         f"layout {layout.kind}: none of {MOST_DRAWS} draws was connected; use fewer metres, a "
         "higher mean_degree or require: nothing"
     )
+
+
+def _moved_out(
+    points: list[tuple[float, float]],
+    obstacles: Obstacles,
+    layout: Layout,
+    range_m: float,
+    draw: Draw,
+    rng: random.Random,
+) -> list[tuple[float, float]]:
+    """Draw again what lies in a box, until nothing does."""
+    for _ in range(MOST_DRAWS):
+        inside = [i for i, (x, y) in enumerate(points) if not obstacles.is_free((x, y, 0.0))]
+        if not inside:
+            return points
+        fresh = draw(layout, range_m, rng.random)
+        for index in inside:
+            points[index] = fresh[index]
+    raise ConfigurationError(f"layout {layout.kind}: the boxes leave no place for the drones")
+
+
+def _graph(points: list[tuple[float, float]], range_m: float, obstacles: Obstacles | None) -> Graph:
+    near = within(points, range_m)
+    if obstacles is not None:
+        near = {
+            i: [
+                j
+                for j in others
+                if obstacles.margin_db((*points[i], 0.0), (*points[j], 0.0), range_m) > 0
+            ]
+            for i, others in near.items()
+        }
+    return Graph(near)
 
 
 def width_for(drones: int, mean_degree: float, range_m: float) -> float:

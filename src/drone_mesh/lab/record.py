@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Mapping, Sequence, Tuple
+from typing import Mapping, NamedTuple, Sequence, Tuple
 
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.graph import Graph
@@ -17,8 +17,7 @@ Place = Tuple[float, float, float]  # x, y, z in metres
 HOLD_S = 5.0  # our choice: served again means for so long without a break
 
 
-@dataclass(frozen=True)
-class Scene:
+class Scene(NamedTuple):
     """The network's shape at one moment."""
 
     graph: Graph  # of all nodes with power

@@ -14,6 +14,7 @@ from pydantic import (
 from typing_extensions import Annotated, Literal
 
 from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.lab.conditions import parse_condition
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -117,7 +118,7 @@ class Box(Part):
     center: Annotated[List[float], Field(min_length=3, max_length=3)]  # m
     size: Annotated[List[Above0], Field(min_length=3, max_length=3)]  # m along x, y, z
     yaw_deg: float = 0.0
-    material: str = "brick"
+    material: Literal["brick", "wood", "window", "stone", "concrete"] = "brick"
 
 
 class Pick(Part):
@@ -277,7 +278,8 @@ class Obstacles(Part):
     metre_db: AtLeast0 = 0.4  # wall: per metre inside, the same source
     exponent: Annotated[float, Field(ge=1, le=6)] = 2.0  # of the path loss
     fading: Literal["none", "rayleigh", "rician"] = "none"
-    rician_k_db: float = 10.0
+    rician_k_db: Annotated[float, Field(ge=-20, le=40)] = 10.0
+    ceiling_m: Annotated[float, Field(gt=0, le=MAX_HEIGHT_M)] = MAX_HEIGHT_M  # of flights
 
 
 class Scenario(Part):
@@ -302,6 +304,6 @@ class Scenario(Part):
             for fault in self.faults:
                 if fault.action in ("cut_link", "jam", "loss"):
                     raise ValueError(f"fault {fault.action} is for the disc radio")
-            if self.obstacles.boxes:
+            if self.obstacles.boxes or self.obstacles.fading != "none":
                 raise ValueError("obstacles are for the disc radio")
         return self

@@ -15,7 +15,8 @@ from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.look import Look, gateways_of, look_at, physical_graph, route_hops
 from drone_mesh.lab.medium import Medium
 from drone_mesh.lab.metrics import STACKED_M
-from drone_mesh.lab.places import draw_places
+from drone_mesh.lab.places import StartPlace, draw_places
+from drone_mesh.lab.propagation import obstacles_of, put_obstacles
 from drone_mesh.lab.record import RunRecord, Scene
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
@@ -35,10 +36,12 @@ class Simulation:
         self.scenario = scenario
         self.network = _network(scenario, streams)
         self.medium = Medium(self.network, streams.of, scenario.radio.loss)
+        self._planner = put_obstacles(self.network, self.medium, scenario)
         self.flights = Flights(self.network)
         self.timeline = Timeline(scenario, self.network, self.medium, self.flights, streams, self)
         self._looks: list[Look] = []
-        self._start = self._scene(None)
+        self._start_places = self._places()
+        self._start: Scene | None = None
         self._before: Scene | None = None
         self._after_fault: Graph | None = None
         self._pairs: set[tuple[int, int]] = set()
@@ -53,9 +56,12 @@ class Simulation:
             step += 1
             self._pass_time(min(end_s, step * scenario.sample_s))
             look = self._look()
+            if self._start is None:
+                self._start = self._scene(look)._replace(places=self._start_places)
             self.timeline.check(look)
             if on_status is not None:
                 on_status(network.status())
+        assert self._start is not None  # a run has at least one sample
         return RunRecord(
             scenario=scenario,
             gateways=frozenset(gateways_of(network)),
@@ -75,7 +81,7 @@ class Simulation:
             end_s=end_s,
             airtime_s=getattr(network.air, "airtime_s", None),
             frames_destroyed=getattr(network.air, "collisions", None),
-            refused_flights=self.flights.refused,
+            refused_flights=0 if self._planner is None else len(self._planner.refused),
         )
 
     def event_hash(self) -> str:
@@ -151,10 +157,15 @@ def _network(scenario: Scenario, streams: Streams) -> Network:
         max_distance_m=scenario.range_m,
         **_options(scenario),
     )
-    for place in draw_places(scenario.layout, scenario.range_m, streams.of("layout")):
+    for place in _places(scenario, streams):
         add = network.add_gateway if place.gateway else network.add_router
         add(place.node_id, place.x, place.y)
     return network
+
+
+def _places(scenario: Scenario, streams: Streams) -> list[StartPlace]:
+    obstacles = obstacles_of(scenario.obstacles) if scenario.obstacles.boxes else None
+    return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
 
 
 def _options(scenario: Scenario) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.metrics import METRICS, measure_all
 from drone_mesh.lab.places import draw_places
+from drone_mesh.lab.propagation import success
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Layout, Scenario
 from drone_mesh.lab.simulation import Simulation
@@ -309,3 +310,73 @@ def test_a_stale_route_is_an_outage_even_before_it_is_noticed() -> None:
     (first, *_) = record.gaps()
     assert first.lost_s == 20.0
     assert {gap.node for gap in record.gaps()} == {2, 3, 4}
+
+
+# Obstacles
+
+HOUSE = {"center": [9, 0, 5], "size": [2, 6, 10]}
+
+
+def test_a_wall_between_two_drones_ends_their_link_and_without_it_the_run_is_the_same() -> None:
+    def events(**obstacles: Any) -> list[str]:
+        content = {
+            "layout": {"kind": "line", "drones": 3}, "duration_s": 30, "obstacles": obstacles,
+        }  # fmt: skip
+        simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
+        record = simulation.run()
+        return [simulation.event_hash(), sorted(record.looks[-1].served)]
+
+    assert events(boxes=[HOUSE])[1] == [1]
+    assert events(boxes=[{**HOUSE, "center": [9, 50, 5]}]) == events()
+
+
+def test_drones_and_repairs_keep_out_of_the_boxes() -> None:
+    boxes = [
+        {"center": [x, y, 4], "size": [6, 6, 8]} for x in (8, 24, 40) for y in (8, 24, 40)
+    ]  # fmt: skip
+    content = {
+        "layout": {"drones": 40, "width_m": 48, "require": "nothing"},
+        "obstacles": {"boxes": boxes}, "duration_s": 120, "faults": [kill(share=0.3)],
+        "timing": {"connection_lost_after_s": 5},
+    }  # fmt: skip
+    flown = 0
+    for repetition in range(4):
+        simulation = Simulation(Scenario.model_validate(content), Streams(1, repetition))
+        record = simulation.run()
+        assert simulation._planner is not None
+        free = simulation._planner.obstacles.is_free
+        for leg in record.legs:
+            flown += 1
+            for share in range(51):
+                at_s = leg.path.start_s + leg.path.duration_s * share / 50
+                assert free(leg.path.position_at(at_s))
+        assert all(free(place) for place in record.end.places.values())
+    assert flown > 3
+
+
+def test_fading_loses_packets_of_weak_links_more_often() -> None:
+    def lost(spacing_m: float) -> float:
+        content = {
+            "layout": {"kind": "line", "drones": 2, "spacing_m": spacing_m},
+            "obstacles": {"fading": "rayleigh"}, "duration_s": 200,
+        }  # fmt: skip
+        simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
+        record = simulation.run()
+        return simulation.medium.lost / measure_all(record)["packets"]
+
+    assert lost(0.9) < 0.05  # a margin of 20 dB: 1 %
+    assert 0.5 < lost(8.9) < 0.75  # no margin: 63 %
+
+
+@pytest.mark.parametrize(
+    ("margin_db", "fading", "k_db", "expected"),
+    [
+        (0, "rayleigh", 0, 0.368), (10, "rayleigh", 0, 0.904), (-3, "rayleigh", 0, 0.136),
+        (0, "rician", 6, 0.436), (6, "rician", 6, 0.931), (3, "rician", 10, 0.900),
+        (-math.inf, "rician", 6, 0.0), (5, "none", 0, 1.0),
+    ],
+)  # fmt: skip
+def test_packets_arrive_as_often_as_the_fading_says(
+    margin_db: float, fading: str, k_db: float, expected: float
+) -> None:
+    assert success(margin_db, fading, k_db) == pytest.approx(expected, abs=0.002)

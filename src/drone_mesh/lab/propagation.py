@@ -1,0 +1,100 @@
+"""What obstacles and fading do to the links and the flights of one run."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Callable
+
+from drone_mesh.air.obstacles import CUT_DB, Box, Obstacles
+from drone_mesh.drone.flight_path import FlightPath, Vector
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.inprocess import Network
+from drone_mesh.lab import scenario as given
+from drone_mesh.lab.medium import Medium
+
+MARGIN_STEP_DB = 0.1  # of the fading table
+
+
+def obstacles_of(part: given.Obstacles) -> Obstacles:
+    """The boxes of a scenario. A material is one of CUT_DB; brick is as damped as `cut_db` says."""
+    boxes = [
+        Box(
+            (box.center[0], box.center[1], box.center[2]),
+            (box.size[0], box.size[1], box.size[2]),
+            math.radians(box.yaw_deg),
+            part.cut_db if box.material == "brick" else CUT_DB[box.material],
+        )
+        for box in part.boxes
+    ]
+    return Obstacles(boxes, part.radio == "block", part.metre_db, part.exponent, part.ceiling_m)
+
+
+def success(margin_db: float, fading: str, k_db: float) -> float:
+    """Probability that one packet arrives over a link with this margin.
+
+    Rayleigh: the power is exponentially distributed about its mean. Rician: its line-of-sight part
+    is K times the rest; the power is then a scaled noncentral chi-squared variable.
+    """
+    if fading == "none":
+        return 1.0
+    if math.isinf(margin_db):
+        return 0.0 if margin_db < 0 else 1.0
+    return _faded(round(margin_db / MARGIN_STEP_DB), fading, k_db)
+
+
+@functools.lru_cache(maxsize=4096)
+def _faded(steps: int, fading: str, k_db: float) -> float:
+    below = 10 ** (-steps * MARGIN_STEP_DB / 10)
+    if fading == "rayleigh":
+        return math.exp(-below)
+    from scipy.stats import ncx2  # the only part of a run that needs scipy
+
+    k = 10 ** (k_db / 10)
+    return float(ncx2.sf(2 * (k + 1) * below, 2, 2 * k))
+
+
+def put_obstacles(network: Network, medium: Medium, scenario: given.Scenario) -> Planner | None:
+    """Let the boxes act on links and flights; None where a scenario has neither boxes nor fading.
+
+    To be called before the nodes start.
+    """
+    part = scenario.obstacles
+    if not part.boxes and part.fading == "none":
+        return None
+    obstacles = obstacles_of(part)
+    range_m = scenario.range_m
+    if part.boxes:
+        medium.disc.sees = lambda a, b: (
+            obstacles.margin_db(a.to_vector(), b.to_vector(), range_m) > 0
+        )
+    if part.fading != "none":
+
+        def arrives(a: Location, b: Location) -> float:
+            margin_db = obstacles.margin_db(a.to_vector(), b.to_vector(), range_m)
+            return success(margin_db, part.fading, part.rician_k_db)
+
+        medium.arrives = arrives
+    planner = Planner(obstacles)
+    for node_id, node in network.nodes.items():
+        node.drone.plan_flight = functools.partial(planner.plan, node_id)
+    return planner
+
+
+class Planner:
+    """Plans flights past the boxes, and remembers those that there was no way for."""
+
+    def __init__(self, obstacles: Obstacles) -> None:
+        self.obstacles = obstacles
+        self.refused: list[int] = []  # node ids
+        self.on_refusal: Callable[[int], None] = lambda node: None
+
+    def plan(
+        self, node: int, start: Vector, goal: Vector, start_s: float, speed_m_s: float
+    ) -> FlightPath | None:
+        """As Obstacles.plan_flight."""
+        path = self.obstacles.plan_flight(start, goal, start_s, speed_m_s)
+        if path is None:
+            self.refused.append(node)
+            self.on_refusal(node)
+        return path
