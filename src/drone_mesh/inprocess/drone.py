@@ -17,6 +17,7 @@ class Time(Protocol):
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None: ...
 
+
 PlanFlight = Callable[[Vector, Vector, float, float], Optional[FlightPath]]
 """From start, goal, time and speed to a flight."""
 
