@@ -1,0 +1,55 @@
+"""What README and docs tell the reader to type works as it stands there."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from fenced_blocks import PAGES, ROOT, blocks  # noqa: E402
+
+PYTHON = blocks("python")
+LIMIT_S = 100
+
+
+@pytest.mark.parametrize(
+    "page", sorted({block.page for block in PYTHON}), ids=lambda page: str(page.relative_to(ROOT))
+)
+def test_the_python_of_a_page_runs_from_top_to_bottom(page, tmp_path):
+    code = "".join(block.text for block in PYTHON if block.page == page)
+    for package in re.findall(r"^(?:from|import) (circuitpython_\w+)", code, flags=re.MULTILINE):
+        if importlib.util.find_spec(package) is None:
+            pytest.skip(f"{package} needs a newer Python")
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=str(tmp_path),
+        env={"PYTHONPATH": str(ROOT / "src")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=LIMIT_S,
+    )
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("block", blocks("bash"), ids=str)
+def test_each_block_of_commands_is_run_by_a_test_or_says_why_not(block):
+    assert block.test == "simulation" or re.fullmatch(r"none, \w.+", block.test), block.test
+
+
+def test_commands_stand_in_blocks_of_bash():
+    """Another block would escape the test above. "$ ..." is a session with its output."""
+    for page in PAGES:
+        opening = None
+        for line in page.read_text(encoding="utf-8").splitlines():
+            if line.startswith("```"):
+                opening = line if opening is None else None
+            elif opening == "```":
+                words = ("python3 ", "ros", "scripts/", "source ", "PYTHONPATH=")
+                assert not line.startswith(words), (page, line)
