@@ -6,6 +6,7 @@ class Message:
     __slots__: list[str]
     _type: str
     _md5sum: str
+    _connection_header: dict[str, str]  # of a received message
     def serialize(self, buff: IO[bytes]) -> None: ...
     def deserialize(self, str: bytes) -> Self: ...
 

@@ -18,6 +18,7 @@ CLOCK_TOPIC = "/clock"
 FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the factor achieved, once a second
 SPEED_SERVICE = "/DroneFactory/setSpeed"  # SetSpeed
 PROGRESS_TOPIC = "/mesh/progress"  # Header: up to when a host in another process has done its work
+SIM_TIME_PARAM = "/use_sim_time"
 FLEET_PARAM = "/drone_mesh/fleet"  # the factory's configuration, for hosts in other processes
 
 REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
@@ -27,6 +28,11 @@ DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simu
 
 MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz
 MAP_FRAME = "map"
+
+
+def host_param(host: str) -> str:
+    """The parameter by which a ROS node declares that it runs nodes of the mesh: their ids."""
+    return f"/drone_mesh/hosts/{host.strip('/')}"
 
 
 def drone_frame(node_id: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from typing import Callable, Protocol
 
 from drone_mesh.communication.messages import MessageType, packet
@@ -28,12 +29,18 @@ def probe_of(node_id: int) -> bytes:
 class Announcements:
     """Announces antennas to the simulator until their own probes return.
 
-    Any thread. `_lock` guards all fields, and is not held while something is published.
+    Later it goes on announcing them in turn: another DroneInfo with their id could have taken their
+    packets elsewhere.
+
+    Any thread. `_lock` guards all fields. `_announcing` keeps the order of what is published that
+    of the antennas' power; publishing only puts into a queue.
     """
 
     def __init__(self, publish: Callable[[DroneInfo], None]) -> None:
         self._publish = publish
         self._lock = threading.Lock()
+        self._announcing = threading.Lock()
+        self._rota: deque[int] = deque()  # ids of all antennas, the one announced longest ago first
         self._antennas: dict[int, Antenna] = {}
         self._on_registered: dict[int, Callable[[], None]] = {}
         self._unregistered: set[int] = set()
@@ -47,6 +54,7 @@ class Announcements:
             self._antennas[antenna.node_id] = antenna
             self._on_registered[antenna.node_id] = on_registered
             self._unregistered.add(antenna.node_id)
+            self._rota.append(antenna.node_id)
         self.announce(antenna)
 
     def remove(self, antenna: Antenna) -> None:
@@ -55,11 +63,14 @@ class Announcements:
             self._antennas.pop(antenna.node_id, None)
             self._on_registered.pop(antenna.node_id, None)
             self._unregistered.discard(antenna.node_id)
+            if antenna.node_id in self._rota:
+                self._rota.remove(antenna.node_id)
 
     def announce(self, antenna: Antenna) -> None:
         """Publish where this antenna listens, and whether it has power."""
         topic = names.node_topic(antenna.node_id)
-        self._publish(antenna_info(antenna.node_id, topic, antenna.on()))
+        with self._announcing:
+            self._publish(antenna_info(antenna.node_id, topic, antenna.on()))
 
     def announce_all_to_new_simulator(self) -> None:
         """No antenna is registered any more: announce them all."""
@@ -70,6 +81,14 @@ class Announcements:
     def announce_unregistered(self) -> None:
         """Repeat the announcement of each antenna whose probe has not returned."""
         for antenna in self.unregistered():
+            self.announce(antenna)
+
+    def announce_next(self, count: int) -> None:
+        """Repeat the announcements of up to so many antennas, each in its turn."""
+        with self._lock:
+            antennas = [self._antennas[n] for n in list(self._rota)[:count]]
+            self._rota.rotate(-count)
+        for antenna in antennas:
             self.announce(antenna)
 
     def unregistered(self) -> list[Antenna]:

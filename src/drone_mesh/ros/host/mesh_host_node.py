@@ -14,6 +14,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import or_stop
 from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone
@@ -101,6 +102,9 @@ def main() -> None:
         _log.info("serving %s", f"drones {ids.start}..{ids.stop - 1}" if ids else "no drones")
         settings = or_stop(lambda: MeshSettings.of(fleet))
         host = MeshHost(settings, lambda: clock.now_s, stop.fail)
+        # The world waits for declared hosts only.
+        rospy.set_param(names.host_param(rospy.get_name()), [ids.start, ids.stop - 1])
+        MasterWatch(names.host_param(rospy.get_name())).start()
         clock.drive(host.executor)
         host.start()
         try:

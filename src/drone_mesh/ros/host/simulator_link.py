@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 from typing import Sequence
 
@@ -18,6 +19,7 @@ from drone_mesh.ros.host.simulator_connection import SimulatorConnection
 
 LOOK_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
 ANNOUNCE_AGAIN_AFTER = 20  # looks; our choice: an unregistered antenna is announced again
+LOOKS_PER_ROUND = 50  # our choice: each antenna is announced at least once in so many looks
 
 _log = logging.getLogger(__name__)
 
@@ -140,6 +142,8 @@ class SimulatorLink(rospy.SubscribeListener):
                 self._lost(connection, ServiceGone("it closed its connections"))
             if self._connection is None:
                 self._try_to_connect()
+            if self._connection is not None:
+                self.antennas.announce_next(math.ceil(len(self.antennas) / LOOKS_PER_ROUND))
             if self._connection is not None and self.antennas.unregistered():
                 looks += 1
                 if looks % ANNOUNCE_AGAIN_AFTER == 0:

@@ -17,6 +17,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.conversions import flight_order, location_of
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import file_parameter, or_stop
 from drone_mesh.srv import (
     Casus,
@@ -109,4 +110,5 @@ def main() -> None:
     layouts = or_stop(lambda: Layouts.load(path))
     DroneManager(layouts)
     _log.info("%d layouts, built in and from %s", len(layouts.cases), path)
+    MasterWatch().start()
     rospy.spin()

@@ -19,6 +19,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.figures import Figures
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import factory_configuration, or_stop
 from drone_mesh.ros.services.antenna_topic import AntennaTopic
 from drone_mesh.srv import (
@@ -165,7 +166,7 @@ class WirelessSignalSimulator:
 
     def _is_heard(self, topic: str | None) -> bool:
         listener = None if topic is None else self._antenna_topics.get(topic)
-        return listener is not None and listener.has_receiver()
+        return listener is not None and listener.has_subscriber()
 
     def _carry(self, topic: str, message: NRF24) -> bool:
         listener = self._antenna_topics.get(topic)
@@ -190,4 +191,5 @@ def main() -> None:
     show_library_logs_on_rosout()
     WirelessSignalSimulator(max_distance_m)
     _log.info("nodes closer than %g m hear each other", max_distance_m)
+    MasterWatch().start()
     rospy.spin()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.fleet_parameter import set_fleet_parameter
@@ -52,6 +54,7 @@ class Simulation:
             EngineServer(drone, reporter)
         host = self._start_host(stop)
         set_fleet_parameter(self._parameters.configuration)
+        MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM).start()
         try:
             self._step(host, stop)
         finally:

@@ -1,0 +1,57 @@
+"""DirectPublisher: publishes in the caller's thread, and cuts off subscribers that do not read."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import warnings
+
+import rospy
+from genpy import Message
+from rospy.impl.transport import Transport
+
+
+class DirectPublisher(rospy.SubscribeListener):
+    """A publisher without queues, for topics that carry many small messages. Any thread.
+
+    A queue of rospy costs a thread for each subscriber and two switches for each message, and
+    hides that a subscriber has gone. Without it a subscriber that does not read can block the
+    caller, once its buffers in the kernel are full: for `limit_s`, then it is disconnected.
+    """
+
+    def __init__(self, topic: str, data_class: type[Message], limit_s: float) -> None:
+        """`limit_s`: wall seconds, below 1, for which one send may block."""
+        self._timeval = struct.pack("@ll", 0, int(limit_s * 1e6))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)  # rospy's about the missing queue
+            self._publisher = rospy.Publisher(
+                topic, data_class, subscriber_listener=self, tcp_nodelay=True, queue_size=None
+            )
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """A new subscriber (a thread of rospy): limit how long it can block."""
+        for connection in self.connections():
+            if connection.socket is not None:
+                connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, self._timeval)
+
+    def publish(self, message: Message) -> None:
+        """To all subscribers. Raises ROSException once the topic is closed."""
+        self._publisher.publish(message)
+
+    def has_subscriber(self) -> bool:
+        """Whether a process subscribes to the topic, and is still alive."""
+        implementation = self._publisher.impl  # None once it is closed
+        if implementation is None or not implementation.has_connections():
+            return False
+        # A killed process leaves its connection behind; rospy notices only at the second write.
+        implementation.check()
+        return bool(implementation.has_connections())
+
+    def connections(self) -> list[Transport]:
+        """The present connections to subscribers."""
+        implementation = self._publisher.impl
+        return [] if implementation is None else implementation.connections
+
+    def close(self) -> None:
+        """Withdraw the topic."""
+        self._publisher.unregister()

@@ -1,0 +1,74 @@
+"""MasterWatch: registers a node again when its master was restarted."""
+
+from __future__ import annotations
+
+import http.client
+import logging
+import threading
+import xmlrpc.client
+
+import rosgraph
+import rospy
+from rospy.impl.registration import (
+    Registration,
+    get_registration_listeners,
+    get_service_manager,
+    get_topic_manager,
+)
+
+PERIOD_S = 2.0  # wall; our choice
+_NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException)
+
+_log = logging.getLogger(__name__)
+
+
+class MasterWatch:
+    """Looks at the master in a thread of its own.
+
+    A new master knows nothing: connections between nodes stay, but nobody finds topics, services
+    and parameters. The watch registers all topics and services of this process again, and restores
+    its private parameters and those that it is given.
+    """
+
+    def __init__(self, *parameters: str) -> None:
+        """`parameters`: names of public parameters to restore, if they exist when it starts."""
+        self._names = [rospy.resolve_name(name) for name in (rospy.get_name(), *parameters)]
+        self._values: dict[str, object] = {}
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="master watch", daemon=True)
+
+    def start(self) -> None:
+        """Note the parameters, and look from now on, until the node shuts down."""
+        self._values = {
+            name: rospy.get_param(name) for name in self._names if rospy.has_param(name)
+        }
+        rospy.on_shutdown(self._stopped.set)
+        self._thread.start()
+
+    def _run(self) -> None:
+        master = rosgraph.Master(rospy.get_name())
+        while not self._stopped.wait(PERIOD_S):
+            try:
+                master.lookupNode(rospy.get_name())
+            except rosgraph.MasterException:  # it answers, and does not know this node
+                if not (self._stopped.is_set() or rospy.is_shutdown()):
+                    self._register_again()
+            except _NO_ANSWER as error:
+                _log.debug("the master does not answer: %s", error)
+
+    def _register_again(self) -> None:
+        listeners = get_registration_listeners()
+        try:
+            for name, value in self._values.items():
+                rospy.set_param(name, value)
+        except _NO_ANSWER as error:
+            _log.debug("the master does not answer: %s", error)
+            return
+        topics, services = get_topic_manager(), get_service_manager()
+        for name, kind in topics.get_publications():
+            listeners.notify_added(name, kind, Registration.PUB)
+        for name, kind in topics.get_subscriptions():
+            listeners.notify_added(name, kind, Registration.SUB)
+        for name, uri in services.get_services():
+            listeners.notify_added(name, uri, Registration.SRV)
+        _log.warning("registered %s again: the master was restarted", rospy.get_name())

@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""The master is killed in mid-run and comes back knowing nothing; everything is found again."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import unittest
+from typing import Iterator
+
+import psutil
+import rosgraph
+import rostest
+from rostest_support import free_port, wait_for
+
+STARTED_WITHIN_S = 60.0
+FOUND_WITHIN_S = 30.0
+
+
+class MasterRestartTest(unittest.TestCase):
+    def setUp(self) -> None:
+        self.port = free_port()
+        self.environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}"}
+
+    @contextlib.contextmanager
+    def started(self, *command: str) -> Iterator[subprocess.Popen[bytes]]:
+        process = subprocess.Popen(
+            command,
+            env=self.environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        try:
+            yield process
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            try:
+                process.wait(timeout=20)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+
+    def run_tool(self, *command: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            command,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=60,
+            check=False,
+            text=True,
+        )
+
+    def all_connected(self) -> bool:
+        """What `status` finds: it needs the state's topic and the parameter of simulated time."""
+        return self.run_tool("rosrun", "drone_mesh", "status").returncode == 0
+
+    def master_answers(self) -> bool:
+        return rosgraph.is_master_online(self.environment["ROS_MASTER_URI"])
+
+    def test_topics_services_and_parameters_are_found_again(self) -> None:
+        core = ("roscore", "-p", str(self.port))
+        fleet = ("roslaunch", "--wait", "drone_mesh", "factory.launch", "routers:=2")
+        with contextlib.ExitStack() as stack:
+            first = stack.enter_context(self.started(*core))
+            wait_for("a master", STARTED_WITHIN_S, self.master_answers)
+            stack.enter_context(self.started(*fleet))
+            wait_for("all connected", STARTED_WITHIN_S, self.all_connected)
+            for process in psutil.Process(first.pid).children(recursive=True):
+                process.kill()
+            first.kill()
+            wait_for("the master's death", FOUND_WITHIN_S, lambda: not self.master_answers())
+            stack.enter_context(self.started(*core))
+            wait_for("a new master", STARTED_WITHIN_S, self.master_answers)
+            wait_for("the state found again", FOUND_WITHIN_S, self.all_connected)
+            simulated = self.run_tool("rosparam", "get", "/use_sim_time")
+            self.assertEqual(simulated.stdout.strip(), "true")
+            order = ("/DroneManager/requestDroneMovement", "2", "3", "3", "0")
+            ordered = self.run_tool("rosservice", "call", *order)
+            self.assertIn("status: 1", ordered.stdout)
+            switched = self.run_tool("rosservice", "call", "/Nodes/1/powerSwitch", "false")
+            self.assertEqual(switched.returncode, 0, switched.stdout)
+            seen = self.run_tool("rosservice", "call", "/SignalSimulator/othersinRange", "0")
+            self.assertNotIn("[1", seen.stdout)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "master_restart", MasterRestartTest)

@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""What other nodes publish or do not read does not cut off a node, nor slow the world down."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import unittest
+from xmlrpc.client import ServerProxy
+
+import psutil
+import rosgraph
+import rospy
+import rostest
+from rosgraph_msgs.msg import Clock
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, pid_of, wait_for
+
+from drone_mesh.msg import DroneInfo
+
+STUCK = 30
+TAKEN_AWAY = "/taken/away"
+
+
+def subscribe_and_never_read(number: int) -> socket.socket:
+    """A subscriber of /clock that shakes hands and then leaves everything in its buffer."""
+    publisher = ServerProxy(rosgraph.Master("/test").lookupNode("/DroneFactory"))
+    _code, _text, protocol = publisher.requestTopic(f"/stuck_{number}", "/clock", [["TCPROS"]])
+    _tcpros, host, port = protocol
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+    connection.connect((host, port))
+    fields = {"callerid": f"/stuck_{number}", "topic": "/clock", "type": Clock._type}
+    lines = [f"{k}={v}".encode() for k, v in {**fields, "md5sum": Clock._md5sum}.items()]
+    header = b"".join(struct.pack("<I", len(line)) + line for line in lines)
+    connection.sendall(struct.pack("<I", len(header)) + header)
+    return connection
+
+
+def published_topics() -> set[str]:
+    return {topic for topic, _type in rospy.get_published_topics()}
+
+
+class StrayMessagesTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        rospy.init_node("test_stray_messages")
+        cls.log = LogWatch()
+        cls.mesh = MeshWatch(3)
+        cls.mesh.wait("all connected", 30, cls.mesh.connected)
+
+    def test_a_node_whose_packets_were_redirected_recovers_by_itself(self) -> None:
+        publisher = rospy.Publisher("/WirelessSignalSimulator", DroneInfo, queue_size=10)
+        wait_for("the simulator", WALL_LIMIT_S, lambda: publisher.get_num_connections() > 0)
+        publisher.publish(DroneInfo(2, (0.0, 0.0, 0.0), TAKEN_AWAY, True))
+        wait_for("a line about it", WALL_LIMIT_S, lambda: self.log.lines(TAKEN_AWAY))
+        self.assertIn("topic changed: node 2: from /Node/2", self.log.lines(TAKEN_AWAY)[0])
+        wait_for("its own topic again", WALL_LIMIT_S, lambda: TAKEN_AWAY not in published_topics())
+        sent = self.mesh.info(2).totalMessages
+        self.mesh.wait(
+            "2 sends and is connected",
+            40,
+            lambda: self.mesh.info(2).totalMessages > sent and self.mesh.connected(),
+        )
+        self.assertEqual(self.log.failures(), [])
+
+    def test_subscribers_of_the_clock_that_never_read_cost_the_world_no_thread(self) -> None:
+        factory = psutil.Process(pid_of("/DroneFactory"))
+        before = factory.num_threads()
+        stuck = [subscribe_and_never_read(number) for number in range(STUCK)]
+        self.addCleanup(lambda: [connection.close() for connection in stuck])
+        for connection in stuck:  # the publisher's header comes first, then the ticks
+            self.assertGreater(len(connection.recv(1)), 0)
+        self.assertLess(factory.num_threads(), before + STUCK // 2)
+        now_s = rospy.get_time()
+        wait_for("the clock to go on", WALL_LIMIT_S, lambda: rospy.get_time() > now_s + 1.0)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "stray_messages", StrayMessagesTest)
