@@ -108,9 +108,9 @@ def load_configuration(
         configuration = FactoryConfiguration(**values)
     except ValidationError as error:
         name = str(error.errors()[0]["loc"][0])
-        shown = "nothing" if values[name] is None else reprlib.repr(values[name])
+        shown = "(empty)" if values[name] is None else reprlib.repr(values[name])
         raise ConfigurationError(
-            f"{where(name)}: {name} is {shown}, want {_allowed(name)}"
+            f"{where(name)}: invalid {name} {shown}: expected {_allowed(name)}"
         ) from None
     _log.info("seed %d: seed:=%d repeats this run", configuration.seed, configuration.seed)
     return configuration

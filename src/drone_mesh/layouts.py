@@ -129,29 +129,31 @@ def _refusal(file: YamlFile, found: Sequence[Any]) -> ConfigurationError:
     unknown = [error["loc"][0] for error in found if error["type"] == "extra_forbidden"]
     if unknown:
         where = file.where(unknown[0])
-        return ConfigurationError(f"{where}: unknown key {unknown[0]}; want only 'cases'")
+        return ConfigurationError(f"{where}: unknown key {unknown[0]}: expected only 'cases'")
     loc = found[0]["loc"]
     is_key = loc[-1] == "[key]"  # the key itself is wrong, and stands before that as text
     keys = (*loc[:-2], found[0]["input"]) if is_key else loc
     where = file.where(*keys)
     if len(keys) == 1:
-        return ConfigurationError(f"{where}: want 'cases:' with one layout for each case number")
+        return ConfigurationError(f"{where}: expected 'cases:' with one layout per case number")
     case = keys[1]
     if len(keys) == 2 and is_key:
-        return ConfigurationError(f"{where}: case {case!r} is not a whole number 0..{MAX_CASE}")
+        return ConfigurationError(
+            f"{where}: invalid case {case!r}: must be a whole number 0..{MAX_CASE}"
+        )
     if len(keys) == 2:
         return ConfigurationError(
-            f"{where}: case {case}: want 'node id: [longitude, latitude, height]' lines"
+            f"{where}: case {case}: expected 'node id: [longitude, latitude, height]' lines"
         )
     node_id = keys[2]
     if is_key:
         return ConfigurationError(
-            f"{where}: case {case}: {node_id!r} is not a node id, want 0..{MAX_NODE_ID}"
+            f"{where}: case {case}: invalid node id {node_id!r}: must be 0..{MAX_NODE_ID}"
         )
     place = reprlib.repr(file.content["cases"][case][node_id])
     return ConfigurationError(
-        f"{where}: case {case}, drone {node_id}: {place} is not a place, "
-        "want three numbers [longitude, latitude, height]"
+        f"{where}: case {case}, drone {node_id}: invalid place {place}: "
+        "expected three numbers [longitude, latitude, height]"
     )
 
 

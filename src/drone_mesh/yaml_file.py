@@ -66,7 +66,9 @@ def read_mapping(path: str | Path) -> YamlFile:
     if content is None:
         content = {}
     if not isinstance(content, dict):
-        raise ConfigurationError(f"{path}: want 'key: value' lines, not a {type(content).__name__}")
+        raise ConfigurationError(
+            f"{path}: expected 'key: value' lines, not a {type(content).__name__}"
+        )
     return YamlFile(path, content, lines)
 
 

@@ -29,10 +29,14 @@ class BadArgumentsTest(unittest.TestCase):
         self.assertNotIn("Traceback", launch.stdout)
 
     def test_a_number_that_is_out_of_bounds(self) -> None:
-        self.launch_and_expect("max_distance:=-1", "argument: max_distance is '-1', want metres")
+        self.launch_and_expect(
+            "max_distance:=-1", "argument: invalid max_distance '-1': expected metres"
+        )
 
     def test_a_number_that_is_none(self) -> None:
-        self.launch_and_expect("hosts:=many", "argument: hosts is 'many', want a whole number")
+        self.launch_and_expect(
+            "hosts:=many", "argument: invalid hosts 'many': expected a whole number"
+        )
 
     def test_a_file_of_layouts_that_is_not_there(self) -> None:
         self.launch_and_expect("casus:=/no/such.yaml", "/no/such.yaml: No such file or directory")

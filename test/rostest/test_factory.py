@@ -64,7 +64,7 @@ class FactoryTest(unittest.TestCase):
         for factor in (math.nan, math.inf, -1.0, 1e-300, 1e-5, 100_000.0):
             answer = call("/DroneFactory/setSpeed", SetSpeed, False, factor)
             self.assertFalse(answer.success, factor)
-            self.assertIn("want 0.001..1000", answer.message)
+            self.assertIn("must be 0.001..1000", answer.message)
 
     def test_a_new_speed_takes_effect_during_the_wait_for_a_step_at_the_old_one(self) -> None:
         self.addCleanup(call, "/DroneFactory/setSpeed", SetSpeed, False, 4.0)

@@ -100,7 +100,7 @@ class SimulatorTest(unittest.TestCase):
         got = self.b.wait_for_packet(near, "the packet for 2 did not arrive")
         self.assertEqual(got, near.ljust(32, b"\x05"))
         self.assertEqual(self.far.heard, [])
-        with self.assertRaisesRegex(rospy.ServiceException, "33 bytes, want 32 per packet"):
+        with self.assertRaisesRegex(rospy.ServiceException, "33 bytes: expected 32 per packet"):
             call("/SignalSimulator/messages", WirelessMessages, 1, bytes(33))
 
     def test_a_node_that_is_off_neither_sends_nor_receives(self) -> None:

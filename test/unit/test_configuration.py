@@ -94,27 +94,33 @@ def test_as_fast_as_possible_is_a_factor_of_zero(write):
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        ("gateways: -1", "gateways is -1, want a whole number of drones, 0..254"),
-        ("routers: 255", "routers is 255, want a whole number of drones, 0..254"),
-        ("routers: 1.5", "routers is 1.5, want a whole"),
-        ("routers: many", "routers is 'many', want a whole"),
-        ("routers: true", "routers is True, want a whole"),
-        ("routers: [1]", r"routers is \[1\], want a whole"),
-        ("routers:", "routers is nothing, want a whole"),
-        ("gridsize: 0", "gridsize is 0, want a whole number of routers in a row, 1..254"),
-        ("spacing: 0", "spacing is 0, want metres, above 0, at most 1000"),
-        ("spacing: .nan", "spacing is nan, want metres"),
-        ("max_distance: .inf", "max_distance is inf, want metres, above 0"),
-        ("real_time_factor: -0.1", "real_time_factor is -0.1, want a factor, 0.001..1000, or 0"),
-        ("real_time_factor: 1.0e-9", "real_time_factor is 1e-09, want a factor, 0.001..1000"),
-        ("real_time_factor: .nan", "real_time_factor is nan, want a factor, 0.001..1000"),
-        ("check_period: 0", "check_period is 0, want seconds, 0.1..3600"),
-        ("connection_lost_after: soon", "connection_lost_after is 'soon', want seconds"),
-        ("debug: maybe", "debug is 'maybe', want true or false"),
-        ("gui: 2", "gui is 2, want true or false"),
-        ("routing: 3", "routing is 3, want the name of a routing technique"),
-        ("seed: -1", "seed is -1, want a whole number, 0..4294967295, or random"),
-        ("seed: 1.5", "seed is 1.5, want a whole number"),
+        ("gateways: -1", "invalid gateways -1: expected a whole number of drones, 0..254"),
+        ("routers: 255", "invalid routers 255: expected a whole number of drones, 0..254"),
+        ("routers: 1.5", "invalid routers 1.5: expected a whole"),
+        ("routers: many", "invalid routers 'many': expected a whole"),
+        ("routers: true", "invalid routers True: expected a whole"),
+        ("routers: [1]", r"invalid routers \[1\]: expected a whole"),
+        ("routers:", r"invalid routers \(empty\): expected a whole"),
+        ("gridsize: 0", "invalid gridsize 0: expected a whole number of routers in a row, 1..254"),
+        ("spacing: 0", "invalid spacing 0: expected metres, above 0, at most 1000"),
+        ("spacing: .nan", "invalid spacing nan: expected metres"),
+        ("max_distance: .inf", "invalid max_distance inf: expected metres, above 0"),
+        (
+            "real_time_factor: -0.1",
+            "invalid real_time_factor -0.1: expected a factor, 0.001..1000, or 0",
+        ),
+        (
+            "real_time_factor: 1.0e-9",
+            "invalid real_time_factor 1e-09: expected a factor, 0.001..1000",
+        ),
+        ("real_time_factor: .nan", "invalid real_time_factor nan: expected a factor, 0.001..1000"),
+        ("check_period: 0", "invalid check_period 0: expected seconds, 0.1..3600"),
+        ("connection_lost_after: soon", "invalid connection_lost_after 'soon': expected seconds"),
+        ("debug: maybe", "invalid debug 'maybe': expected true or false"),
+        ("gui: 2", "invalid gui 2: expected true or false"),
+        ("routing: 3", "invalid routing 3: expected the name of a routing technique"),
+        ("seed: -1", "invalid seed -1: expected a whole number, 0..4294967295, or random"),
+        ("seed: 1.5", "invalid seed 1.5: expected a whole number"),
         ("routters: 3", "unknown key routters; did you mean routers?"),
         ("colour: red", "unknown key colour; known are check_period, "),
         ("7: 3", "unknown key 7; known are"),
@@ -129,7 +135,9 @@ def test_a_bad_line_is_refused_with_file_line_key_value_and_what_is_allowed(writ
 
 
 def test_a_bad_override_is_refused_as_an_argument(write):
-    with pytest.raises(ConfigurationError, match="^argument: spacing is '-1', want metres"):
+    with pytest.raises(
+        ConfigurationError, match="^argument: invalid spacing '-1': expected metres"
+    ):
         load_configuration(write(""), {"spacing": "-1"})
     with pytest.raises(
         ConfigurationError, match="^argument: unknown key space; did you mean spacing?"
@@ -142,8 +150,8 @@ def test_a_bad_override_is_refused_as_an_argument(write):
     [
         ("routers: 1\nrouters: 2\n", "line 2: duplicate key routers"),
         ("routers: [1\n", "line 2: "),
-        ("- routers\n", "want 'key: value' lines, not a list"),
-        ("routers 3\n", "want 'key: value' lines, not a str"),
+        ("- routers\n", "expected 'key: value' lines, not a list"),
+        ("routers 3\n", "expected 'key: value' lines, not a str"),
         ("? [1, 2]\n: 3\n", "line 1: "),
         ("routers: !!python/object:os.system {}\n", "line 1: "),
         ("routers: \x00\n", "mine.yaml: "),
@@ -180,7 +188,7 @@ def test_a_pipe_or_a_device_is_refused_at_once(tmp_path):
 
 def test_a_long_value_is_not_repeated_whole(write):
     path = write(f"routers: [{', '.join(['1'] * 1000)}]")
-    with pytest.raises(ConfigurationError, match="want a whole number of drones") as refused:
+    with pytest.raises(ConfigurationError, match="expected a whole number of drones") as refused:
         load_configuration(path)
     assert len(str(refused.value)) < 200 + len(str(path))
 

@@ -40,7 +40,7 @@ def check_position(node_id: int, position: Sequence[float]) -> Position:
     """The position, or AirError if it is not three finite numbers."""
     if len(position) != 3 or not all(map(math.isfinite, position)):
         raise AirError(
-            f"node {node_id}: invalid position {tuple(position)}: want three finite numbers"
+            f"node {node_id}: invalid position {tuple(position)}: expected three finite numbers"
         )
     x, y, z = position
     return (float(x), float(y), float(z))

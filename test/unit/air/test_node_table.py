@@ -122,9 +122,9 @@ def test_unknown_nodes_are_not_linked_and_cannot_request_the_nodes_in_range():
     [
         (254, (1.0, 1.0, 1.0), "/Node/254", "invalid node id 254: must be 0..253"),
         (255, (1.0, 1.0, 1.0), "", "invalid node id 255: must be 0..253"),
-        (3, (math.nan, 1.0, 1.0), "", "want three finite numbers"),
-        (3, (1.0, math.inf, 1.0), "/Node/3", "want three finite numbers"),
-        (3, (1.0, 1.0), "", "want three finite numbers"),
+        (3, (math.nan, 1.0, 1.0), "", "expected three finite numbers"),
+        (3, (1.0, math.inf, 1.0), "/Node/3", "expected three finite numbers"),
+        (3, (1.0, 1.0), "", "expected three finite numbers"),
         (3, NOWHERE, "/", "invalid topic name '/'"),
         (3, NOWHERE, "a b", "invalid topic name"),
         (3, NOWHERE, "~private", "invalid topic name"),

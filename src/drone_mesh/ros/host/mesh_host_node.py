@@ -45,7 +45,7 @@ def _whole_parameter(name: str) -> int:
     try:
         return int(value)
     except ValueError:
-        raise ConfigurationError(f"{name} is {value!r}, want a whole number") from None
+        raise ConfigurationError(f"invalid {name} {value!r}: must be a whole number") from None
 
 
 def _is_served(node_id: int) -> bool:
@@ -67,13 +67,15 @@ def ids_to_serve(fleet: FactoryConfiguration) -> range:
     if rospy.has_param("~hosts"):
         hosts, index = _whole_parameter("hosts"), _whole_parameter("index")
         if not 1 <= index <= hosts:
-            raise ConfigurationError(f"index is {index}, want 1..{hosts} (the number of hosts)")
+            raise ConfigurationError(
+                f"invalid index {index}: must be 1..{hosts} (the number of hosts)"
+            )
         ids = range(count * (index - 1) // hosts, count * index // hosts)
     else:
         ids = range(_whole_parameter("first"), _whole_parameter("last") + 1)
         if len(ids) == 0 or ids[0] < 0 or ids[-1] >= count:
             raise ConfigurationError(
-                f"first..last is {ids.start}..{ids.stop - 1}; the world has drones 0..{count - 1}"
+                f"invalid first..last {ids.start}..{ids.stop - 1}: the drones are 0..{count - 1}"
             )
     served = [node_id for node_id in ids if _is_served(node_id)]
     if served:

@@ -125,7 +125,7 @@ class WirelessSignalSimulator:
         joined = request.packets
         if len(joined) % PAYLOAD_BYTES:
             raise rospy.ServiceException(
-                f"packets: {len(joined)} bytes, want {PAYLOAD_BYTES} per packet"
+                f"invalid packets of {len(joined)} bytes: expected {PAYLOAD_BYTES} per packet"
             )
         packets = [joined[at : at + PAYLOAD_BYTES] for at in range(0, len(joined), PAYLOAD_BYTES)]
         with self._lock:

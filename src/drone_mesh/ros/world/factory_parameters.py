@@ -39,7 +39,7 @@ class FactoryParameters:
         hosts = str(rospy.get_param("~hosts", "") or 1)
         if not hosts.isdigit():
             raise ConfigurationError(
-                f"argument: hosts is {hosts!r}, want a whole number, 0 or more"
+                f"argument: invalid hosts {hosts!r}: expected a whole number, 0 or more"
             )
         if configuration.radio == "nrf24":
             _require_wall_time_in_one_process(configuration, int(hosts))
@@ -49,11 +49,11 @@ class FactoryParameters:
 def _require_wall_time_in_one_process(configuration: FactoryConfiguration, hosts: int) -> None:
     if hosts != 1:
         raise ConfigurationError(
-            f"argument: hosts is {hosts}, want 1 with radio nrf24: all emulated chips share one "
-            "air, which lives in one process"
+            f"argument: invalid hosts {hosts}: must be 1 with radio nrf24: all emulated chips "
+            "share one air in one process"
         )
     if configuration.real_time_factor != 1.0:
         raise ConfigurationError(
-            f"real_time_factor is {configuration.real_time_factor:g}, want 1 with radio nrf24: "
-            "the emulated chips run in wall time"
+            f"invalid real_time_factor {configuration.real_time_factor:g}: must be 1 with radio "
+            "nrf24, since the emulated chips run in wall time"
         )

@@ -113,8 +113,8 @@ class WorldRunner:
         if factor != 0.0 and not MIN_REAL_TIME_FACTOR <= factor <= MAX_REAL_TIME_FACTOR:
             return SetSpeedResponse(
                 False,
-                f"real_time_factor is {factor:g}, want {MIN_REAL_TIME_FACTOR:g}.."
-                f"{MAX_REAL_TIME_FACTOR:g}, or 0 to leave it as it is",
+                f"invalid real_time_factor {factor:g}: must be {MIN_REAL_TIME_FACTOR:g}.."
+                f"{MAX_REAL_TIME_FACTOR:g}, or 0 to keep it",
             )
         self._paused = request.paused
         if factor > 0.0:
