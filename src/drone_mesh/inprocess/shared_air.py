@@ -14,6 +14,7 @@ import math
 
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
 from drone_mesh.nrf24.medium_access import EVERYBODY, Outgoing
@@ -48,6 +49,10 @@ class SharedRadio(abc.ABC):
     drone: IDroneEngine
     powered: bool
     listening_since_s: float | None  # None: it sends, turns round or has no power
+
+    @abc.abstractmethod
+    def recognises(self, frame: Transmission) -> bool:
+        """Whether the radio looks for the address of that frame now."""
 
     @abc.abstractmethod
     def frame_left(self, frame: Transmission) -> None:
@@ -145,7 +150,7 @@ class SharedAir:
 
     def _arrive(self, frame: Transmission, receiver: SharedRadio) -> None:
         since_s = receiver.listening_since_s
-        if since_s is None or since_s > frame.start_s:
+        if since_s is None or since_s > frame.start_s or not receiver.recognises(frame):
             return
         sender_id, receiver_id = frame.sender.node_id, receiver.node_id
         power_dbm = self._power(sender_id, receiver_id)
@@ -157,6 +162,7 @@ class SharedAir:
             self._bits_per_s,
             self._packet_bits if frame.answers is None else self._answer_bits,
             frame.packet if frame.answers is None else None,
+            round(frame.start_s * NS_PER_S),
         )
         errors = self.links.bit_errors(hop)
         if errors is None:

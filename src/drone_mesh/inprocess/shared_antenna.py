@@ -23,7 +23,7 @@ from drone_mesh.nrf24.medium_access import EVERYBODY, Fate, MediumAccess, Outgoi
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.statistics import RadioStatistics
-from drone_mesh.nrf24.transceiver import TX_DELAY_S
+from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
 SETTLING_S = SETTLING_NS / NS_PER_S
 # What the driver's SPI transfers take at 8 MHz, as the emulator counts them.
@@ -177,8 +177,10 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
     def _finish(self, acknowledged: bool) -> None:
         """TX_DS or MAX_RT; the driver notices when it looks next."""
         self.listening_since_s = None
-        now_s, expected_s = self._clock.now_s, self._settings.acknowledged_s
-        looks_s = self._ce_rose_s + expected_s
+        now_s, packet = self._clock.now_s, self._trying
+        broadcast = packet is not None and packet.receiver == EVERYBODY
+        expected_s = self._settings.broadcast_s if broadcast else self._settings.acknowledged_s
+        looks_s = self._ce_rose_s + CE_PULSE_S + expected_s
         if now_s > looks_s:
             looks_s += math.ceil((now_s - looks_s) / self._ard_s) * self._ard_s
         self._clock.call_at(max(looks_s, now_s) + FINISH_S, self._listen_again, acknowledged)
@@ -198,14 +200,17 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
 
     # Receiving -------------------------------------------------------------------------------
 
+    def recognises(self, frame: Transmission) -> bool:
+        if self._trying is None:
+            return frame.answers is None
+        return frame.answers is self and frame.packet is self._trying  # pipe 0, and no other
+
     def frame_arrived(self, frame: Transmission) -> None:
         if frame.answers is self:
-            if frame.packet is self._trying and not self._answered:
+            if not self._answered:
                 self._answered = True
                 self._finish(True)
             return
-        if self._trying is not None:
-            return  # waits for an acknowledgement, on another pipe
         if self._unread == FIFO_DEPTH:
             return
         packet, now_s = frame.packet, self._clock.now_s

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from chip_lab import ADDRESS, us
+from chip_lab import ADDRESS, Lab, us
 
+from drone_mesh.nrf24.emulator.links import IdealDisc
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import Register
 
@@ -188,3 +189,45 @@ def test_prim_rx_changed_while_ce_is_high_turns_the_radio_round_and_warns(lab):
     lab.wait_us(130)
     assert prx.chip.state is State.RX
     assert prx.chip.warnings == ["PRIM_RX changed while CE is high"]
+
+
+def test_a_short_pulse_of_ce_while_a_retransmit_settles_changes_nothing(lab):
+    """Once the first frame has left, the transaction runs by itself [DS Fig. 17]."""
+    ptx = lab.wires("ptx").become_ptx()
+    ptx.load()
+    ptx.pulse()
+    lab.wait_us(130 + 1316 + 1500 + 50)  # 70 us before the second frame
+    assert ptx.chip.state is State.TX_SETTLING
+    ptx.pulse(5)
+    lab.wait_us(60_000)
+    assert ptx.status & 0x30 == 0x10
+    assert len(lab.trace.frames) == 16
+
+
+class DamagedAnswers(IdealDisc):
+    """One bit of each acknowledgement arrives wrong."""
+
+    def bit_errors(self, hop):
+        return 1 if hop.packet is None else super().bit_errors(hop)
+
+
+class LastBits:
+    """Chooses the bits that are wrong: those of the CRC."""
+
+    def sample(self, bits, count):
+        return bits[-count:]
+
+
+def test_the_wait_for_an_acknowledgement_ends_with_a_broken_one():
+    lab = Lab(DamagedAnswers(1000.0))
+    lab.air._rng = LastBits()
+    ptx, prx = lab.pair()
+    ptx.load()
+    ptx.pulse()
+    lab.wait_us(130 + 1316 + 130 + 292 - 10)
+    assert ptx.chip.state is State.ACK_WAIT
+    lab.wait_us(10 + 208 + 10)  # past the end of the frame and of the window of 500 us
+    assert ptx.chip.state is State.RETRY_WAIT
+    lab.wait_us(60_000)
+    assert ptx.status & 0x30 == 0x10
+    assert len(prx.unload_all()) == 1

@@ -232,3 +232,15 @@ def test_a_flag_without_a_payload_is_cleared_so_that_the_irq_pin_rises(lab):
     receiver.chip.set_flags(0x40)
     assert receiver.receive(0.05) == []
     assert receiver.chip.irq.value
+
+
+def test_the_acknowledgement_goes_to_the_address_that_the_packet_came_to(lab):
+    """Also if the register changes in the 130 us in between."""
+    ptx, prx = lab.pair()
+    ptx.load()
+    ptx.pulse()
+    lab.wait_us(130 + 1316)  # the frame has arrived
+    assert prx.chip.state is State.ANSWER_SETTLING
+    prx.write(Register.RX_ADDR_P2, b"\x77")
+    lab.wait_us(5_000)
+    assert ptx.status & 0x30 == 0x20

@@ -155,3 +155,13 @@ def test_the_payload_is_not_disturbed_by_other_channels(lab):
     other.write(Register.RF_CH, 3)
     send_together(lab, one, other)
     assert prx.unload_all() == [(2, PAYLOAD)]
+
+
+def test_rpd_shows_the_power_of_the_last_valid_packet(lab):
+    prx = lab.wires("prx").become_prx()
+    for distance_m, rpd in ((5.0, 1), (50.0, 0), (5.0, 1)):
+        sender = broadcasting(lab, f"at {distance_m} m", distance_m)
+        sender.load(bytes((round(distance_m) + len(lab.trace.frames),)) * 32, no_ack=True)
+        sender.pulse()
+        lab.wait_us(5_000)
+        assert prx.byte(Register.RPD) == rpd

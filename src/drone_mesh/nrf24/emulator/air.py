@@ -142,8 +142,8 @@ class Air:
             default=-math.inf,
         )
 
-    def address_passed(self, antenna: Antenna, channel: int, address_bits: int) -> bool:
-        """Whether a frame that the antenna recognises is on the air, already past its address."""
+    def recognised_until_ns(self, antenna: Antenna, channel: int, address_bits: int) -> int | None:
+        """End of a frame on the air that the antenna recognises, already past its address."""
         since_ns = antenna.listening_since_ns
         for flight in self._on_channel.get(channel, ()):
             passed_ns = flight.start_ns + address_bits * 1_000_000_000 // flight.bits_per_s
@@ -154,8 +154,8 @@ class Air:
                 and passed_ns <= self.clock.now_ns
                 and antenna.recognises(flight.frame)
             ):
-                return True
-        return False
+                return flight.end_ns
+        return None
 
     def _end(self, flight: Flight) -> None:
         for observer in self._observers:
@@ -186,6 +186,7 @@ class Air:
                 flight.bits_per_s,
                 bit_count,
                 flight.packet,
+                flight.start_ns,
             )
         )
         if errors is None:

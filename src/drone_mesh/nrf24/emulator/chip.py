@@ -114,7 +114,11 @@ class EmulatedChip(ChipCore):
                 if not self.registers.receiver:
                     self.transmitter.ce_rose()
                 self.settle()
-        elif self.state is State.TX_SETTLING and self._ce_pulse_was_short():
+        elif (
+            self.state is State.TX_SETTLING
+            and not self.transmitter.retransmits  # CE no longer matters then [DS Fig. 17]
+            and self._ce_pulse_was_short()
+        ):
             self.warn("CE pulse shorter than 10 us (Thce)")
             self.overtake()
             self.state = State.STANDBY_I
@@ -131,8 +135,8 @@ class EmulatedChip(ChipCore):
             taken = self.transmitter.answer_arrived(frame)
         else:
             taken = self.receiver.frame_arrived(frame)
-        if taken and power_dbm > RPD_DBM:
-            self.latch_rpd()
+        if taken:
+            self.latch_rpd(power_dbm > RPD_DBM)
 
     def frame_left(self) -> None:
         self.flight = None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import abc
 from typing import Callable
 
-from drone_mesh.nrf24.airtime import SETTLING_NS
+from drone_mesh.nrf24.airtime import PREAMBLE_BITS, SETTLING_NS
 from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Flight, Position
 from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
 from drone_mesh.nrf24.emulator.frames import Frame
@@ -42,7 +42,7 @@ class ChipCore(abc.ABC):
         self.flight: Flight | None = None  # the own frame that is on the air
         self.ce_rose_ns = -SETTLING_NS
         self._epoch = 0  # timers of an earlier epoch are void
-        self._rpd_latched = False
+        self._rpd_latched: bool | None = False  # None: as the channel is now
         self.ce = EmulatedCe(self.clock, self._ce_changed)
         self.irq = EmulatedIrq(self.clock)
 
@@ -132,7 +132,7 @@ class ChipCore(abc.ABC):
     def listen(self, state: State) -> None:
         """The receiver has settled."""
         self.state = state
-        self._rpd_latched = False
+        self._rpd_latched = None
         self._listening_to = (self.registers.channel, self.registers.bits_per_s)
         self.air.listen(self, *self._listening_to)
 
@@ -150,8 +150,10 @@ class ChipCore(abc.ABC):
 
     def rpd(self) -> bool:
         """Received power detector: more than -64 dBm now, or when a packet came, or at the end."""
-        if self._rpd_latched or self.listening_since_ns is None:
+        if self._rpd_latched is not None:
             return self._rpd_latched
+        if self.listening_since_ns is None:
+            return False
         channel = self._listening_to[0]
         return self.air.energy_dbm(self, channel, self.listening_since_ns) > RPD_DBM
 
@@ -181,6 +183,12 @@ class ChipCore(abc.ABC):
             self.air.abort(self.flight)
             self.flight = None
 
-    def latch_rpd(self) -> None:
-        """A packet came with more than RPD_DBM: RPD stays set."""
-        self._rpd_latched = True
+    def latch_rpd(self, strong: bool) -> None:
+        """A valid packet came: RPD shows its power, also that of a weak one after a strong one."""
+        self._rpd_latched = strong
+
+    def recognised_until_ns(self) -> int | None:
+        """End of the frame that is coming in and was recognised; None: there is none."""
+        registers = self.registers
+        address_bits = PREAMBLE_BITS + 8 * registers.address_bytes
+        return self.air.recognised_until_ns(self, registers.channel, address_bits)

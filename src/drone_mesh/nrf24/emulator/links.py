@@ -11,6 +11,8 @@ import math
 import random
 from typing import Callable, Hashable, NamedTuple
 
+from drone_mesh.nrf24.airtime import NS_PER_S
+
 SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
 _FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
 _NEAREST_M = 0.1  # antennas may share a point; log10(0) may not
@@ -28,6 +30,7 @@ class Hop(NamedTuple):
     bits_per_s: int
     bit_count: int
     packet: object  # the same object for each attempt to send one packet; None: acknowledgement
+    start_ns: int = 0  # when the frame began
 
 
 class LinkModel(abc.ABC):
@@ -143,27 +146,38 @@ class ScriptedLoss(LinkModel):
 class LossCurve(LinkModel):
     """Packets get lost as often as was measured over distance.
 
-    What is known is the share of packets that were lost after all retries, not the fate of single
-    frames; these are lost in bursts. So the fate is drawn once for each packet on each link, and
-    every attempt to send that packet shares it. Acknowledgements of a packet that came are not
-    lost. Beyond the last distance nothing was measured, and nothing arrives; below the first, the
-    share is that of the first.
+    What was measured is the share of packets that were lost after 16 frames, and the time that a
+    packet took. Independent losses cannot explain both: they would have to be so frequent that
+    every packet took long. So there are two kinds here. A link fails for `BURST_S` at a time, as
+    often as packets were lost: that loses all frames of a transaction of the chip, and another try
+    after a pause finds the link as it is then. And between the bursts, single frames get lost as
+    often as the packets took longer than their bursts explain. Acknowledgements of a packet that
+    came are not lost. Beyond the last distance nothing was measured, and nothing arrives; below the
+    first, the shares are those of the first.
     """
+
+    BURST_S = 0.05  # our choice: just longer than 16 frames at 250 kbit/s
 
     def __init__(
         self,
         points: tuple[tuple[float, float], ...],
         rng: random.Random,
         *,
+        frame_points: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
         metres_per_metre: float = 1.0,
     ) -> None:
-        """`points`: distance in metres and share of lost packets, by rising distance."""
-        if not points or any(b[0] <= a[0] for a, b in zip(points, points[1:])):
-            raise ValueError("a loss curve needs points of rising distance")
+        """`points`: distance in metres and share of lost packets, by rising distance.
+
+        `frame_points`: the same for single frames between the bursts.
+        """
+        for curve in (points, frame_points):
+            if not curve or any(b[0] <= a[0] for a, b in zip(curve, curve[1:])):
+                raise ValueError("a loss curve needs points of rising distance")
         self._points = points
+        self._frame_points = frame_points
         self._rng = rng
         self._scale = metres_per_metre
-        self._fates: dict[tuple[Hashable, Hashable], tuple[object, bool]] = {}
+        self._fates: dict[tuple[Hashable, Hashable], tuple[object, int, bool]] = {}
 
     @property
     def range_m(self) -> float:
@@ -175,15 +189,11 @@ class LossCurve(LinkModel):
         metres = distance_m * self._scale
         if metres > self._points[-1][0]:
             return None
-        last_m, last_loss = self._points[0]
-        for point_m, point_loss in self._points:
-            if metres <= point_m:
-                if point_m == last_m:
-                    return point_loss
-                part = (metres - last_m) / (point_m - last_m)
-                return last_loss + max(part, 0.0) * (point_loss - last_loss)
-            last_m, last_loss = point_m, point_loss
-        return last_loss
+        return _between(self._points, metres)
+
+    def frame_loss(self, distance_m: float) -> float:
+        """Share of single frames that are lost between the bursts."""
+        return _between(self._frame_points, distance_m * self._scale)
 
     def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
         return free_space_dbm(distance_m * self._scale, tx_dbm, carrier_mhz)
@@ -195,8 +205,27 @@ class LossCurve(LinkModel):
         if hop.packet is None:
             return 0
         link = (hop.sender, hop.receiver)
-        packet, lost = self._fates.get(link, (None, False))
-        if packet is not hop.packet:
+        packet, until_ns, lost = self._fates.get(link, (None, 0, False))
+        if packet is not hop.packet or hop.start_ns >= until_ns:
             lost = self._rng.random() < loss
-            self._fates[link] = (hop.packet, lost)
-        return None if lost else 0
+            until_ns = hop.start_ns + round(self.BURST_S * NS_PER_S)
+            self._fates[link] = (hop.packet, until_ns, lost)
+        if lost or self._rng.random() < self.frame_loss(hop.distance_m):
+            return None
+        return 0
+
+    def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
+        return self.loss(distance_m) is not None
+
+
+def _between(points: tuple[tuple[float, float], ...], metres: float) -> float:
+    """On straight lines between the points; level before the first and after the last."""
+    last_m, last_value = points[0]
+    for point_m, value in points:
+        if metres <= point_m:
+            if point_m == last_m:
+                return value
+            part = (metres - last_m) / (point_m - last_m)
+            return last_value + max(part, 0.0) * (value - last_value)
+        last_m, last_value = point_m, value
+    return last_value

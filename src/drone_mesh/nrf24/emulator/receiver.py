@@ -42,7 +42,8 @@ class Receiver:
             chip.overtake()
             chip.stop_listening()
             chip.state = State.ANSWER_SETTLING
-            chip.after(SETTLING_NS, lambda: self._answer(pipe, packet.pid))
+            address = registers.pipe_addresses[pipe]  # the one that the packet came to [DS 7.4.1]
+            chip.after(SETTLING_NS, lambda: self._answer(pipe, address, packet.pid))
         return True
 
     def _is_new(self, pipe: int, packet: Packet) -> bool:
@@ -70,7 +71,7 @@ class Receiver:
         chip.rx_fifo.push(Incoming(pipe, packet.payload, width))
         chip.set_flags(flags)
 
-    def _answer(self, pipe: int, pid: int) -> None:
+    def _answer(self, pipe: int, address: bytes, pid: int) -> None:
         chip, registers = self._chip, self._chip.registers
         payload: Outgoing | None = None
         if registers.ack_payloads and registers.dynamic[pipe]:
@@ -78,7 +79,7 @@ class Receiver:
         if payload is not None:
             payload.was_sent = True
         frame = Frame.encode(
-            registers.pipe_addresses[pipe],
+            address,
             b"" if payload is None else payload.payload,
             registers.ack_formats[pipe],
             pid,

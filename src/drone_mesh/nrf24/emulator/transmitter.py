@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.nrf24.airtime import PREAMBLE_BITS, SETTLING_NS
+from drone_mesh.nrf24.airtime import SETTLING_NS
 from drone_mesh.nrf24.emulator.chip_core import ChipCore
 from drone_mesh.nrf24.emulator.fifos import Incoming, Outgoing
 from drone_mesh.nrf24.emulator.frames import Frame
@@ -111,11 +111,12 @@ class Transmitter:
         chip = self._chip
         if chip.state is not State.ACK_WAIT:
             return
-        registers = chip.registers
-        address_bits = PREAMBLE_BITS + 8 * registers.address_bytes
-        if not chip.air.address_passed(chip, registers.channel, address_bits):
+        until_ns = chip.recognised_until_ns()
+        if until_ns is None or until_ns <= chip.clock.now_ns:
             chip.stop_listening()
             chip.state = State.RETRY_WAIT
+        else:  # to the end of that frame; if it was broken, the wait is over [DS 7.5.1, Fig. 10]
+            chip.after(until_ns - chip.clock.now_ns, self._window_over)
 
     def _no_answer(self) -> None:
         chip = self._chip

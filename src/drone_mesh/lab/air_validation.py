@@ -1,0 +1,137 @@
+"""The fast model of the air against the emulated chips: `python3 -m drone_mesh.lab.air_validation`.
+
+docs/performance.md, "The model against the chips".
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from dataclasses import dataclass
+from typing import Sequence
+
+from drone_mesh.lab.air_trial import CHIPS, MODEL, AirTrial, Figures, watch, with_seed
+
+SIZES = (17, 26, 50, 101)
+RATES = ("250k", "1M", "2M")
+LINKS = ("disc", "distance")
+SEEDS = 5
+AFTER_S = 60.0
+WITHIN_S = 180.0
+# What counts as agreement.
+SHARE_POINTS = 2.0
+CONNECTED_PART = 0.25
+FRAMES_PART = 0.10
+COLLIDED_PART = 0.10
+
+
+@dataclass(frozen=True)
+class Means:
+    """Of several seeds."""
+
+    connected_s: float
+    share_percent: float
+    frames_per_s: float
+    collided_percent: float
+    simulated_per_core_s: float
+
+    @classmethod
+    def of(cls, runs: Sequence[Figures]) -> Means:
+        """The means of these runs."""
+        count = len(runs)
+        return cls(
+            sum(run.connected_s for run in runs) / count,
+            100 * sum(run.share for run in runs) / count,
+            sum(run.frames / run.simulated_s for run in runs) / count,
+            100 * sum(run.collided for run in runs) / count,
+            sum(run.simulated_s for run in runs) / max(sum(run.cpu_s for run in runs), 1e-9),
+        )
+
+
+def disagreements(chips: Means, model: Means) -> list[str]:
+    """The figures in which the model is too far from the chips."""
+    found = []
+    if abs(model.share_percent - chips.share_percent) > SHARE_POINTS:
+        found.append("share")
+    if chips.connected_s == math.inf or model.connected_s == math.inf:
+        if chips.connected_s != model.connected_s:
+            found.append("time")
+    elif abs(model.connected_s / chips.connected_s - 1) > CONNECTED_PART:
+        found.append("time")
+    if abs(model.frames_per_s / chips.frames_per_s - 1) > FRAMES_PART:
+        found.append("frames")
+    if abs(model.collided_percent / max(chips.collided_percent, 1e-9) - 1) > COLLIDED_PART:
+        found.append("collided")
+    return found
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="drone_mesh.lab.air_validation",
+        description="Runs the same meshes on emulated chips and on the fast model, and prints a "
+        "table in Markdown: means over the seeds, chips / model. The exit status is 1 if a row "
+        f"disagrees: share by {SHARE_POINTS:g} points, time to all connected by "
+        f"{100 * CONNECTED_PART:g} %, frames or collided share by {100 * FRAMES_PART:g} %.",
+    )
+    parser.add_argument("--nodes", type=int, nargs="+", default=SIZES, help="sizes of the meshes")
+    parser.add_argument("--rates", nargs="+", choices=RATES, default=RATES)
+    parser.add_argument("--links", nargs="+", choices=LINKS, default=LINKS)
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="per row (default %(default)s)")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=AFTER_S,
+        help="to watch after all are connected (default %(default)g)",
+    )
+    arguments = parser.parse_args(argv)
+    if arguments.seeds < 1:
+        parser.error("--seeds must be 1 or more")
+    if not arguments.seconds > 0:
+        parser.error("--seconds must be above 0")
+    return arguments
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the table; 1 if a row disagrees."""
+    arguments = _arguments(argv)
+    print(
+        "| nodes | rate | links | all connected, s | connected, % | frames/s | collided, % |",
+        end="",
+    )
+    print(" sim. s per core s | disagrees |\n|---|---|---|---|---|---|---|---|---|", flush=True)
+    wrong = 0
+    try:
+        for nodes in arguments.nodes:
+            for rate in arguments.rates:
+                for links in arguments.links:
+                    trial = AirTrial(nodes, rate, links=links)
+                    wrong += _row(trial, arguments.seeds, arguments.seconds)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    return int(wrong > 0)
+
+
+def _row(trial: AirTrial, seeds: int, seconds: float) -> bool:
+    runs: dict[str, list[Figures]] = {CHIPS: [], MODEL: []}
+    for seed in range(1, seeds + 1):
+        print(f"{trial.nodes} nodes, {trial.rate}, {trial.links}: seed {seed}", file=sys.stderr)
+        for kind in runs:
+            runs[kind].append(watch(with_seed(trial, seed), kind, WITHIN_S, seconds))
+    chips, model = Means.of(runs[CHIPS]), Means.of(runs[MODEL])
+    wrong = disagreements(chips, model)
+    cells = [
+        f"{chips.connected_s:.1f} / {model.connected_s:.1f}",
+        f"{chips.share_percent:.2f} / {model.share_percent:.2f}",
+        f"{chips.frames_per_s:.0f} / {model.frames_per_s:.0f}",
+        f"{chips.collided_percent:.1f} / {model.collided_percent:.1f}",
+        f"{chips.simulated_per_core_s:.0f} / {model.simulated_per_core_s:.0f}",
+        ", ".join(wrong) or "no",
+    ]
+    print(f"| {trial.nodes} | {trial.rate} | {trial.links} | {' | '.join(cells)} |", flush=True)
+    return bool(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
