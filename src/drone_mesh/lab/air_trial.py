@@ -13,6 +13,8 @@ from drone_mesh.communication.observer import MeshEvent, MeshEventKind
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.inprocess.network import Network
+from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
@@ -140,7 +142,9 @@ class ModelMesh:
     def figures(self) -> dict[str, float]:
         """Of the air and of all radios."""
         air = self.network.air
-        radios = [node.antenna.statistics() for node in self.network.nodes.values()]
+        assert isinstance(air, SharedAir)
+        antennas = [node.antenna for node in self.network.nodes.values()]
+        radios = [one.statistics() for one in antennas if isinstance(one, SharedAntenna)]
         return _totals(
             air.frames,
             air.collisions,

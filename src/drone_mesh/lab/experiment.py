@@ -52,7 +52,7 @@ class Experiment(BaseModel):
     stop: Optional[Stop] = None
     metrics: List[str] = []
     compare: Optional[Compare] = None
-    draws: Literal["all", "split"] = "all"  # which runs the report counts
+    draws: Literal["all", "split", "whole"] = "all"  # which runs the report counts
     timeout_s: Annotated[float, Field(gt=0)] = 600.0  # wall time of one run
     output: Literal["runs", "runs_and_outages"] = "runs_and_outages"
 
@@ -118,6 +118,8 @@ def as_text(value: Any) -> str:
     """A swept value as a word for tables and file names."""
     if isinstance(value, (str, int, float, bool)) or value is None:
         return str(value)
+    if isinstance(value, dict):
+        return ";".join(f"{key}:{as_text(inside)}" for key, inside in value.items()) or "none"
     return json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
@@ -307,7 +309,7 @@ def _scenario(
         raise source.error_of(error, ("base",), Scenario) from None
     for key in ("routing", "repair"):
         try:
-            extensions.check_technique(key, getattr(scenario, key))
+            extensions.check_technique(key, getattr(scenario, key), scenario.model)
         except ConfigurationError as error:
             raise source.error(named.get(key, ("base", key)), f"{key}: {error}") from None
     _check_ids(scenario, source)

@@ -29,9 +29,15 @@ def search_in_text(folder: str) -> None:
         sys.path.insert(0, folder)
 
 
-def check_technique(kind: str, name: str) -> None:
+def check_technique(kind: str, name: str, model: str) -> None:
     """Raises ConfigurationError if there is no such routing or repair technique."""
-    if kind == "routing":
+    if kind == "repair" and model == "ideal":
+        from drone_mesh.lab.ideal import IDEAL_RULES
+
+        if name not in IDEAL_RULES:
+            known = ", ".join(sorted(IDEAL_RULES))
+            raise ConfigurationError(f"no rule {name!r} for model ideal: use one of {known}")
+    elif kind == "routing":
         create_routing_technique(name)
     elif "repair" in inspect.signature(Network).parameters:
         Network(repair=name)  # type: ignore[call-arg]

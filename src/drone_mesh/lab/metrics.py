@@ -83,6 +83,12 @@ def t_total_s(run: RunRecord) -> float:
     return run.healed_at_s - run.fault_s
 
 
+@_metric("s", "t_total_s, or observed_s if not healed; only for tables that average caps in")
+def t_capped_s(run: RunRecord) -> float:
+    total_s = t_total_s(run)
+    return observed_s(run) if math.isnan(total_s) else total_s
+
+
 @_metric("s", "of t_total_s: until the first router notices that it has lost its gateway")
 def t_detect_s(run: RunRecord) -> float:
     return _phases(run)[0]
@@ -341,10 +347,10 @@ def coverage(run: RunRecord) -> float:
     points_after = [run.end.places[n][:2] for n in sorted(run.end.graph.near)]
     if not points_before or not points_after:
         return 0.0
-    return _covered(points_after, range_m) / _covered(points_before, range_m)
+    return covered(points_after, range_m) / covered(points_before, range_m)
 
 
-def _covered(points: Sequence[Sequence[float]], range_m: float) -> int:
+def covered(points: Sequence[Sequence[float]], range_m: float) -> int:
     """Cells of a grid, an eighth of the range wide, whose middle a drone reaches."""
     cell = range_m / 8
     offsets = np.arange(-8, 9)

@@ -50,8 +50,9 @@ class Results(NamedTuple):
         return self.by_cell.get(cell, {})
 
     def counts(self, row: Row) -> bool:
-        """Whether the report counts this run: `draws: split` leaves out what did not split."""
-        return self.loaded.experiment.draws == "all" or row.get("split") == "1"
+        """Whether the report counts this run: `draws:` may leave out what split, or did not."""
+        draws = self.loaded.experiment.draws
+        return draws == "all" or (row.get("split") == "1") == (draws == "split")
 
     @property
     def axis_names(self) -> dict[str, str]:

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import NamedTuple, Sequence
 
-from drone_mesh.errors import MeshError
+from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.lab.plan import PlannedRun
 from drone_mesh.lab.provenance import code_version
 from drone_mesh.lab.record import RunRecord
@@ -31,7 +31,10 @@ def replay(results: Results, beginning: str) -> Replay:
     """Run it again. Raises MeshError as the run does."""
     planned = results.find_run(beginning)
     spec = planned.spec
-    simulation = Simulation(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition))
+    scenario = scenario_of(spec.scenario)
+    if scenario.model == "ideal":
+        raise ConfigurationError(f"run {spec.run} is of model ideal: it has no events to show")
+    simulation = Simulation(scenario, Streams(spec.seed, spec.repetition))
     states: list[MeshStatus] = []
     record = simulation.run(states.append)
     label = results.loaded.cells[planned.cell].label

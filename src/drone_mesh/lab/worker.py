@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import json
+import logging
 import math
 import threading
 import time
@@ -55,6 +56,8 @@ def execute_batch(specs: list[RunSpec]) -> list[Outcome]:
 def execute(spec: RunSpec) -> Outcome:
     """Never raises for what the run does: that is its outcome."""
     started = time.perf_counter()
+    # A thousand runs would repeat each warning of the nodes a thousand times.
+    logging.getLogger("drone_mesh").setLevel(logging.CRITICAL)
     try:
         with _Alarm(spec.timeout_s):
             values, event_hash, outages = _measure(spec)
@@ -80,6 +83,10 @@ def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[OutageRow, ...
         extensions.search_in_text(spec.search_path)
     scenario = scenario_of(spec.scenario)
     streams = Streams(spec.seed, spec.repetition)
+    if scenario.model == "ideal":
+        from drone_mesh.lab.ideal import run_ideal  # needs scipy, which a mesh does not
+
+        return (*run_ideal(scenario, streams), ())
     simulation = Simulation(scenario, streams)
     record = simulation.run()
     values = measure_all(record)

@@ -1,0 +1,243 @@
+"""Runs without packets: everybody knows everything at once, and flies straight on a plane.
+
+Published repair methods are evaluated in this way. It shows what a rule can do at best, and lets
+our runs stand beside published tables; detection, decisions and routes take no time in it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import Callable, NamedTuple
+
+import numpy as np
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.metrics import METRICS, STACKED_M, covered
+from drone_mesh.lab.places import draw_places
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.streams import Streams
+
+STEP_S = 0.1  # as in the published simulations
+ARRIVED_M = 1e-9
+
+
+class Swarm(NamedTuple):
+    """The survivors at one step. Arrays have one row per survivor."""
+
+    places: np.ndarray  # (n, 2), m
+    before: np.ndarray  # (n, 2), m, one step ago
+    parts: np.ndarray  # (n,), number of the connected part
+    home: int  # row of the gateway
+    near_lost: np.ndarray  # (n, 2), m, mean place of lost neighbours; NaN: none lost
+    near: np.ndarray  # (n, n), who is in range of whom
+    middle: np.ndarray  # (2,), m, of the area
+    step_m: float  # flown in one step
+
+
+Rule = Callable[[Swarm], np.ndarray]
+"""Displacement of each survivor in this step, (n, 2) in metres, not longer than step_m."""
+
+
+def centering(swarm: Swarm) -> np.ndarray:
+    """Everybody flies to the mean of all survivors, up to one metre of a range of 120."""
+    return _towards(swarm, swarm.places.mean(axis=0), stop_m=swarm.step_m)
+
+
+def home(swarm: Swarm) -> np.ndarray:
+    """Who has no path to the gateway flies to it; a part stops when it has one."""
+    moves = _towards(swarm, swarm.places[swarm.home])
+    moves[swarm.parts == swarm.parts[swarm.home]] = 0.0
+    return moves
+
+
+def oracle(swarm: Swarm) -> np.ndarray:
+    """Each part without a gateway moves as a block to the nearest drone that has one.
+
+    The shortest vector brings it into range: no rule can connect a single part with less.
+    """
+    moves = np.zeros_like(swarm.places)
+    rooted = np.flatnonzero(swarm.parts == swarm.parts[swarm.home])
+    for part in set(swarm.parts.tolist()) - {int(swarm.parts[swarm.home])}:
+        own = np.flatnonzero(swarm.parts == part)
+        gaps = swarm.places[rooted][None] - swarm.places[own][:, None]
+        lengths = np.linalg.norm(gaps, axis=2)
+        mine, other = np.unravel_index(np.argmin(lengths), lengths.shape)
+        gap, length = gaps[mine, other], lengths[mine, other]
+        moves[own] = gap / length * min(swarm.step_m, length)
+    return moves
+
+
+def hero(swarm: Swarm) -> np.ndarray:
+    """Towards the lost neighbours; who lost none follows the change of its neighbours' mean.
+
+    Mi, Yang, Liu, ICRA 2011, as it is described; only neighbours are known.
+    """
+    lost = ~np.isnan(swarm.near_lost[:, 0])
+    moves = np.zeros_like(swarm.places)
+    moves[lost] = _towards(swarm, swarm.near_lost)[lost]
+    counts = swarm.near.sum(axis=1, keepdims=True)
+    change = swarm.near @ (swarm.places - swarm.before) / np.maximum(counts, 1)
+    length = np.linalg.norm(change, axis=1, keepdims=True)
+    follow = np.divide(change, length, out=np.zeros_like(change), where=length > ARRIVED_M)
+    moves[~lost] = follow[~lost] * swarm.step_m
+    return moves
+
+
+def sidr(swarm: Swarm) -> np.ndarray:
+    """Each part flies as a block from its own mean to the middle of the area.
+
+    Chen, Wang, Chang, Wei, IEEE Access 8:77089, 2020, as it is described.
+    """
+    return _blocks(swarm, lambda mean: swarm.middle - mean)
+
+
+def sidr_as_coded(swarm: Swarm) -> np.ndarray:
+    """SIDR as two public repositories code it: the mean is one number for x and y.
+
+    Every part then flies along a diagonal, whatever its place.
+    """
+    return _blocks(swarm, lambda mean: swarm.middle - mean.mean())
+
+
+IDEAL_RULES: dict[str, Rule] = {
+    "centering": centering,
+    "home": home,
+    "oracle": oracle,
+    "hero": hero,
+    "sidr": sidr,
+    "sidr_as_coded": sidr_as_coded,
+}
+
+
+def _towards(swarm: Swarm, goal: np.ndarray, stop_m: float = ARRIVED_M) -> np.ndarray:
+    gap = goal - swarm.places
+    length = np.linalg.norm(gap, axis=1, keepdims=True)
+    step = np.minimum(swarm.step_m, length)
+    step[length <= stop_m] = 0.0
+    unit: np.ndarray = np.divide(gap, length, out=np.zeros_like(gap), where=length > ARRIVED_M)
+    moves: np.ndarray = unit * step
+    return moves
+
+
+def _blocks(swarm: Swarm, direction: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    moves = np.zeros_like(swarm.places)
+    for part in set(swarm.parts.tolist()):
+        own = swarm.parts == part
+        way = direction(swarm.places[own].mean(axis=0))
+        length = float(np.linalg.norm(way))
+        if length > ARRIVED_M:
+            moves[own] = way / length * min(swarm.step_m, length)
+    return moves
+
+
+def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], str]:
+    """All metrics (NaN where there is none without packets), and a hash of the final places.
+
+    Raises ConfigurationError for a scenario that is not one kill of a random share or number.
+    """
+    kill = scenario.faults[0].kill if len(scenario.faults) == 1 else None
+    if kill is None or kill.pick != "random" or kill.ids is not None:
+        raise ConfigurationError("model ideal: faults must be one random kill")
+    starts = draw_places(scenario.layout, scenario.range_m, streams.of("layout"))
+    places = np.array([(start.x, start.y) for start in starts])
+    gateways = [index for index, start in enumerate(starts) if start.gateway]
+    fit = [i for i in range(len(starts)) if not (kill.spare == "gateways" and i in gateways)]
+    number = kill.number if kill.number is not None else round((kill.share or 0.0) * len(fit))
+    victims = streams.of("fault 0").sample(fit, min(number, len(fit)))
+    alive = np.array(sorted(set(range(len(starts))) - set(victims)))
+    if not set(gateways) & set(alive.tolist()):
+        raise ConfigurationError("model ideal: no gateway is left")
+    return _repair(scenario, places, alive, victims, gateways)
+
+
+def _repair(
+    scenario: Scenario,
+    start: np.ndarray,
+    alive: np.ndarray,
+    victims: list[int],
+    gateways: list[int],
+) -> tuple[dict[str, float], str]:
+    rule = IDEAL_RULES[scenario.repair]
+    range_m, dead = scenario.range_m, start[victims]
+    places = start[alive].copy()
+    home_row = int(np.flatnonzero(alive == next(g for g in gateways if g in alive))[0])
+    lost_near = _near_lost(places, dead, range_m)
+    before, flown = places.copy(), np.zeros(len(places))
+    middle = (start.min(axis=0) + start.max(axis=0)) / 2
+    near, parts = _parts(places, range_m)
+    first_parts, cut_off = int(parts.max()) + 1, int((parts != parts[home_row]).sum())
+    steps, most = 0, round(scenario.duration_s / STEP_S) - 1
+    pairs: set[tuple[int, int]] = set()
+    while parts.max() > 0 and steps < most:
+        swarm = Swarm(
+            places, before, parts, home_row, lost_near, near, middle, scenario.speed_m_s * STEP_S
+        )
+        moves = rule(swarm)
+        before, places = places, places + moves
+        flown += np.linalg.norm(moves, axis=1)
+        steps += 1
+        near, parts = _parts(places, range_m)
+        pairs |= _touching(places, moves)
+    healed = parts.max() == 0
+    end_s = steps * STEP_S
+    shifts = np.linalg.norm(places - start[alive], axis=1)
+    values = dict.fromkeys(METRICS, math.nan)
+    values.update(
+        healed=float(healed),
+        split=float(first_parts > 1),
+        cut_off=float(cut_off),
+        victims=float(len(victims)),
+        t_total_s=end_s if healed else math.nan,
+        t_capped_s=end_s,
+        t_detect_s=0.0 if healed else math.nan,
+        t_decide_s=0.0 if healed else math.nan,
+        t_fly_s=end_s if healed else math.nan,
+        t_reroute_s=0.0 if healed else math.nan,
+        observed_s=most * STEP_S,
+        connected_share=float((parts == parts[home_row]).mean()),
+        distance_total_m=float(flown.sum()),
+        distance_max_m=float(flown.max()),
+        distance_mean_m=float(flown[flown > 0].mean()) if (flown > 0).any() else 0.0,
+        moved=float((flown > 0).sum()),
+        displacement_mean_m=float(shifts.mean()),
+        displacement_max_m=float(shifts.max()),
+        collisions=float(len(pairs)),
+        stacked=float(len({row for pair in _close(places) for row in pair})),
+        parts_before=1.0,
+        parts_after=float(parts.max() + 1),
+        degree_after=float(near.sum() / len(near)),
+        coverage=covered(places.tolist(), range_m) / covered(start.tolist(), range_m),
+    )
+    digest = hashlib.sha256(np.round(places, 6).tobytes()).hexdigest()[:16]
+    return values, digest
+
+
+def _parts(places: np.ndarray, range_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """(who is near whom, number of each one's connected part)."""
+    from scipy.sparse.csgraph import connected_components
+
+    gaps = places[:, None] - places[None]
+    near = (gaps * gaps).sum(axis=2) < range_m * range_m
+    np.fill_diagonal(near, False)
+    return near, connected_components(near, directed=False)[1]
+
+
+def _near_lost(places: np.ndarray, dead: np.ndarray, range_m: float) -> np.ndarray:
+    mean = np.full_like(places, math.nan)
+    if len(dead):
+        lost = np.linalg.norm(places[:, None] - dead[None], axis=2) < range_m
+        some = lost.any(axis=1)
+        mean[some] = (lost[some] @ dead) / lost[some].sum(axis=1, keepdims=True)
+    return mean
+
+
+def _close(places: np.ndarray) -> set[tuple[int, int]]:
+    gaps = places[:, None] - places[None]
+    close = np.triu((gaps * gaps).sum(axis=2) < STACKED_M**2, k=1)
+    return {(int(a), int(b)) for a, b in zip(*np.nonzero(close))}
+
+
+def _touching(places: np.ndarray, moves: np.ndarray) -> set[tuple[int, int]]:
+    moving = (moves != 0).any(axis=1)
+    return {pair for pair in _close(places) if moving[pair[0]] or moving[pair[1]]}
