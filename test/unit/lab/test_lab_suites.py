@@ -1,0 +1,127 @@
+"""The experiments that come with the package, and the runs without packets among them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.ideal import IDEAL_RULES, Swarm, run_ideal
+from drone_mesh.lab.plan import Plan
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.template import write_template
+from drone_mesh.lab.worker import execute
+
+EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
+SUITES = ["air", "heal", "obstacles", "published", "routing", "timing"]
+
+
+@pytest.mark.parametrize("name", SUITES)
+def test_each_suite_is_a_valid_experiment_whose_runs_do_not_fail(name: str) -> None:
+    loaded = load_experiment(
+        EXPERIMENTS / f"{name}.yaml",
+        [] if name in ("published", "air") else ["base.duration_s=70", "base.sample_s=5"],
+    )
+    assert loaded.experiment.name == name
+    first = next(iter(Plan(loaded)))
+    assert execute(first.spec).message == ""
+
+
+def test_the_template_of_lab_new_is_a_valid_experiment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = write_template("first_try")
+    assert len(load_experiment(path).cells) == 4
+    with pytest.raises(ConfigurationError, match=r"first_try\.yaml exists; it was not touched"):
+        write_template("first_try")
+    with pytest.raises(ConfigurationError, match="use letters, digits"):
+        write_template("../x")
+
+
+# Rules without packets
+
+
+def swarm(places: list[tuple[float, float]], **changes: Any) -> Swarm:
+    array = np.array(places, float)
+    near = np.linalg.norm(array[:, None] - array[None], axis=2) < 9.0
+    np.fill_diagonal(near, False)
+    known: dict[str, Any] = {
+        "places": array, "before": array.copy(), "parts": np.zeros(len(array), int), "home": 0,
+        "near_lost": np.full_like(array, math.nan), "near": near,
+        "middle": np.array([0.0, 0.0]), "step_m": 0.5,
+    }  # fmt: skip
+    return Swarm(**{**known, **changes})
+
+
+def test_centering_flies_to_the_mean_of_all() -> None:
+    moves = IDEAL_RULES["centering"](swarm([(0, 0), (20, 0)]))
+    assert moves.tolist() == [[0.5, 0.0], [-0.5, 0.0]]
+
+
+def test_home_moves_only_who_has_no_path_to_the_gateway() -> None:
+    moves = IDEAL_RULES["home"](swarm([(0, 0), (5, 0), (0, 20)], parts=np.array([0, 0, 1])))
+    assert moves.tolist() == [[0, 0], [0, 0], [0, -0.5]]
+
+
+def test_the_oracle_moves_a_part_as_a_block_over_the_shortest_gap() -> None:
+    places = [(0, 0), (8, 0), (18, 0), (26, 0)]
+    moves = IDEAL_RULES["oracle"](swarm(places, parts=np.array([0, 0, 1, 1])))
+    assert moves.tolist() == [[0, 0], [0, 0], [-0.5, 0], [-0.5, 0]]
+
+
+def test_hero_flies_to_lost_neighbours_and_the_others_follow() -> None:
+    lost = np.array([[5.0, 0.0], [math.nan, math.nan]])
+    before = np.array([[0.0, 0.0], [0.0, 5.0]])
+    seen = swarm([(0.5, 0), (0, 5)], near_lost=lost, before=before)
+    assert IDEAL_RULES["hero"](seen).tolist() == [[0.5, 0.0], [0.5, 0.0]]
+
+
+def test_sidr_as_coded_flies_along_a_diagonal_and_as_described_to_the_middle() -> None:
+    places = [(4, 0), (4, 2)]
+    described = IDEAL_RULES["sidr"](swarm(places, middle=np.array([4.0, 9.0])))
+    assert described.tolist() == [[0, 0.5], [0, 0.5]]
+    coded = IDEAL_RULES["sidr_as_coded"](swarm(places, middle=np.array([6.0, 6.0])))
+    assert coded[0, 0] == coded[0, 1] == pytest.approx(0.5 / math.sqrt(2))
+
+
+@pytest.mark.parametrize("rule", ["centering", "home", "oracle"])
+def test_rules_that_know_everything_heal_what_was_split(rule: str) -> None:
+    content = {
+        "model": "ideal", "layout": {"drones": 60, "width_m": 41}, "repair": rule,
+        "speed_m_s": 0.75, "duration_s": 50, "faults": [{"at_s": 0, "kill": {"number": 30}}],
+    }  # fmt: skip
+    measured, digest = run_ideal(Scenario.model_validate(content), Streams(1, 0))
+    assert measured["split"] == 1
+    assert measured["healed"] == 1
+    assert 0 < measured["t_total_s"] < 49.9
+    assert measured["connected_share"] == 1.0
+    assert (measured, digest) == run_ideal(Scenario.model_validate(content), Streams(1, 0))
+
+
+def test_no_rule_flies_less_in_all_than_the_oracle() -> None:
+    content = {
+        "model": "ideal", "layout": {"drones": 60, "width_m": 41}, "speed_m_s": 0.75,
+        "duration_s": 50, "faults": [{"at_s": 0, "kill": {"number": 25}}],
+    }  # fmt: skip
+    flown = {}
+    for rule in ("oracle", "home", "centering"):
+        total = 0.0
+        for repetition in range(5):
+            scenario = Scenario.model_validate({**content, "repair": rule})
+            total += run_ideal(scenario, Streams(1, repetition))[0]["distance_total_m"]
+        flown[rule] = total
+    assert flown["oracle"] < flown["home"] < flown["centering"]
+
+
+def test_a_rule_for_packets_is_none_without_them(tmp_path: Path) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\nbase:\n  model: ideal\n  repair: thesis\n")
+    with pytest.raises(ConfigurationError, match=r"line 4: repair: no rule 'thesis' for model"):
+        load_experiment(path)
