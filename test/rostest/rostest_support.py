@@ -78,7 +78,7 @@ class LogWatch:
 
 
 class MeshWatch:
-    """The nodes 0..count-1, as they tell of themselves. Times are simulated seconds."""
+    """The nodes 0..count-1, from their debug topics. Times are simulated seconds."""
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -183,14 +183,16 @@ class Stranger:
     def _hear(self, packet: NRF24) -> None:
         self.heard.append(bytes(packet.payload))
 
-    def tell(self, position: tuple[float, float, float], sub: str = "", on: bool = True) -> None:
+    def announce(
+        self, position: tuple[float, float, float], sub: str = "", on: bool = True
+    ) -> None:
         """Publish one DroneInfo about itself."""
         self._publisher.publish(DroneInfo(self.node_id, position, sub, on))
 
     def register(self) -> None:
         """Returns when the simulator knows it and it can be sent to."""
         wait_for("no simulator", WALL_LIMIT_S, lambda: self._publisher.get_num_connections() > 0)
-        self.tell(self._place, self._topic)
+        self.announce(self._place, self._topic)
         hello = bytes((self.node_id, self.node_id, 0, self.node_id, self.node_id))
 
         def reachable() -> bool:

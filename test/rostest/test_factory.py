@@ -78,14 +78,14 @@ class FactoryTest(unittest.TestCase):
         self.assertEqual(self.start_places, [(-1.0, 0.0, 0), (0.0, 0.0, 0), (1.0, 0.0, 0)])
 
     def test_a_goal_is_flown_to_and_told_at_most_20_times_a_second(self) -> None:
-        told: list[DroneInfo] = []
-        positions = rospy.Subscriber("/WirelessSignalSimulator", DroneInfo, told.append)
+        heard: list[DroneInfo] = []
+        positions = rospy.Subscriber("/WirelessSignalSimulator", DroneInfo, heard.append)
 
         def of_the_engine() -> list[DroneInfo]:
-            return [info for info in list(told) if info.nodeID == 2 and not info.sub]
+            return [info for info in list(heard) if info.nodeID == 2 and not info.sub]
 
         wait_for("no DroneInfo of the engine for a new subscriber", 10, of_the_engine)
-        told.clear()
+        heard.clear()
         self.fly(2, latitude=3.0, longitude=5.0, height=2)
         goal = (5.0, 3.0, float(np.float32(2.05)))  # of the box's centre
         self.mesh.wait(

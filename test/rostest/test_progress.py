@@ -28,7 +28,7 @@ class ProgressTest(unittest.TestCase):
         cls.now_s = 0.0
         cls.said: collections.Counter[str] = collections.Counter()
         rospy.Subscriber("/clock", Clock, cls._tick)
-        rospy.Subscriber("/mesh/progress", Header, lambda told: cls.said.update([told.frame_id]))
+        rospy.Subscriber("/mesh/progress", Header, lambda heard: cls.said.update([heard.frame_id]))
         cls.log = LogWatch()
         cls.mesh.wait("all connected", 60, cls.mesh.connected)
 

@@ -58,11 +58,11 @@ class SimulatorTest(unittest.TestCase):
 
     def figure(self, name: str) -> float:
         """The figures that the simulator publishes after this call."""
-        told: list[float] = []
+        heard: list[float] = []
         for _message in range(2):  # the first may have been on its way
             array = rospy.wait_for_message("/diagnostics", DiagnosticArray, WALL_LIMIT_S)
-            told += [float(v.value) for s in array.status for v in s.values if v.key == name]
-        return told[-1]
+            heard += [float(v.value) for s in array.status for v in s.values if v.key == name]
+        return heard[-1]
 
     def test_a_packet_reaches_the_topic_of_its_receiver_unchanged(self) -> None:
         sent = packet(1, 2) + bytes(range(27))
@@ -104,17 +104,17 @@ class SimulatorTest(unittest.TestCase):
             call("/SignalSimulator/messages", WirelessMessages, 1, bytes(33))
 
     def test_a_node_that_is_off_neither_sends_nor_receives(self) -> None:
-        self.b.tell((0.0, 0.0, 0.0), "/stranger_b", on=False)
+        self.b.announce((0.0, 0.0, 0.0), "/stranger_b", on=False)
         wait_for("2 was not switched off", 5, lambda: self.in_range(1) == [])
         self.assertFalse(self.a.send(packet(1, 2)))
         self.assertFalse(self.b.send(packet(2, 1)))
-        self.b.tell((0.0, 0.0, 0.0), "/stranger_b", on=True)
+        self.b.announce((0.0, 0.0, 0.0), "/stranger_b", on=True)
         wait_for("2 was not switched on", 5, lambda: self.in_range(1) == [2])
 
     def test_an_engine_moves_its_node(self) -> None:
-        self.far.tell((9.0, 0.0, 0.1))
+        self.far.announce((9.0, 0.0, 0.1))
         wait_for("3 did not move", 5, lambda: self.in_range(1) == [2, 3])
-        self.far.tell((10.5, 0.0, 0.1))
+        self.far.announce((10.5, 0.0, 0.1))
         wait_for("3 did not move back", 5, lambda: self.in_range(1) == [2])
 
     def test_a_killed_receiver_does_not_count_as_reached(self) -> None:
@@ -133,7 +133,7 @@ class SimulatorTest(unittest.TestCase):
     def test_only_who_has_listened_before_can_lose_a_packet(self) -> None:
         late = Stranger(8, "/stranger_late", (1.0, 1.0, 0.1))
         late.subscriber.unregister()
-        late.tell((1.0, 1.0, 0.1), "/stranger_late")
+        late.announce((1.0, 1.0, 0.1), "/stranger_late")
         wait_for("8 is known", WALL_LIMIT_S, lambda: self.knows(8))
         lost = self.figure("lost in range")
         self.assertFalse(self.a.send(packet(1, 8)))
@@ -144,7 +144,7 @@ class SimulatorTest(unittest.TestCase):
         subscriber.unregister()
         wait_for("8 listens no more", WALL_LIMIT_S, lambda: not self.a.send(packet(1, 8)))
         self.assertGreater(self.figure("lost in range"), lost)
-        late.tell((0.0, 0.0, 0.0), "/stranger_late", on=False)
+        late.announce((0.0, 0.0, 0.0), "/stranger_late", on=False)
 
     def test_bad_information_changes_nothing_and_does_not_flood_the_log(self) -> None:
         nan = float("nan")
@@ -154,7 +154,7 @@ class SimulatorTest(unittest.TestCase):
             self.a._publisher.publish(DroneInfo(255, (1.0, 0.0, 0.0), "", True))
             self.a._publisher.publish(DroneInfo(1, (1.0, 0.0, 0.0), "no topic", True))
             self.a._publisher.publish(DroneInfo(1, (1.0, 0.0, 0.0), "/rosout", True))
-        self.a.tell((1.0, 0.5, 0.1))  # comes after them on the same connection
+        self.a.announce((1.0, 0.5, 0.1))  # comes after them on the same connection
         wait_for("no line about it", 10, lambda: self.log.lines("DroneInfo dropped"))
         self.assertEqual(self.in_range(1), [2])
         self.assertTrue(self.b.send(packet(2, 1)))

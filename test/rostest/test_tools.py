@@ -70,39 +70,39 @@ class ToolsTest(unittest.TestCase):
 
     def test_1_each_tool_explains_itself(self) -> None:
         for tool in TOOLS:
-            told = subprocess.run(
+            finished = subprocess.run(
                 ["rosrun", "drone_mesh", tool, "--help"],
                 capture_output=True,
                 text=True,
                 timeout=TOOL_LIMIT_S,
                 check=False,
             )
-            self.assertEqual(told.returncode, 0, told.stderr)
-            self.assertIn(f"usage: rosrun drone_mesh {tool}", told.stdout)
-            self.assertIn("Exit code", told.stdout)
+            self.assertEqual(finished.returncode, 0, finished.stderr)
+            self.assertIn(f"usage: rosrun drone_mesh {tool}", finished.stdout)
+            self.assertIn("Exit code", finished.stdout)
 
     def test_1_each_node_explains_itself_and_leaves_the_one_that_runs_alone(self) -> None:
         for node in NODES:
-            told = run(node, "--help")
-            self.assertEqual(told.returncode, 0, told.stderr)
-            self.assertIn(f"usage: rosrun drone_mesh {node}", told.stdout)
+            finished = run(node, "--help")
+            self.assertEqual(finished.returncode, 0, finished.stderr)
+            self.assertIn(f"usage: rosrun drone_mesh {node}", finished.stdout)
             refused = run(node, "--nonsense")
             self.assertEqual(refused.returncode, 2)
             self.assertIn("unrecognized arguments: --nonsense", refused.stderr)
 
     def test_2_without_a_master_no_node_waits_for_one(self) -> None:
         for node in NODES:
-            told = run(node, ROS_MASTER_URI="http://127.0.0.1:9")
-            self.assertEqual(told.returncode, 2)
-            self.assertIn(f"{node}: no ROS master at http://127.0.0.1:9", told.stderr)
-            self.assertNotIn("Traceback", told.stderr)
+            finished = run(node, ROS_MASTER_URI="http://127.0.0.1:9")
+            self.assertEqual(finished.returncode, 2)
+            self.assertIn(f"{node}: no ROS master at http://127.0.0.1:9", finished.stderr)
+            self.assertNotIn("Traceback", finished.stderr)
 
     def test_2_without_a_master_there_is_one_line_that_says_so(self) -> None:
         for arguments in (["status"], ["status", "--watch"], ["snapshot", "picture.png"]):
-            told = run(*arguments, ROS_MASTER_URI="http://127.0.0.1:9")
-            self.assertEqual(told.returncode, 2)
-            self.assertIn("no ROS master at http://127.0.0.1:9", told.stderr)
-            self.assertNotIn("Traceback", told.stderr)
+            finished = run(*arguments, ROS_MASTER_URI="http://127.0.0.1:9")
+            self.assertEqual(finished.returncode, 2)
+            self.assertIn("no ROS master at http://127.0.0.1:9", finished.stderr)
+            self.assertNotIn("Traceback", finished.stderr)
 
     def test_3_a_run_is_seen_live_and_recorded_and_told(self) -> None:
         recorder = subprocess.Popen(
@@ -113,10 +113,10 @@ class ToolsTest(unittest.TestCase):
             wait_for("a bag", WALL_LIMIT_S, lambda: list(self.folder.glob("*.bag.active")))
             wait_for("the recorder listens", WALL_LIMIT_S, recorder_listens)
             wait_for("all connected", WALL_LIMIT_S, lambda: self.connected() == 4)
-            told = run("status")
-            self.assertEqual(told.returncode, 0, told.stdout + told.stderr)
-            self.assertIn("3 of 3 routers connected", told.stdout)
-            self.assertNotIn("\x1b", told.stdout)
+            finished = run("status")
+            self.assertEqual(finished.returncode, 0, finished.stdout + finished.stderr)
+            self.assertIn("3 of 3 routers connected", finished.stdout)
+            self.assertNotIn("\x1b", finished.stdout)
             self.assertEqual(run("snapshot", f"{self.folder}/live.png").returncode, 0)
             call("/Nodes/2/powerSwitch", PowerSwitch, False)
             wait_for("3 is lost", WALL_LIMIT_S, lambda: self.connected() == 2)
@@ -130,14 +130,16 @@ class ToolsTest(unittest.TestCase):
         self._look_into(bag)
 
     def _look_into(self, bag: Path) -> None:
-        told = run("status", "--bag", str(bag))
-        self.assertEqual(told.returncode, 0, told.stderr)
-        self.assertIn("2 of 2 routers connected, 1 switched off", told.stdout)
+        finished = run("status", "--bag", str(bag))
+        self.assertEqual(finished.returncode, 0, finished.stderr)
+        self.assertIn("2 of 2 routers connected, 1 switched off", finished.stdout)
         self.assertEqual(run("snapshot", "--bag", str(bag), f"{self.folder}/bag.png").returncode, 0)
         for picture in ("live.png", "bag.png"):
             self.assertEqual((self.folder / picture).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
-        told = run("report", str(bag), "-o", f"{self.folder}/run.html", "--csv", str(self.folder))
-        self.assertEqual(told.returncode, 0, told.stderr)
+        finished = run(
+            "report", str(bag), "-o", f"{self.folder}/run.html", "--csv", str(self.folder)
+        )
+        self.assertEqual(finished.returncode, 0, finished.stderr)
         page = (self.folder / "run.html").read_text(encoding="utf-8")
         self.assertTrue("<td>2 off</td>" in page, "the page does not tell the cause of the loss")
         self.assertIn("flight decided", (self.folder / "events.csv").read_text(encoding="utf-8"))
@@ -147,10 +149,10 @@ class ToolsTest(unittest.TestCase):
         nonsense.write_bytes(b"\x89 this is not a bag")
         for path in (nonsense, self.folder / "missing.bag"):
             for arguments in (["status", "--bag"], ["report"]):
-                told = run(*arguments, str(path))
-                self.assertEqual(told.returncode, 2)
-                self.assertIn(str(path), told.stderr)
-                self.assertNotIn("Traceback", told.stderr)
+                finished = run(*arguments, str(path))
+                self.assertEqual(finished.returncode, 2)
+                self.assertIn(str(path), finished.stderr)
+                self.assertNotIn("Traceback", finished.stderr)
 
 
 if __name__ == "__main__":

@@ -119,7 +119,7 @@ class Telemetry:
         """Why the autopilot cannot be relied on now; empty if it can."""
         if self.autopilot is None:
             if self._other_vehicle:
-                return "the vehicle is no multirotor with ArduPilot or PX4"
+                return "the vehicle is not a multirotor with ArduPilot or PX4"
             return "no heartbeat from an ArduPilot or PX4 autopilot yet"
         silence_s = now_s - self.heartbeat_s
         if silence_s > HEARTBEAT_LOST_S:
