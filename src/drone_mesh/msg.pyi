@@ -21,6 +21,15 @@ class DroneInfo(Message):
         on: bool = ...,
     ) -> None: ...
 
+class FlightOrderAnswer(Message):
+    SENT: Final = 1
+    NO_ROUTE: Final = 2
+    REFUSED: Final = 3
+    gateway: int
+    drone: int
+    outcome: int
+    def __init__(self, gateway: int = ..., drone: int = ..., outcome: int = ...) -> None: ...
+
 class HostReport(Message):
     header: std_msgs.msg.Header
     host: str

@@ -41,6 +41,27 @@ class Casus:
     _request_class = CasusRequest
     _response_class = CasusResponse
 
+class OrderLayoutRequest(Message):
+    caseID: int
+    def __init__(self, caseID: int = ...) -> None: ...
+
+class OrderLayoutResponse(Message):
+    sent: bytes
+    no_route: bytes
+    not_in_fleet: bytes
+    message: str
+    def __init__(
+        self,
+        sent: bytes | Sequence[int] = ...,
+        no_route: bytes | Sequence[int] = ...,
+        not_in_fleet: bytes | Sequence[int] = ...,
+        message: str = ...,
+    ) -> None: ...
+
+class OrderLayout:
+    _request_class = OrderLayoutRequest
+    _response_class = OrderLayoutResponse
+
 class PowerSwitchRequest(Message):
     power: bool
     def __init__(self, power: bool = ...) -> None: ...

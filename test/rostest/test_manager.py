@@ -6,13 +6,14 @@ from __future__ import annotations
 import math
 import time
 import unittest
+from typing import Container
 
 import rospy
 import rostest
 from rostest_support import LogWatch, call, wait_for
 
-from drone_mesh.msg import RequestGatewayDroneFlight
-from drone_mesh.srv import Casus, RequestDroneFlight
+from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
+from drone_mesh.srv import Casus, OrderLayout, RequestDroneFlight
 
 
 def request(node_id: int, latitude: float, longitude: float, height: int) -> int:
@@ -34,12 +35,17 @@ class ManagerTest(unittest.TestCase):
         if self.gateway is not None:
             self.gateway.unregister()
 
-    def listen(self) -> None:
-        """Subscribe as a gateway does. Orders to drone 250 only show that they arrive."""
+    def listen(self, no_route: Container[int] = ()) -> None:
+        """Subscribe as a gateway does, and answer. Orders to drone 250 show that they arrive."""
+        answers = rospy.Publisher("/gateway/answers", FlightOrderAnswer, queue_size=100)
+        wait_for("the manager to subscribe", 10, lambda: answers.get_num_connections() > 0)
         trials: list[RequestGatewayDroneFlight] = []
 
         def order(order: RequestGatewayDroneFlight) -> None:
             (trials if order.ID == 250 else self.orders).append(order)
+            lost = order.ID in no_route
+            outcome = FlightOrderAnswer.NO_ROUTE if lost else FlightOrderAnswer.SENT
+            answers.publish(FlightOrderAnswer(0, order.ID, outcome))
 
         self.gateway = rospy.Subscriber("/gateway", RequestGatewayDroneFlight, order)
         wait_for("no order arrived", 10, lambda: request(250, 1, 1, 1) == 1 and trials)
@@ -51,6 +57,43 @@ class ManagerTest(unittest.TestCase):
         order = self.orders[0]
         self.assertEqual((order.ID, order.latitude, order.longitude), (3, 4.5, -2.25))
         self.assertEqual(order.height, 7)
+
+    def test_an_order_that_no_gateway_has_a_route_for_has_status_2(self) -> None:
+        self.listen(no_route=[3])
+        self.assertEqual(request(3, 1, 1, 0), 2)
+        self.assertEqual(request(4, 1, 1, 0), 1)
+        wait_for("a line", 5, lambda: self.log.lines("drone 3: no gateway has a route to it"))
+
+    def test_a_gateway_that_does_not_answer_counts_as_one_that_sent(self) -> None:
+        silent = rospy.Subscriber("/gateway", RequestGatewayDroneFlight, self.orders.append)
+        self.addCleanup(silent.unregister)
+        wait_for("an order", 10, lambda: request(250, 1, 1, 1) == 1 and self.orders)
+
+    def test_a_layout_reports_what_became_of_its_orders(self) -> None:
+        self.listen(no_route=[2, 5])
+        answer = call("/DroneManager/orderLayout", OrderLayout, 101)
+        self.assertEqual((list(answer.sent), list(answer.no_route)), ([6, 4, 3, 1], [5, 2]))
+        self.assertEqual(list(answer.not_in_fleet), [])
+        self.assertEqual(answer.message, "ordered 4 of 6 drones; no route to drones 2, 5")
+
+    def test_drones_that_are_not_in_the_fleet_are_not_ordered(self) -> None:
+        self.listen()
+        rospy.set_param("/drone_mesh/fleet", {"gateways": 1, "routers": 4, "seed": "1"})
+        self.addCleanup(rospy.delete_param, "/drone_mesh/fleet")
+        with self.assertRaisesRegex(
+            rospy.ServiceException, "drone 99 is not in this fleet: .* 0..4"
+        ):
+            request(99, 1, 1, 0)
+        call("/DroneManager/SetToCasus", Casus, 101)
+        line = "case 101: ordered 4 of 6 drones; drones 5..6 are not in this fleet"
+        wait_for("one line", 5, lambda: self.log.lines(line))
+        self.assertEqual([order.ID for order in self.orders], [4, 3, 2, 1])
+
+    def test_the_short_names_do_the_same(self) -> None:
+        self.listen()
+        self.assertEqual(call("/requestDroneMovement", RequestDroneFlight, 3, 1, 1, 0).status, 1)
+        call("/SetToCasus", Casus, 1)
+        wait_for("both orders", 5, lambda: [order.ID for order in self.orders] == [3, 1])
 
     def test_without_a_gateway_the_status_is_0_after_3_seconds(self) -> None:
         begun_s = time.monotonic()

@@ -26,7 +26,7 @@ class NoRouteTest(unittest.TestCase):
         begun_s = time.monotonic()
         answer = call("/DroneManager/requestDroneMovement", RequestDroneFlight, 2, 4.0, 3.0, 0)
         self.assertLess(time.monotonic() - begun_s, LIMIT_S)
-        self.assertEqual(answer.status, 1)
+        self.assertEqual(answer.status, 2)
         wait_for("no line that names drone 2", 10, lambda: log.lines("no route to drone 2"))
         mesh.pass_time(3.0)
         self.assertEqual(mesh.place(2), start_place)

@@ -9,6 +9,7 @@ import rospy
 import rostest
 from rostest_support import LogWatch, MeshWatch, call
 
+from drone_mesh.msg import NodeDebugInfo
 from drone_mesh.srv import AreaScan
 
 
@@ -23,6 +24,10 @@ class PowerSwitchTest(unittest.TestCase):
         log = LogWatch()
         mesh = MeshWatch(3)
         mesh.wait("all connected", 30, mesh.connected)
+        heard: set[int] = set()
+        of_all = rospy.Subscriber("/debug", NodeDebugInfo, lambda info: heard.add(info.nodeID))
+        mesh.wait("all nodes on /debug", 10, lambda: heard == {0, 1, 2})
+        of_all.unregister()
         mesh.switch(2, False)
         mesh.wait("2 off and not connected", 3, lambda: mesh.off(2) and mesh.hops()[2] is None)
         mesh.wait("2 off in the simulator", 3, lambda: near(1) == [0])

@@ -11,8 +11,14 @@ MESSAGES_SERVICE = "/SignalSimulator/messages"
 BROADCAST_SERVICE = "/SignalSimulator/broadcast"
 
 GATEWAY_TOPIC = "/gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
+GATEWAY_ANSWERS_TOPIC = "/gateway/answers"  # FlightOrderAnswer: each gateway -> DroneManager
 REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"
 SET_TO_CASUS_SERVICE = "/DroneManager/SetToCasus"
+ORDER_LAYOUT_SERVICE = "/DroneManager/orderLayout"  # OrderLayout
+# The same services under the names that people type first.
+SHORT_REQUEST_MOVEMENT_SERVICE = "/requestDroneMovement"
+SHORT_SET_TO_CASUS_SERVICE = "/SetToCasus"
+ALL_DEBUG_TOPIC = "/debug"  # NodeDebugInfo of all nodes, only while there is a subscriber
 
 CLOCK_TOPIC = "/clock"
 FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the factor achieved, once a second

@@ -16,6 +16,7 @@ from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
 
 DEBUG_PERIOD_S = 1.0  # docs/protocol.md, "Topics"
 SWITCH_TIMEOUT_S = 2.0  # our choice: the power switch answers within this wall time
+_ALL_DEBUG_QUEUE = 512  # messages of all nodes that may wait for a slow subscriber
 _MAX_UINT16 = 0xFFFF
 
 _log = logging.getLogger(__name__)
@@ -24,7 +25,8 @@ _log = logging.getLogger(__name__)
 class AntennaPanel:
     """The ROS controls of one antenna, whatever kind of radio it has.
 
-    Publishes: /Nodes/<id>/debug (NodeDebugInfo), 1 Hz of simulated time with debugging on
+    Publishes: /Nodes/<id>/debug (NodeDebugInfo), 1 Hz of simulated time with debugging on;
+               /debug, the same of all nodes, only while there is a subscriber
     Services:  /Nodes/<id>/powerSwitch (PowerSwitch)
 
     The switch is handled in a thread of rospy; everything else is for the executor's worker.
@@ -39,7 +41,7 @@ class AntennaPanel:
         self._is_on = is_on
         self._switch = switch
         self._service: rospy.Service | None = None
-        self._publisher: rospy.Publisher | None = None
+        self._publishers: tuple[rospy.Publisher, ...] = ()
         self._stop_debugging: Callable[[], None] | None = None
 
     def start(self) -> None:
@@ -56,18 +58,28 @@ class AntennaPanel:
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Start or stop publishing NodeDebugInfo."""
-        if self._stop_debugging is not None and self._publisher is not None:
+        if self._stop_debugging is not None:
             self._stop_debugging()
-            self._publisher.unregister()
-            self._stop_debugging = self._publisher = None
+            self._stop_debugging = None
+            for publisher in self._publishers:
+                publisher.unregister()
+            self._publishers = ()
         if on:
             publisher = rospy.Publisher(
                 names.debug_topic(self._node_id), NodeDebugInfo, queue_size=2
             )
-            self._publisher = publisher
-            self._stop_debugging = self._seat.call_every(
-                DEBUG_PERIOD_S, lambda _now_s: publisher.publish(self._debug_info(info))
+            of_all = rospy.Publisher(
+                names.ALL_DEBUG_TOPIC, NodeDebugInfo, queue_size=_ALL_DEBUG_QUEUE
             )
+
+            def publish(_now_s: float) -> None:
+                message = self._debug_info(info)
+                publisher.publish(message)
+                if of_all.get_num_connections():
+                    of_all.publish(message)
+
+            self._publishers = (publisher, of_all)
+            self._stop_debugging = self._seat.call_every(DEBUG_PERIOD_S, publish)
 
     def _debug_info(self, info: IMeshDebugInfo) -> NodeDebugInfo:
         return NodeDebugInfo(

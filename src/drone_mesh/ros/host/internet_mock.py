@@ -9,15 +9,19 @@ import rospy
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.errors import GoalRefused
 from drone_mesh.execution import Seat
-from drone_mesh.msg import RequestGatewayDroneFlight
+from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_of
+
+_QUEUE = 512  # answers that may wait for a slow DroneManager: two whole fleets
 
 _log = logging.getLogger(__name__)
 
 
 class RosInternetMock(IInternetConnection):
     """Subscribes /gateway (RequestGatewayDroneFlight), and hands each order to its gateway.
+
+    Publishes /gateway/answers (FlightOrderAnswer): what became of each order.
 
     `connect` and `disconnect` are for the executor's worker, to which orders are submitted.
     """
@@ -27,6 +31,9 @@ class RosInternetMock(IInternetConnection):
         self._node_id = node_id
         self._seat = seat
         self._subscriber: rospy.Subscriber | None = None
+        self._answers = rospy.Publisher(
+            names.GATEWAY_ANSWERS_TOPIC, FlightOrderAnswer, tcp_nodelay=True, queue_size=_QUEUE
+        )
 
     def connect(self, commands: IGatewayCommands) -> None:
         """Subscribe; orders go to `commands`."""
@@ -55,6 +62,11 @@ class RosInternetMock(IInternetConnection):
             )
         except GoalRefused as error:
             _log.warning("gateway %d: order for drone %d: %s", self._node_id, request.ID, error)
+            self._answer(request.ID, FlightOrderAnswer.REFUSED)
             return
+        self._answer(request.ID, FlightOrderAnswer.SENT if taken else FlightOrderAnswer.NO_ROUTE)
         if taken:
             _log.info("gateway %d sent drone %d to %s", self._node_id, request.ID, goal.in_words())
+
+    def _answer(self, drone: int, outcome: int) -> None:
+        self._answers.publish(FlightOrderAnswer(self._node_id, drone, outcome))

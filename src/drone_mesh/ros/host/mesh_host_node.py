@@ -13,12 +13,12 @@ from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import or_stop
 from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone
-from drone_mesh.ros.host.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.host.followed_clock import FollowedClock
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.mesh_settings import MeshSettings

@@ -4,31 +4,39 @@ from __future__ import annotations
 
 import logging
 import time
+from typing import Sequence
 
 import rospy
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
-from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.layouts import Layouts, Order, UnknownCase
 from drone_mesh.msg import RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.conversions import flight_order, location_of
+from drone_mesh.ros.graph.fleet_parameter import fleet_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import file_parameter, or_stop
+from drone_mesh.ros.services.order_answers import OrderAnswers
+from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.srv import (
     Casus,
     CasusRequest,
     CasusResponse,
+    OrderLayout,
+    OrderLayoutRequest,
+    OrderLayoutResponse,
     RequestDroneFlight,
     RequestDroneFlightRequest,
     RequestDroneFlightResponse,
 )
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/protocol.md, "Drone manager")
+ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
 LOOK_PERIOD_S = 0.05
 ORDERS_IN_QUEUE = 512  # two whole fleets
 
@@ -40,8 +48,10 @@ class DroneManager:
 
     Parameters (private): ~casus (a YAML file of layouts; config/casus.yaml by default)
     Publishes:  /gateway (RequestGatewayDroneFlight)
+    Subscribes: /gateway/answers (FlightOrderAnswer)
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
-                (Casus)
+                (Casus), both also under their last names alone; /DroneManager/orderLayout
+                (OrderLayout)
     """
 
     # Its only state, the layouts, never changes, so the handlers may run in parallel.
@@ -54,11 +64,15 @@ class DroneManager:
             tcp_nodelay=True,
             queue_size=ORDERS_IN_QUEUE,
         )
-        rospy.Service(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, self._request_movement)
-        rospy.Service(names.SET_TO_CASUS_SERVICE, Casus, self._set_to_casus)
+        self._answers = OrderAnswers()
+        for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
+            rospy.Service(name, RequestDroneFlight, self._request_movement)
+        for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
+            rospy.Service(name, Casus, self._set_to_casus)
+        rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
-        """Status 1: at least one gateway received the order; 0: there is no gateway."""
+        """Status 1: a gateway received the order; 2: but none has a route; 0: there is none."""
         goal = location_of(request)
         try:
             check_goal(*goal)
@@ -66,26 +80,59 @@ class DroneManager:
             raise rospy.ServiceException(str(error)) from None
         if request.ID > MAX_NODE_ID:
             raise rospy.ServiceException(f"invalid drone id {request.ID}: must be 0..{MAX_NODE_ID}")
+        fleet = fleet_if_known()
+        if fleet is not None and fleet.drones <= request.ID:
+            raise rospy.ServiceException(
+                f"drone {request.ID} is not in this fleet: its ids are 0..{fleet.drones - 1}"
+            )
         if not self._gateway_is_there():
             _log.warning("drone %d: order dropped, there is no gateway", request.ID)
             return RequestDroneFlightResponse(status=0)
-        self._order(request.ID, goal)
-        return RequestDroneFlightResponse(status=1)
+        _sent, no_route = self._order([Order(request.ID, goal)], fleet)
+        if no_route:
+            _log.warning("drone %d: no gateway has a route to it", request.ID)
+        return RequestDroneFlightResponse(status=2 if no_route else 1)
 
     def _set_to_casus(self, request: CasusRequest) -> CasusResponse:
+        self._carry_out(request.caseID)
+        return CasusResponse()
+
+    def _order_layout(self, request: OrderLayoutRequest) -> OrderLayoutResponse:
+        summary = self._carry_out(request.caseID)
+        return OrderLayoutResponse(
+            summary.sent, summary.no_route, summary.not_in_fleet, summary.in_words()
+        )
+
+    def _carry_out(self, case: int) -> OrderSummary:
         try:
-            orders = self._layouts.orders(request.caseID)
+            orders = self._layouts.orders(case)
         except UnknownCase as error:
             raise rospy.ServiceException(str(error)) from None
         if not self._gateway_is_there():
             raise rospy.ServiceException("no gateway is running")
-        _log.info("case %d: ordering %d drones to their places", request.caseID, len(orders))
-        for node_id, goal in orders:
-            self._order(node_id, goal)
-        return CasusResponse()
+        fleet = fleet_if_known()
+        drones = MAX_NODE_ID + 1 if fleet is None else fleet.drones
+        missing = [order.node_id for order in orders if order.node_id >= drones]
+        sent, no_route = self._order([o for o in orders if o.node_id < drones], fleet)
+        summary = OrderSummary(sent, no_route, missing)
+        complete = len(sent) == len(orders)
+        _log.log(
+            logging.INFO if complete else logging.WARNING, "case %d: %s", case, summary.in_words()
+        )
+        return summary
 
-    def _order(self, node_id: int, goal: Location) -> None:
-        self._gateways.publish(flight_order(node_id, goal))
+    def _order(
+        self, orders: Sequence[Order], fleet: FactoryConfiguration | None
+    ) -> tuple[list[int], list[int]]:
+        """Publish these orders, in this order; returns the ids that were sent, or have no route."""
+
+        def publish() -> None:
+            for node_id, goal in orders:
+                self._gateways.publish(flight_order(node_id, goal))
+
+        gateways = self._gateways.get_num_connections() if fleet is None else fleet.gateways
+        drones = [order.node_id for order in orders]
+        return self._answers.await_outcomes(drones, publish, gateways, ANSWERS_TIMEOUT_S)
 
     def _gateway_is_there(self) -> bool:
         """Whether a gateway subscribes; waits for one, since it may be starting."""

@@ -15,8 +15,8 @@ from drone_mesh.ros.graph.persistent_service import (
     ServiceRefused,
 )
 from drone_mesh.srv import (
-    Casus,
-    CasusRequest,
+    OrderLayout,
+    OrderLayoutRequest,
     PowerSwitch,
     PowerSwitchRequest,
     RequestDroneFlight,
@@ -42,14 +42,19 @@ class RosControls:
         """Order a drone to a place, through the mesh."""
         request = RequestDroneFlightRequest(ID=node, latitude=y, longitude=x, height=round(z))
         answer = _call(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request)
-        if not answer.status:
+        if answer.status == 0:
             raise OrderRefused("no gateway is running to take the order")
+        if answer.status == 2:
+            raise OrderRefused(f"no gateway has a route to drone {node}")
         return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
 
     def layout(self, case: int) -> str:
         """Order all drones of a layout to their positions."""
-        _call(names.SET_TO_CASUS_SERVICE, Casus, CasusRequest(caseID=case))
-        return f"ordered layout {case}"
+        request = OrderLayoutRequest(caseID=case)
+        answer = _call(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
+        if not answer.sent:
+            raise OrderRefused(f"layout {case}: {answer.message}")
+        return f"layout {case}: {answer.message}"
 
     def speed(self, paused: bool, factor: float) -> str:
         """Pause or resume simulated time, or change its speed."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.fleet_parameter import set_fleet_parameter
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
-from drone_mesh.ros.host.fleet_parameter import set_fleet_parameter
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.world.drone_views import drone_views
 from drone_mesh.ros.world.engine_server import EngineServer, PositionReporter

@@ -21,3 +21,11 @@ def get_fleet_parameter() -> FactoryConfiguration:
     """The configuration that the factory has set. Raises KeyError before it has."""
     fleet = rospy.get_param(names.FLEET_PARAM)
     return FactoryConfiguration(**{**fleet, "seed": int(fleet["seed"])})
+
+
+def fleet_if_known() -> FactoryConfiguration | None:
+    """The configuration that the factory has set; None: there is no factory, or not yet."""
+    try:
+        return get_fleet_parameter()
+    except KeyError:
+        return None

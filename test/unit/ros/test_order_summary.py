@@ -1,0 +1,28 @@
+"""What became of the orders of a layout, in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.ros.services.order_summary import OrderSummary
+
+
+@pytest.mark.parametrize(
+    ("summary", "line"),
+    [
+        (OrderSummary([3, 2, 1], [], []), "ordered 3 of 3 drones"),
+        (OrderSummary([1], [], []), "ordered 1 of 1 drone"),
+        (
+            OrderSummary(list(range(16, 0, -1)), [], [17]),
+            "ordered 16 of 17 drones; drone 17 is not in this fleet",
+        ),
+        (
+            OrderSummary([1, 2], [3, 9, 5, 4], list(range(18, 101))),
+            "ordered 2 of 89 drones; no route to drones 3..5, 9; "
+            "drones 18..100 are not in this fleet",
+        ),
+        (OrderSummary([], [7], []), "ordered 0 of 1 drone; no route to drone 7"),
+    ],
+)
+def test_a_summary_counts_the_orders_and_names_the_drones_without_one(summary, line):
+    assert summary.in_words() == line
