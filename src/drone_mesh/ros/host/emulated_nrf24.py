@@ -25,8 +25,8 @@ class EmulatedNRF24(IWirelessCommunication):
     Publishes: /Node/<id> (NRF24): the received packets; /Nodes/<id>/debug (NodeDebugInfo)
     Services:  /Nodes/<id>/powerSwitch (PowerSwitch)
 
-    A send blocks the executor's worker for as long as the chip takes: each node needs a worker of
-    its own, as on a Pi.
+    Sends are queued. Setting the chip up blocks the executor's worker for milliseconds, so each
+    node has a worker of its own, as on a Pi.
     """
 
     def __init__(self, node_id: int, radio: NRF24LowLevelInterface, seat: Seat) -> None:

@@ -64,7 +64,7 @@ class EmulatedRadios:
         """Nothing to do: the air is there."""
 
     def seat(self) -> Seat:
-        """A worker of its own: a send blocks it for as long as the chip takes."""
+        """A worker of its own, as on a Pi: setting a chip up blocks it for milliseconds."""
         executor = MeshExecutor(self._clock, clock_is_poked=True, name="mesh_node")
         executor.start()
         self._executors.append(executor)
