@@ -2,4 +2,6 @@
 
 from __future__ import annotations
 
-MAX_DISTANCE_M = 9.0  # docs/protocol.md, "Wireless signal simulator": in range is nearer
+from drone_mesh.communication.repair_options import RANGE_M
+
+MAX_DISTANCE_M = RANGE_M

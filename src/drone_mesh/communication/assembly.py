@@ -8,6 +8,7 @@ from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import MeshObserver, ignore_events
+from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing import DEFAULT_ROUTING, create_routing_technique
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
@@ -26,6 +27,7 @@ def assemble_component(
     timing: MeshTiming | None = None,
     observer: MeshObserver = ignore_events,
     debug: bool = True,
+    repair: RepairOptions | None = None,
 ) -> MeshnetworkComponent:
     """A gateway if it has an `internet` side, else a router; not started yet.
 
@@ -34,7 +36,9 @@ def assemble_component(
     """
     technique = create_routing_technique(routing) if isinstance(routing, str) else routing
     if internet is None:
-        return MeshnetworkRouter(node_id, antenna, engine, technique, rng, timing, observer, debug)
+        return MeshnetworkRouter(
+            node_id, antenna, engine, technique, rng, timing, observer, debug, repair
+        )
     return MeshnetworkGateway(
         node_id, antenna, engine, technique, internet, rng, timing, observer, debug
     )

@@ -14,6 +14,7 @@ class Passage(NamedTuple):
     came_from: int
     went_to: int
     at_s: float
+    hops: int
 
 
 class CirculationGuard:
@@ -26,17 +27,26 @@ class CirculationGuard:
         self._passages: dict[bytes, Passage] = {}
         self._ages: deque[tuple[float, bytes]] = deque()
 
-    def came_round(self, identity: bytes, came_from: int, now_s: float) -> Passage | None:
-        """The first passage of a packet that now comes from another neighbour, else None."""
+    def came_round(
+        self, identity: bytes, came_from: int, now_s: float, hops: int = 0
+    ) -> Passage | None:
+        """The first passage of a packet that now comes from another neighbour, else None.
+
+        A heartbeat counts its hops: only with more `hops` than before has it come round.
+        """
         while self._ages and now_s - self._ages[0][0] >= CIRCULATION_S:
             at_s, old = self._ages.popleft()
             if old in self._passages and self._passages[old].at_s == at_s:
                 del self._passages[old]
         first = self._passages.get(identity)
-        return first if first is not None and first.came_from != came_from else None
+        if first is None or first.came_from == came_from or (hops and hops <= first.hops):
+            return None
+        return first
 
-    def passed(self, identity: bytes, came_from: int, went_to: int, now_s: float) -> None:
+    def passed(
+        self, identity: bytes, came_from: int, went_to: int, now_s: float, hops: int = 0
+    ) -> None:
         """The packet was handed on. The first passage is the one that counts."""
         if identity not in self._passages:
-            self._passages[identity] = Passage(came_from, went_to, now_s)
+            self._passages[identity] = Passage(came_from, went_to, now_s, hops)
             self._ages.append((now_s, identity))

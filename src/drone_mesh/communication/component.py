@@ -46,6 +46,8 @@ from drone_mesh.errors import GoalRefused
 INTRODUCE_AFTER_POWER_S = 0.2  # our choice: the medium has to hear of the antenna first
 INTRODUCE_SPREAD_S = 1.0  # our choice: after an outage the nodes do not all speak at once
 
+SILENCE_PERIODS = 1.5  # our choice: each neighbour is asked once a check period
+
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
 
@@ -79,7 +81,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._search_again_s = antenna.medium.search_s  # 0: the next check is soon enough
         self._deadlines = Deadlines()
         self._introduces_for_others = False  # Due.INTRODUCE answers a node that needs a gateway
-        self._neighbours = Neighbours()
+        self._neighbours = Neighbours(SILENCE_PERIODS * self._timing.check_period_s)
         self._report = Reporter(node_id, self._deadlines, observer)
         self.complaints = Complaints(node_id)
         self._delivery = Delivery(
@@ -148,8 +150,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if now_s >= deadlines.get(Due.ROUTING):
             deadlines.set(Due.ROUTING, math.inf)
             self._routing.on_time(now_s)
-        if now_s >= deadlines.get(Due.ASK_POSITION) and self._pilot.watch():
-            self._landed()
+        if now_s >= deadlines.get(Due.ASK_POSITION):
+            self._watch_flight()
         due_s = deadlines.get(Due.CHECK)
         if now_s >= due_s:
             period_s = self._timing.check_period_s
@@ -178,6 +180,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             return
         if self._neighbours.heard(from_, now_s):
             self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
+            self._on_neighbour_found()
         if creator == me:  # it came back and teaches no route
             self._routing.can_communicate_with_node(from_)
         elif not self._routing.learn(creator, from_, kind, payload):
@@ -246,6 +249,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if node in (self._node_id, NO_ROUTE):
             return node
         return self._routing.get_direction_to_node(node)
+
+    def get_repair_status(self) -> str:
+        """What the repair does and why, in a few words; empty while nothing is to be repaired."""
+        return ""
 
     def get_goal(self) -> Location | None:
         """Where the drone is flying to; None while it is not."""
@@ -369,6 +376,15 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     ) -> None:
         """A heartbeat for another node is about to be forwarded."""
 
+    @abc.abstractmethod
+    def _on_location(
+        self, node: int, location: Location, gateway: messages.GatewayPlace | None
+    ) -> None:
+        """`node` says where it is, and perhaps where a gateway was."""
+
+    def _on_neighbour_found(self) -> None:
+        """A packet arrived from a node that was not a neighbour."""
+
     def _on_neighbour_lost(self, node: int) -> None:
         """A packet could not be handed to a neighbour; the routes know already."""
 
@@ -376,9 +392,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     def _process(self, payload: bytes, creator: int, from_: int, kind: int) -> None:
         if kind == MessageType.LOCATION:
-            message = messages.LocationMessage.from_payload(payload)
-            gateway, next_hop = self.get_preferred_gateway(), self.get_route_to_gateway()
-            self.places.heard(creator, message.location, gateway, next_hop)
+            location = messages.LocationMessage.from_payload(payload).location
+            self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
         elif kind == MessageType.REQUESTLOCATION:
             self._send_location(creator)
         elif kind == MessageType.MISSING:
@@ -407,22 +422,31 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         return self._parts.heartbeat(me, me, connected, gateway)
 
     def _send_location(self, asker: int) -> None:
-        location = self._pilot.location()
+        location = self._pilot.goal or self._pilot.location()  # where it will stand counts
         if location is not None:
-            me, now_s = self._node_id, self._deadlines.now_s
-            self._delivery.send_own(
-                messages.LocationMessage.of(location, now_s, me, me, asker, asker).to_payload()
-            )
+            me, now_s, places = self._node_id, self._deadlines.now_s, self.places
+            answer = messages.LocationMessage.of(location, now_s, me, me, asker, asker).to_payload()
+            if places.gateway is not None:
+                gateway, age_s = self.get_preferred_gateway(), now_s - places.gateway_seen_s
+                answer = messages.GatewayPlace(gateway, places.gateway, age_s).behind(answer)
+            self._delivery.send_own(answer)
 
     # Flight ----------------------------------------------------------------------------------
 
     def _on_order(self, order: messages.GoToLocationMessage) -> None:
         try:
             check_goal(*order.location)
+            self._check_can_fly()
         except GoalRefused as error:
             self.complaints.add("order refused", str(error), self._deadlines.now_s)
             return
         self._take_order(order.creator, order.location)
+
+    def _check_can_fly(self) -> None:
+        """Raises GoalRefused if the drone would not fly to a goal now."""
+        why_not = self._pilot.why_not_fly()
+        if why_not:
+            raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
 
     def _take_order(self, creator: int, goal: Location) -> None:
         if self._pilot.goal == goal:
@@ -430,6 +454,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._report(MeshEventKind.FLIGHT_ORDERED, creator, f"to {goal.in_words()}")
         self._pilot.fly_to(goal)
         self._took_off()
+
+    def _watch_flight(self) -> None:
+        if self._pilot.watch():
+            self._landed()
 
     def _landed(self) -> None:
         """The drone is somewhere else, with other neighbours."""

@@ -18,6 +18,9 @@ from drone_mesh.communication.router_states import Link, RouterEvent, RouterStat
 _HOPS_UNTIL_KNOWN = 10  # our choice: for how many hops to wait for the first answer
 
 
+MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
+
+
 class Shortcut(NamedTuple):
     """A neighbour that presented itself with fewer hops than the route in use."""
 
@@ -52,6 +55,12 @@ class GatewayConnection:
         if self.gateway == NO_ROUTE:
             return NO_ROUTE
         return self._parts.routing.get_direction_to_node(self.gateway)
+
+    def may_use(self, gateway: int) -> bool:
+        """Whether news of `gateway` is of use: it is the preferred one, or there is none yet."""
+        if self.gateway == NO_ROUTE and gateway <= MAX_NODE_ID and gateway != self._parts.node_id:
+            self.gateway = gateway
+        return gateway == self.gateway
 
     # Heartbeats out --------------------------------------------------------------------------
 
@@ -171,10 +180,13 @@ class GatewayConnection:
     def ask_for_places(self) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved."""
         next_hop = self.next_hop()
-        if self._parts.places.gateway is None or next_hop == self.gateway:
-            self._ask_for_place(self.gateway)
+        places = self._parts.places
+        age_s = self._parts.now_s - places.gateway_seen_s
+        too_old = age_s >= (MAX_AGE_PERIODS - 1) * self._parts.timing.check_period_s
+        if places.gateway is None or next_hop == self.gateway or too_old:
+            self.ask_for_place(self.gateway)
         if next_hop not in (self.gateway, NO_ROUTE):
-            self._ask_for_place(next_hop)
+            self.ask_for_place(next_hop)
 
     # The end of a connection -----------------------------------------------------------------
 
@@ -204,7 +216,8 @@ class GatewayConnection:
         self._asked_neighbour_s = now_s
         return False
 
-    def _ask_for_place(self, node: int) -> None:
+    def ask_for_place(self, node: int) -> None:
+        """Ask `node` where it is, along the route to it."""
         me = self._parts.node_id
         self._parts.delivery.send_own(
             Message(me, me, MessageType.REQUESTLOCATION, node, node).to_payload()

@@ -13,7 +13,7 @@ class Due(enum.IntEnum):
     INTRODUCE = 1  # after the antenna came back
     ASK_POSITION = 2  # in flight
     ANSWER = 3  # the latest moment for the gateway's answer to a heartbeat
-    DECIDE = 4  # a negotiation
+    REPAIR = 4  # what the repair waits for
     ROUTING = 5  # what the routing technique asked for
 
 

@@ -145,7 +145,7 @@ class Delivery:
     def forget_route(self, other: int, node: int, told_by: int) -> None:
         """`other` cannot reach `node`; if that was the last route, inform the other neighbours."""
         if other == node:
-            self._neighbours.lost(node)
+            self._neighbours.lost(node, self._deadlines.now_s)
         if self._routing.other_cant_communicate_with_node(other, node):
             self._report(MeshEventKind.NODE_MISSING, node)
             self.tell_missing(node, told_by=told_by)
@@ -153,14 +153,14 @@ class Delivery:
     def gateway_lost(self, gateway: int) -> None:
         """The routes to `gateway` do not work: forget them, and inform the neighbours."""
         if self._routing.get_direction_to_node(gateway) == gateway:
-            self._neighbours.lost(gateway)
+            self._neighbours.lost(gateway, self._deadlines.now_s)
         if self._routing.gateway_lost(gateway):
             self.tell_missing(gateway)
 
     def gateway_taken(self, neighbour: int, gateway: int) -> None:
         """Try `gateway` through `neighbour`; other routes to it did not work."""
         if self._routing.get_direction_to_node(gateway) == gateway:
-            self._neighbours.lost(gateway)
+            self._neighbours.lost(gateway, self._deadlines.now_s)
         self._routing.gateway_taken(neighbour, gateway)
 
     def tell_missing(self, missing: int, first: int = NO_ROUTE, told_by: int = NO_ROUTE) -> None:
@@ -199,7 +199,7 @@ class Delivery:
         )
 
     def _neighbour_lost(self, node: int, came_from: int) -> None:
-        if self._neighbours.lost(node):
+        if self._neighbours.lost(node, self._deadlines.now_s):
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)
         if self._routing.cant_communicate_with_node(node):
             self._report(MeshEventKind.NODE_MISSING, node)

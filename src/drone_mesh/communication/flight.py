@@ -64,6 +64,10 @@ class Pilot:
             self._complaints.add("own location unknown", str(error), self._deadlines.now_s)
             return None
 
+    def why_not_fly(self) -> str:
+        """Why the drone would not fly to a goal now; empty while it would."""
+        return self._engine.why_not_fly()
+
     def fly_to(self, goal: Location, step_back: bool = False) -> None:
         """Start a flight, or change the goal of the present one; `step_back`: for a repair."""
         self._flight = Flight(goal)

@@ -36,7 +36,6 @@ class Forwarding:
         """Forward a packet to its addressee; drop it if it circulates or has no route."""
         creator, from_, kind, _to, forward = messages.header(payload)
         routing = self._routing
-        identity = b""
         if routing.FLOODS:
             if creator == self._node_id:
                 return
@@ -45,12 +44,12 @@ class Forwarding:
         if creator == self._node_id:
             self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
             return
-        if kind != MessageType.HEARTBEAT:
-            identity = messages.identity(payload)
-            first = self._circulation.came_round(identity, from_, now_s)
-            if first is not None:
-                self._drop_circulating(payload, first.went_to, now_s)
-                return
+        identity = messages.identity(payload)
+        hops = messages.hops(payload) if kind == MessageType.HEARTBEAT else 0
+        first = self._circulation.came_round(identity, from_, now_s, hops)
+        if first is not None:
+            self._drop_circulating(payload, first.went_to, now_s)
+            return
         lost = NO_ROUTE
         for _attempt in range(2):
             directions = routing.directions(forward, from_, creator)
@@ -65,8 +64,7 @@ class Forwarding:
                 self._complaints.dropped("a heartbeat with too many hops", payload, now_s)
                 return
             if self._delivery.send(forwarded, to, came_from=from_):
-                if identity:
-                    self._circulation.passed(identity, from_, to, now_s)
+                self._circulation.passed(identity, from_, to, now_s, hops)
                 return
             lost = to
         self.stranded(payload, now_s)

@@ -16,6 +16,7 @@ from drone_mesh.communication.interfaces import (
     KnownNode,
 )
 from drone_mesh.communication.messages import (
+    GatewayPlace,
     GoToLocationMessage,
     MovementNegotiationMessage,
 )
@@ -74,7 +75,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     ) -> bool:
         """Send a drone to a place (metres). True: there was a route and the next hop took it.
 
-        Raises GoalRefused for an invalid node id or an invalid place.
+        Raises GoalRefused for an invalid node id or place, and if its own drone cannot fly.
         """
         self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
@@ -83,6 +84,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if height != int(height):
             raise GoalRefused(f"height {height} m: an order gives whole metres")
         if node_id == self._node_id:
+            self._check_can_fly()
             self._take_order(node_id, Location(latitude, longitude, height))
             return True
         me = self._node_id
@@ -140,6 +142,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
 
     def _on_negotiation(self, bid: MovementNegotiationMessage) -> None:
         """A gateway does not fly for the mesh."""
+
+    def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
+        self._neighbours.is_at(node, location, self._deadlines.now_s)
 
     def _took_off(self) -> None:
         """A gateway stays connected wherever it is."""

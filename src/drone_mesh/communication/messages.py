@@ -14,7 +14,7 @@ import enum
 import math
 import struct
 from dataclasses import dataclass
-from typing import ClassVar, Union
+from typing import ClassVar, NamedTuple, Union
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.drone.interfaces import Location
@@ -256,6 +256,9 @@ _TypedMessage = Union[
 ]
 AnyMessage = Union[Message, _TypedMessage]
 
+_GATEWAY_PLACE = struct.Struct("<BBffh")  # age + 1 in seconds, id, latitude, longitude, height
+_GATEWAY_PLACE_AT = HEADER_BYTES + LocationMessage.BODY.size
+_OLDEST_AGE_S = 254
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
 _EXTENSION_AT = {  # places of the first byte behind a body that can be extended
@@ -267,6 +270,29 @@ _NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the star
     MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
     MessageType.MOVEMENT_NEGOTIATION: struct.Struct("<f"),
 }
+
+
+class GatewayPlace(NamedTuple):
+    """Where a gateway was: an extension behind the body of a LOCATION."""
+
+    gateway: int  # its id
+    place: Location
+    age_s: float  # how long ago it was there
+
+    def behind(self, payload: bytes) -> bytes:
+        """A LOCATION with this extension."""
+        age = 1 + max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
+        latitude, longitude, height = self.place
+        body = _GATEWAY_PLACE.pack(age, self.gateway, latitude, longitude, round(height))
+        return payload[:_GATEWAY_PLACE_AT] + body + payload[_GATEWAY_PLACE_AT + len(body) :]
+
+    @classmethod
+    def from_payload(cls, payload: bytes) -> GatewayPlace | None:
+        """The extension of a LOCATION; None if there is none, or no valid one."""
+        age, gateway, *place = _GATEWAY_PLACE.unpack_from(payload, _GATEWAY_PLACE_AT)
+        if age == 0 or not all(map(math.isfinite, place)):
+            return None
+        return cls(gateway, Location(*place), age - 1.0)
 
 
 def header(payload: bytes) -> tuple[int, int, int, int, int]:
@@ -359,7 +385,9 @@ def body(payload: bytes) -> bytes:
 
 
 def identity(payload: bytes) -> bytes:
-    """The bytes that stay the same while a packet other than a heartbeat is forwarded."""
+    """The bytes that stay the same while a packet is forwarded."""
+    if payload[_TYPE] == _HEARTBEAT:
+        return payload[:_FROM] + payload[_TYPE:_TO] + payload[_FORWARD:_HEARTBEAT_HOPS]
     return payload[:_FROM] + payload[_TYPE:_TO] + payload[_FORWARD:]
 
 

@@ -2,33 +2,72 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.interfaces import Location
+
+
+class HeardPlace(NamedTuple):
+    """Where a node said that it was."""
+
+    place: Location
+    heard_s: float
 
 
 class Neighbours:
-    """When each neighbour was last heard, and which gateway it uses.
+    """When each neighbour was last heard, which gateway it uses, and the places of nodes.
 
-    The only owner of this table: the other parts of a component report here what they learn. A
-    node that is no longer a neighbour keeps its gateway on record until it names another one.
+    The only owner of this table: the other parts of a component report here what they learn. What
+    a node said of its gateway and its place stays on record when it is no longer a neighbour.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, silence_s: float) -> None:
+        """`silence_s`: neighbours that are lost within this time count as lost together."""
+        self._silence_s = silence_s
         self._heard_s: dict[int, float] = {}
+        self._lost_s: dict[int, float] = {}
         self._gateways: dict[int, int] = {}
+        self._places: dict[int, HeardPlace] = {}
+        self.silent = False  # all neighbours, two or more, were lost together; none was heard since
 
     def heard(self, node: int, now_s: float) -> bool:
         """A packet arrived from `node`. True if it was not a neighbour before."""
         is_new = node not in self._heard_s
         self._heard_s[node] = now_s
+        if is_new:
+            self._lost_s.pop(node, None)
+            self.silent = False
         return is_new
 
-    def lost(self, node: int) -> bool:
+    def lost(self, node: int, now_s: float) -> bool:
         """`node` is out of reach. True if it was a neighbour."""
-        return self._heard_s.pop(node, None) is not None
+        if self._heard_s.pop(node, None) is None:
+            return False
+        self._lost_s[node] = now_s
+        if not self._heard_s:
+            together = [at_s for at_s in self._lost_s.values() if now_s - at_s <= self._silence_s]
+            self.silent = len(together) >= 2
+        return True
 
     def forget_all(self) -> None:
         """This node moved, so it may have other neighbours."""
         self._heard_s.clear()
+        self._lost_s.clear()
+
+    def ids(self) -> frozenset[int]:
+        """The present neighbours."""
+        return frozenset(self._heard_s)
+
+    def heard_s(self) -> dict[int, float]:
+        """A copy: for each neighbour the time of its last packet, in seconds."""
+        return dict(self._heard_s)
+
+    def last_heard_s(self, node: int, otherwise: float) -> float:
+        """When `node` was last heard; `otherwise` if it is not a neighbour."""
+        return self._heard_s.get(node, otherwise)
+
+    # What nodes say of themselves ------------------------------------------------------------
 
     def uses_gateway(self, node: int, gateway: int) -> None:
         """`node` is connected to `gateway`."""
@@ -38,10 +77,14 @@ class Neighbours:
         """The gateway that `node` named last, or NO_ROUTE."""
         return self._gateways.get(node, NO_ROUTE)
 
-    def heard_s(self) -> dict[int, float]:
-        """A copy: for each neighbour the time of its last packet, in seconds."""
-        return dict(self._heard_s)
+    def is_at(self, node: int, place: Location, now_s: float) -> None:
+        """`node`, a neighbour or not, says where it is."""
+        self._places[node] = HeardPlace(place, now_s)
 
-    def last_heard_s(self, node: int, otherwise: float) -> float:
-        """When `node` was last heard; `otherwise` if it is not a neighbour."""
-        return self._heard_s.get(node, otherwise)
+    def place_of(self, node: int) -> HeardPlace | None:
+        """Where `node` was when it last said so."""
+        return self._places.get(node)
+
+    def places(self) -> dict[int, HeardPlace]:
+        """All places that nodes named, by node. Do not change it."""
+        return self._places

@@ -7,20 +7,22 @@ from drone_mesh.drone.interfaces import Location
 
 
 class KnownPlaces:
-    """The places that a node has heard of and might fly to (docs/protocol.md,
-    "Places to step back to")."""
+    """The places that a node might fly to (docs/protocol.md, "Places to step back to")."""
 
     def __init__(self) -> None:
         self.gateway: Location | None = None  # of the preferred gateway
+        self.gateway_seen_s = 0.0  # when the gateway was there
         self.good: Location | None = None  # the last good known location
         self.good_id = NO_ROUTE  # the node whose place that is
 
-    def heard(self, node: int, place: Location, gateway: int, next_hop: int) -> None:
-        """`node` is at `place`; `next_hop` leads to the preferred gateway `gateway`."""
-        if node == gateway:
-            self.gateway = place
-        if node != gateway or node == next_hop:
-            self.good, self.good_id = place, node
+    def gateway_is_at(self, place: Location, seen_s: float) -> None:
+        """The preferred gateway was at `place` at `seen_s`; older news changes nothing."""
+        if self.gateway is None or seen_s >= self.gateway_seen_s:
+            self.gateway, self.gateway_seen_s = place, seen_s
+
+    def next_hop_is_at(self, node: int, place: Location) -> None:
+        """The next hop towards the gateway is `node`, at `place`."""
+        self.good, self.good_id = place, node
 
     def forget_gateway(self) -> None:
         """The node prefers another gateway."""

@@ -13,15 +13,17 @@ from drone_mesh.communication.connection import GatewayConnection
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
+    NO_ROUTE,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import MovementNegotiationMessage
+from drone_mesh.communication.messages import GatewayPlace, MovementNegotiationMessage
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
-from drone_mesh.communication.router_states import Link, Repair, RouterEvent, RouterStates
+from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.router_states import Link, Repair, RouterStates
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.interfaces import IDroneEngine, Location
 
 
 class MeshnetworkRouter(MeshnetworkComponent):
@@ -37,6 +39,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
+        repair: RepairOptions | None = None,
     ) -> None:
         """As MeshnetworkComponent."""
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
@@ -44,7 +47,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._connection = GatewayConnection(
             self._parts, self._states, self.search_other_nodes_in_range
         )
-        self._repair = ConnectionRepair(self._parts, self._states, self._connection)
+        self._repair = ConnectionRepair(
+            self._parts,
+            self._states,
+            self._connection,
+            self.search_other_nodes_in_range,
+            repair or RepairOptions(),
+        )
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
@@ -52,8 +61,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if now_s >= self._deadlines.get(Due.ANSWER):
             self._connection.answer_missed()
         super().tick(now_s)
-        if now_s >= self._deadlines.get(Due.DECIDE):
-            self._repair.on_decision_due()
+        if now_s >= self._deadlines.get(Due.REPAIR) and self._repair.on_due():
+            self._landed()
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered last time, or may still answer."""
@@ -66,6 +75,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def get_hops_from_gateway_away(self) -> int:
         """Hops to the preferred gateway; 255 while not known."""
         return self._connection.hops
+
+    def get_repair_status(self) -> str:
+        """What the repair does and why, in a few words; empty while nothing is to be repaired."""
+        return self._repair.status()
 
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`; the one to the preferred gateway wants an answer."""
@@ -81,6 +94,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
         super().send_heartbeats([other for other in others if other != gateway])
 
     def _check(self, due_s: float) -> None:
+        if not self._repair.may_connect(NO_ROUTE, know_gateway=False):
+            return
         link = self._states.link  # as it was before the routing sends its heartbeats
         was_connected = self._states.connected
         self._routing.maintain_routing()
@@ -93,6 +108,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair.on_antenna_off()
 
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
+        if not self._repair.may_connect(neighbour, know_gateway):
+            return
         if know_gateway and hops <= self._connection.hops:
             self._search_is_answered()
         if self._connection.on_present(neighbour, hops, know_gateway):
@@ -108,6 +125,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
             return  # its own heartbeat came back and proves nothing
         if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
             self._neighbours.uses_gateway(creator, preferred_gateway)
+        if not self._repair.may_connect(from_, know_gateway):
+            return
         if creator == preferred_gateway:
             if self._connection.on_gateway_heartbeat(creator, hops + 1):
                 self._repair.on_connected()
@@ -122,19 +141,42 @@ class MeshnetworkRouter(MeshnetworkComponent):
     ) -> None:
         """On a shared channel the answer of a gateway proves the connection of each relay, too."""
         proves = creator == preferred_gateway and self._antenna.medium.shared
+        proves = proves and self._repair.may_connect(NO_ROUTE, know_gateway)
         if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
             self._repair.on_connected()
 
     def _on_negotiation(self, bid: MovementNegotiationMessage) -> None:
-        self._repair.on_bid(bid.creator, bid.cost)
+        if bid.creator != self._node_id:
+            self._repair.on_bid(bid.creator, bid.cost, bid.from_)
+
+    def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
+        now_s = self._deadlines.now_s
+        self._neighbours.is_at(node, location, now_s)
+        connection = self._connection
+        if node == connection.gateway:
+            self.places.gateway_is_at(location, now_s)
+        elif gateway is not None and connection.may_use(gateway.gateway):
+            self.places.gateway_is_at(gateway.place, now_s - gateway.age_s)
+        if node == connection.next_hop():
+            self.places.next_hop_is_at(node, location)
+        self._repair.on_place(node, location)
+
+    def _on_neighbour_found(self) -> None:
+        self._repair.on_neighbour_found()
 
     def _on_neighbour_lost(self, node: int) -> None:
         self._connection.on_neighbour_lost()
         self._repair.on_neighbour_lost()
 
     def _took_off(self) -> None:
-        self._repair.on_take_off()
+        self._repair.on_ordered_flight()
+
+    def _watch_flight(self) -> None:
+        if not self._pilot.watch():
+            self._repair.on_flight_second()
+        elif self._repair.on_arrived():
+            self._landed()
 
     def _landed(self) -> None:
-        self._connection.end(RouterEvent.LANDED)
+        self._repair.on_landed()
         super()._landed()

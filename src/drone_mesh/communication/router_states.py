@@ -30,7 +30,9 @@ class Repair(enum.Enum):
 
     AT_REST = "at rest"  # nothing: it is connected, or no check has noticed the loss
     LOST = "lost"  # waits for a gateway until the time is up
-    NEGOTIATING = "negotiating"  # has bid, and waits for the bids of its neighbours
+    ASKING = "asking"  # wants to know where its neighbours are
+    NEGOTIATING = "negotiating"  # has bid, and waits for the bids of its group
+    WATCHING = "watching"  # waits for the winner to take off
     FLYING = "flying"
 
 
@@ -41,8 +43,11 @@ class RouterEvent(enum.Enum):
     ANSWER_MISSED = "the gateway did not answer in time, or the heartbeat could not be sent"
     GATEWAY_ANSWERED = "a heartbeat of the gateway arrives"
     LOSS_NOTICED = "a check finds the router unconnected"
+    ASKED_FOR_PLACES = "the time is up, or a neighbour bids: it asks where its neighbours are"
     BID = "the router bids for the flight"
-    BIDS_COUNTED = "the negotiation is decided"
+    BIDS_COUNTED = "another router has won"
+    WINNER_MISSED = "the winner did not take off"
+    ROUND_OVER = "the router has won, the winner took off, or no router bids"
     NO_NEIGHBOURS = "the time is up and there is no neighbour to negotiate with"
     TOOK_OFF = "a flight starts, or changes its goal"
     LANDED = "the flight is over"
@@ -55,7 +60,9 @@ _ALL_TO_SEARCHING = {state: Link.SEARCHING for state in Link}
 _ALL_BUT_FLYING_TO_REST = {
     Repair.AT_REST: Repair.AT_REST,
     Repair.LOST: Repair.AT_REST,
+    Repair.ASKING: Repair.AT_REST,
     Repair.NEGOTIATING: Repair.AT_REST,
+    Repair.WATCHING: Repair.AT_REST,
     Repair.FLYING: Repair.FLYING,
 }
 
@@ -84,8 +91,15 @@ LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[Link, Link]] = {
 REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[Repair, Repair]] = {
     RouterEvent.GATEWAY_ANSWERED: _ALL_BUT_FLYING_TO_REST,
     RouterEvent.LOSS_NOTICED: {Repair.AT_REST: Repair.LOST},
-    RouterEvent.BID: {Repair.LOST: Repair.NEGOTIATING},
-    RouterEvent.BIDS_COUNTED: {Repair.NEGOTIATING: Repair.AT_REST},
+    RouterEvent.ASKED_FOR_PLACES: {Repair.LOST: Repair.ASKING},
+    RouterEvent.BID: {Repair.ASKING: Repair.NEGOTIATING},
+    RouterEvent.BIDS_COUNTED: {Repair.NEGOTIATING: Repair.WATCHING},
+    RouterEvent.WINNER_MISSED: {Repair.WATCHING: Repair.NEGOTIATING},
+    RouterEvent.ROUND_OVER: {
+        Repair.ASKING: Repair.AT_REST,
+        Repair.NEGOTIATING: Repair.AT_REST,
+        Repair.WATCHING: Repair.AT_REST,
+    },
     RouterEvent.NO_NEIGHBOURS: {Repair.LOST: Repair.AT_REST},
     RouterEvent.TOOK_OFF: {state: Repair.FLYING for state in Repair},
     RouterEvent.LANDED: {Repair.FLYING: Repair.AT_REST},

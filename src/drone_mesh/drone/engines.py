@@ -30,8 +30,8 @@ class FlightOptions:
             raise ConfigurationError("--drone mavlink: needs --origin LAT,LON,ALT")
 
 
-def create_engine(node_id: int, location: Location, options: FlightOptions) -> IDroneEngine:
-    """The engine of one node; `location` is where one on the ground stands.
+def create_engine(node_id: int, location: Location | None, options: FlightOptions) -> IDroneEngine:
+    """The engine of one node; `location` is where one on the ground stands, if known.
 
     Raises ConfigurationError if the engine cannot be had.
     """

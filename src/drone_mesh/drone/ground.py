@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import logging
-
-from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
-
-_log = logging.getLogger(__name__)
+from drone_mesh.errors import GoalRefused, LocationUnknown
 
 
 class GroundEngine(IDroneEngine):
-    """Stays where it is, and logs the goals that it gets. Any thread may call it."""
+    """Stays where it is and refuses each goal. Any thread may call it."""
 
-    def __init__(self, node_id: int, location: Location) -> None:
+    def __init__(self, node_id: int, location: Location | None) -> None:
+        """`location` None: it is not known where the node stands."""
         self._node_id = node_id
         self._location = location
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Log the goal. Raises GoalRefused for a place that no drone may be sent to."""
-        check_goal(latitude, longitude, height)
-        here = self._location
-        _log.info(
-            "node %d stands on the ground at latitude %g m, longitude %g m, height %g m and does "
-            "not fly to its goal: latitude %g m, longitude %g m, height %g m",
-            self._node_id,
-            *here,
-            latitude,
-            longitude,
-            height,
-        )
+        """Raises GoalRefused: the node does not fly."""
+        raise GoalRefused(f"drone {self._node_id} cannot fly: {self.why_not_fly()}")
 
     def get_location(self) -> Location:
-        """Where it was put. Never raises."""
+        """Where it was put. Raises LocationUnknown if that is not known."""
+        if self._location is None:
+            raise LocationUnknown("no position was given; use --latitude and --longitude")
         return self._location
 
     def why_not_fly(self) -> str:

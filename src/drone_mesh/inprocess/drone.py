@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Callable, Optional, Protocol
 
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, Vector
@@ -25,8 +26,16 @@ PlanFlight = Callable[[Vector, Vector, float, float], Optional[FlightPath]]
 class InProcessDrone(IDroneEngine):
     """Where one drone is. It flies like the drones of the world."""
 
-    def __init__(self, clock: Time, start: Location, on_flight: Callable[[bool], None]) -> None:
-        """`on_flight` is told when a flight starts (True) and when it is over (False)."""
+    def __init__(
+        self,
+        clock: Time,
+        start: Location,
+        on_flight: Callable[[bool], None],
+        why_not_fly: str = "",
+    ) -> None:
+        """`on_flight` is called when a flight starts (True) and when it is over (False)."""
+        self.flown_m = 0.0  # straight distance from start to goal of all flights, in metres
+        self._why_not_fly = why_not_fly
         self._clock = clock
         self._place = start
         self._path: FlightPath | None = None
@@ -41,8 +50,10 @@ class InProcessDrone(IDroneEngine):
         return self._path
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there. Raises GoalRefused for a place out of bounds."""
+        """Fly there, if it can. Raises GoalRefused for a place out of bounds."""
         check_goal(latitude, longitude, height)
+        if self._why_not_fly:
+            return
         here = self.get_location()
         goal = Location(latitude, longitude, height).to_vector()
         if goal == (self._path.goal if self._path else here.to_vector()):
@@ -52,8 +63,14 @@ class InProcessDrone(IDroneEngine):
             return
         if self._path is None:
             self._on_flight(True)
+        else:
+            self.flown_m += math.dist(self._path.start, here.to_vector())
         self._path = plan
         self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
+
+    def why_not_fly(self) -> str:
+        """As it was made."""
+        return self._why_not_fly
 
     def get_location(self) -> Location:
         """Where it is now. Never raises."""
@@ -64,5 +81,6 @@ class InProcessDrone(IDroneEngine):
     def _arrive(self, path: FlightPath) -> None:
         if path is self._path:  # not replanned on the way
             self._place = Location.from_vector(path.goal)
+            self.flown_m += math.dist(path.start, path.goal)
             self._path = None
             self._on_flight(False)

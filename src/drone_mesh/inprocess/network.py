@@ -17,6 +17,7 @@ from drone_mesh.communication.interfaces import (
     IInternetConnection,
 )
 from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
@@ -58,10 +59,13 @@ class Node:
         node_id: int,
         start: Location,
         rng: random.Random,
+        why_not_fly: str = "",
     ) -> None:
         """`rng` is the antenna's."""
         self._clock = clock
-        self.drone = InProcessDrone(clock, start, functools.partial(air.flight, node_id))
+        self.drone = InProcessDrone(
+            clock, start, functools.partial(air.flight, node_id), why_not_fly
+        )
         self.antenna: InProcessAntenna | SharedAntenna
         if isinstance(air, SharedAir):
             self.antenna = SharedAntenna(air, node_id, self.drone, self.submit, rng)
@@ -126,6 +130,8 @@ class Network:
         radio: str = "disc",
         rate: str = "250k",
         links: LinkModel | None = None,
+        repair: str = DEFAULT_REPAIR,
+        repair_options: RepairOptions | None = None,
     ) -> None:
         """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique.
@@ -138,6 +144,8 @@ class Network:
         self._rng = random.Random(seed)
         self._timing = timing or MeshTiming()
         self._routing = routing
+        self._repair = repair
+        self._repair_options = repair_options
         self.clock = VirtualClock()
         self.air: InProcessAir | SharedAir
         if radio == "shared":
@@ -165,9 +173,14 @@ class Network:
         """A gateway at (x, y) metres on the ground; it starts at `start_s`."""
         self._add(node_id, x, y, start_s, gateway=True)
 
-    def add_router(self, node_id: int, x: float, y: float, start_s: float = 0.0) -> None:
-        """A router at (x, y) metres on the ground; it starts at `start_s`."""
-        self._add(node_id, x, y, start_s, gateway=False)
+    def add_router(
+        self, node_id: int, x: float, y: float, start_s: float = 0.0, why_not_fly: str = ""
+    ) -> None:
+        """A router at (x, y) metres on the ground; it starts at `start_s`.
+
+        It flies, unless there is a reason `why_not_fly`.
+        """
+        self._add(node_id, x, y, start_s, gateway=False, why_not_fly=why_not_fly)
 
     def add_fleet(
         self,
@@ -187,11 +200,19 @@ class Network:
                 gateway=place.role is Role.GATEWAY,
             )
 
-    def _add(self, node_id: int, x: float, y: float, start_s: float, gateway: bool) -> None:
+    def _add(
+        self,
+        node_id: int,
+        x: float,
+        y: float,
+        start_s: float,
+        gateway: bool,
+        why_not_fly: str = "",
+    ) -> None:
         if node_id in self.nodes:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
-        node = Node(self.clock, self.air, node_id, Location(y, x, 0.0), radio_rng)
+        node = Node(self.clock, self.air, node_id, Location(y, x, 0.0), radio_rng, why_not_fly)
         node.component = assemble_component(
             node_id,
             node.antenna,
@@ -201,6 +222,7 @@ class Network:
             routing=self._technique(node_id),
             timing=self._timing,
             observer=self._observe,
+            repair=self._repair_options,
         )
         self.nodes[node_id] = node
         self.clock.call_at(start_s, Node.start, node)

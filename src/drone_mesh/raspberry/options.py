@@ -58,7 +58,7 @@ class Options:
     radio: RadioSettings
     timing: MeshTiming
     routing: str
-    location: Location
+    location: Location | None  # None: not known
     flight: FlightOptions
     fleet: FleetOptions  # the drones of emulated nodes
     emulated: int  # number of emulated nodes that replace the real one; 0: none
@@ -196,14 +196,12 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(default: %(default)s)",
     )
     place = parser.add_argument_group(
-        "place", "Position of the node, in metres, in the common frame of the drones."
+        "place",
+        "Position of a node on the ground, in metres, in the common frame of the drones. Without "
+        "it the node does not claim to be anywhere.",
     )
-    place.add_argument(
-        "--latitude", type=float, default=0.0, help="y in metres (default: %(default)g)"
-    )
-    place.add_argument(
-        "--longitude", type=float, default=0.0, help="x in metres (default: %(default)g)"
-    )
+    place.add_argument("--latitude", type=float, help="y in metres")
+    place.add_argument("--longitude", type=float, help="x in metres")
     place.add_argument(
         "--height", type=float, default=0.0, help="z in metres (default: %(default)g)"
     )
@@ -238,9 +236,14 @@ def _options(
 ) -> Options:
     if parsed.trace is not None and not parsed.emulated:
         parser.error("--trace needs --emulated: a real radio cannot record the frames of others")
-    location = Location(parsed.latitude, parsed.longitude, parsed.height)
+    if (parsed.latitude is None) != (parsed.longitude is None):
+        parser.error("--latitude and --longitude: give both, or neither")
+    location = None
+    if parsed.latitude is not None:
+        location = Location(parsed.latitude, parsed.longitude, parsed.height)
     try:
-        check_goal(*location)
+        if location is not None:
+            check_goal(*location)
         create_routing_technique(parsed.routing)
         return Options(
             node_id=parsed.id or 0,

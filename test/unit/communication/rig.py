@@ -74,6 +74,10 @@ class RigEngine(IDroneEngine):
     def __init__(self):
         self.place = Location(0.0, 0.0, 0.0)
         self.goals = []
+        self.grounded = ""  # why it does not fly
+
+    def why_not_fly(self):
+        return self.grounded
 
     def set_goal(self, latitude, longitude, height):
         self.goals.append(Location(latitude, longitude, height))

@@ -357,6 +357,14 @@ def test_a_heartbeat_is_bounded_by_its_hops_and_not_by_the_way_it_came():
     assert rig.sent() == [packet("05 01 04 03 09 00 ff 02")] * 2
 
 
+def test_a_heartbeat_that_comes_round_with_more_hops_is_dropped_and_its_route_forgotten():
+    rig = Rig()
+    rig.hear("06 06 00 01 01", "09 03 00 01 01")
+    rig.hear("05 02 04 01 09 00 ff 01", "05 04 04 01 09 00 ff 04")
+    assert rig.sent(4) == [packet("05 01 04 03 09 00 ff 02")]
+    assert rig.routing.get_direction_to_node(9) == 255
+
+
 # Anything at all -----------------------------------------------------------------------------
 
 

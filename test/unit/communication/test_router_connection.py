@@ -489,6 +489,8 @@ def test_switching_off_while_waiting_for_an_answer_disconnects_at_once():
 
 def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
     rig = Rig()
+    rig.connect_through(2)
+    rig.mesh.send_heartbeat(0)  # never answered
     rig.hear("02 02 01 01 01 00 00 80 3f")
     rig.antenna.dead = {2}
     rig.wait_until(16.0)  # the timer runs since 5 s

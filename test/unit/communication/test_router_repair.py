@@ -7,22 +7,31 @@ import struct
 import pytest
 from rig import Rig, packet
 
+from drone_mesh.communication.election import IN_VAIN, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.spots import own_spot
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import Location
 
-HEARTBEAT, PRESENT, MISSING, BID = 4, 3, 5, 7
+LOCATION, REQUEST, PRESENT, HEARTBEAT, MISSING, BID = 1, 2, 3, 4, 5, 7
 GATEWAY_AT_0_4 = "00 00 01 01 01 00 00 80 40"  # latitude 4
-GATEWAY_PLACE = Location(4.0, 0.0, 0.0)
+BESIDE_GATEWAY = Location(pytest.approx(4.55), pytest.approx(0.0), 0.0)  # coming from the north
 NEIGHBOUR_2_AT_0_8 = "02 02 01 01 01 00 00 00 41"  # latitude 8
 NEIGHBOUR_PLACE = Location(8.0, 0.0, 0.0)
 
 
 EMERGENCY_S = 45.0
+BIDS_S = EMERGENCY_S + 1.1  # the neighbours had their time to say where they are
+TO_DECISION_S = 0.5  # from then on; bids of nodes farther away may still come
 
 
 def bid(neighbour: int, score: float) -> str:
     return bytes((neighbour, neighbour, BID, 1, 1)).hex() + struct.pack("<f", score).hex()
+
+
+def place(node: int, latitude: float) -> str:
+    """`node` says where it is."""
+    return bytes((node, node, 1, 1, 1)).hex() + struct.pack("<f", latitude).hex()
 
 
 def own_bid(to: int, score: float) -> bytes:
@@ -163,7 +172,7 @@ def test_after_the_landing_the_time_without_a_gateway_counts_from_the_next_check
     rig.wait_until(84.9)
     assert len(rig.engine.goals) == 1
     rig.wait_until(85.1)
-    assert rig.engine.goals[1:] == [GATEWAY_PLACE]
+    assert rig.engine.goals[1:] == [BESIDE_GATEWAY]
 
 
 def test_an_order_ends_the_time_without_a_gateway():
@@ -323,7 +332,7 @@ def test_a_router_that_knows_no_other_place_flies_to_the_gateway():
     assert rig.mesh.get_last_good_known_location_id() == 255
     rig.antenna.dead = {2}
     rig.wait_until(60.0)
-    assert rig.engine.goals[:1] == [GATEWAY_PLACE]
+    assert rig.engine.goals[:1] == [BESIDE_GATEWAY]
 
 
 def test_after_one_step_back_the_next_one_is_to_the_gateway():
@@ -331,7 +340,7 @@ def test_after_one_step_back_the_next_one_is_to_the_gateway():
     rig.wait_until(46.0)
     fly(rig, NEIGHBOUR_PLACE)
     rig.wait_until(120.0)
-    assert rig.engine.goals[:2] == [NEIGHBOUR_PLACE, GATEWAY_PLACE]
+    assert rig.engine.goals[:2] == [NEIGHBOUR_PLACE, BESIDE_GATEWAY]
 
 
 def test_a_router_that_knows_no_place_at_all_stays():
@@ -359,7 +368,7 @@ def test_a_next_hop_that_says_nonsense_does_not_hide_the_place_of_the_gateway():
     rig.hear("02 02 01 01 01 00 60 9c 45")
     rig.antenna.dead = {2}
     rig.wait_until(60.0)
-    assert rig.engine.goals[:1] == [GATEWAY_PLACE]
+    assert rig.engine.goals[:1] == [BESIDE_GATEWAY]
 
 
 # Negotiation ---------------------------------------------------------------------------------
@@ -370,7 +379,7 @@ def test_with_neighbours_it_bids_its_distance_to_the_gateway_in_three_dimensions
     rig.engine.place = Location(12.0, 8.0, 1.0)  # 8, 8 and 1 m away: the root of 129
     rig.wait_until(EMERGENCY_S - 0.1)
     assert rig.sent(BID) == []
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     assert rig.sent(BID) == [own_bid(3, 129**0.5), own_bid(4, 129**0.5)]
     assert rig.engine.goals == []
 
@@ -386,10 +395,11 @@ def test_with_neighbours_it_bids_its_distance_to_the_gateway_in_three_dimensions
 )
 def test_the_highest_score_flies(bids, flies):
     rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S + 0.1)  # its own score is 8
+    rig.wait_until(BIDS_S)  # its own score is 8
     for neighbour, score in bids:
         assert rig.engine.goals == []
         rig.hear(bid(neighbour, score))
+    rig.wait(TO_DECISION_S)
     assert rig.engine.goals == ([NEIGHBOUR_PLACE] if flies else [])
     assert rig.kinds().count("NEGOTIATION_ENDED") == 1
 
@@ -402,6 +412,7 @@ def test_of_equal_scores_the_lowest_id_flies():
     rig.hear("03 03 00 05 05")
     rig.wait_until(35.1)
     rig.hear("03 03 07 05 05 00 00 00 41")
+    rig.wait(1.0 + TO_DECISION_S)
     assert rig.engine.goals == []
     assert rig.events[-1].peer == 3
 
@@ -410,17 +421,19 @@ def test_scores_are_compared_as_they_are_on_the_air():
     """Two drones at one place: rounded to a float32, each bid looks higher than one's own."""
     rig = group_rig(3)
     rig.engine.place = Location(4.0, 10.1, 0.0)  # 10.1 is 10.10000038 as a float32
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear(bid(3, 10.1))
+    rig.wait(TO_DECISION_S)
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_no_router_flies_without_a_bid():
     rig = Rig()
     rig.know_neighbour(3)
-    rig.wait_until(35.1)
+    rig.wait_until(36.1)
     assert rig.sent(BID) == [own_bid(3, -1.0)]
     rig.hear(bid(3, -1.0))
+    rig.wait(TO_DECISION_S)
     assert rig.engine.goals == []
     assert rig.events[-1].peer == NO_ROUTE
 
@@ -428,7 +441,7 @@ def test_no_router_flies_without_a_bid():
 def test_a_router_that_would_take_the_place_of_a_neighbour_does_not_bid():
     rig = group_rig(2, 3)
     rig.antenna.dead = set()  # it takes the heartbeats for the gateway, and no answer comes
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     assert own_bid(3, -1.0) in rig.sent(BID)
 
 
@@ -437,7 +450,7 @@ def test_a_router_that_knows_no_gateway_location_does_not_bid():
     rig.hear(NEIGHBOUR_2_AT_0_8)
     rig.antenna.dead = {2}
     rig.know_neighbour(3)
-    rig.wait_until(35.1)
+    rig.wait_until(36.1)
     assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
@@ -449,16 +462,17 @@ def test_a_router_that_knows_only_the_place_of_the_gateway_bids_for_flying_there
     rig.hear("00 02 01 01 01 00 00 80 40")
     rig.antenna.dead = {2}
     rig.know_neighbour(3)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     assert rig.sent(BID) == [own_bid(3, 8.0)]
     rig.hear(bid(3, 1.0))
-    assert rig.engine.goals == [GATEWAY_PLACE]
+    rig.wait(TO_DECISION_S)
+    assert rig.engine.goals == [BESIDE_GATEWAY]
 
 
 def test_a_router_that_does_not_know_its_location_does_not_bid():
     rig = group_rig(3)
     rig.engine.place = None
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
@@ -471,29 +485,29 @@ def test_a_gateway_that_says_it_is_beyond_all_bounds_does_not_break_the_bids():
 
 def test_a_neighbour_that_does_not_bid_is_waited_for_no_longer_than_a_period():
     rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear(bid(3, 1.0))
-    rig.wait_until(EMERGENCY_S + 9.9)
+    rig.wait_until(BIDS_S + 9.8)
     assert rig.engine.goals == []
-    rig.wait_until(EMERGENCY_S + 10.1)
+    rig.wait_until(BIDS_S + 10.0)
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
     assert rig.kinds().count("EMERGENCY") == 1
 
 
 def test_a_neighbour_that_dies_in_the_middle_is_not_waited_for():
     rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear(bid(3, 1.0))
     rig.antenna.dead = {2, 4}
     rig.mesh.send_heartbeat(4)
-    rig.wait(0.1)
+    rig.wait(TO_DECISION_S)
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_a_neighbour_that_dies_while_the_bid_is_sent_is_not_waited_for():
     rig = group_rig(3)
     rig.antenna.gets_lost = lambda payload: payload[2] == BID
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S + TO_DECISION_S)
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
@@ -501,9 +515,10 @@ def test_bids_that_came_before_the_emergency_count():
     rig = group_rig(3, 4)
     rig.wait_until(14.0)  # its timer starts at 15 s
     rig.hear(bid(3, 9.0))
-    assert rig.sent(BID) == []
+    assert rig.sent(BID) == [packet("03 01 07 04 04 00 00 10 41")]  # passed on, not answered
     rig.wait_until(16.0)
     rig.hear(bid(4, 1.0))
+    rig.wait(1.0 + TO_DECISION_S)
     assert rig.events[-1].kind.name == "NEGOTIATION_ENDED"
     assert rig.events[-1].peer == 3
 
@@ -512,8 +527,11 @@ def test_a_bid_makes_an_unconnected_node_with_a_running_timer_join_at_once():
     rig = group_rig(3, 4)
     rig.wait_until(20.0)
     rig.hear(bid(3, 1.0))
-    assert rig.sent(BID) == [own_bid(3, 8.0), own_bid(4, 8.0)]
+    assert rig.broadcasts()[-1:] == [packet("01 01 02 fe fe")]  # asks where they are
+    rig.hear(place(3, 30.0), place(4, 31.0))
+    assert rig.sent(BID)[-2:] == [own_bid(3, 8.0), own_bid(4, 8.0)]
     rig.hear(bid(4, 2.0))
+    rig.wait(1.0 + TO_DECISION_S)
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
@@ -536,7 +554,7 @@ def test_a_connected_node_does_not_negotiate():
 
 def test_switching_the_antenna_off_ends_a_negotiation():
     rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.antenna.powered = False
     rig.mesh.on_antenna_power(False, rig.now_s)
     rig.wait(12.0)
@@ -546,7 +564,7 @@ def test_switching_the_antenna_off_ends_a_negotiation():
 
 def test_becoming_connected_ends_a_negotiation():
     rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear("00 03 04 01 01 01 00 03", bid(3, 1.0), bid(4, 1.0))
     rig.wait(12.0)
     assert rig.engine.goals == []
@@ -558,26 +576,32 @@ def test_old_bids_do_not_count():
     rig = group_rig(3)
     rig.mesh.on_msg(packet(bid(4, 99.0)), rig.now_s)
     rig.antenna.dead = {2, 4}
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear(bid(3, 1.0))
+    rig.wait(TO_DECISION_S)
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
 
 def test_the_list_is_cleared_after_a_negotiation():
     rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear(bid(3, 99.0), bid(4, 1.0))
+    rig.wait(TO_DECISION_S)
     assert rig.kinds().count("NEGOTIATION_ENDED") == 1
-    rig.wait_until(EMERGENCY_S + 10.05)  # the timer runs again
+    rig.hear(bid(3, TOOK_OFF))
+    rig.wait_until(EMERGENCY_S + 30.5)  # the timer runs again
     rig.hear(bid(4, 1.0))
+    rig.wait(2.0)
     assert rig.kinds().count("NEGOTIATION_STARTED") == 2
     assert rig.kinds().count("NEGOTIATION_ENDED") == 1  # what 3 bids now is not known
 
 
 def test_a_late_bid_does_not_start_the_same_negotiation_again():
     rig = group_rig(3, 4)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear(bid(3, 99.0), bid(4, 1.0))
+    rig.wait(TO_DECISION_S)
+    rig.hear(bid(3, TOOK_OFF))
     rig.forget()
     rig.hear(bid(4, 2.0))
     assert rig.sent(BID) == []
@@ -586,8 +610,9 @@ def test_a_late_bid_does_not_start_the_same_negotiation_again():
 
 def test_an_emergency_flight_forgets_the_routes_when_it_starts():
     rig = group_rig(3)
-    rig.wait_until(EMERGENCY_S + 0.1)
+    rig.wait_until(BIDS_S)
     rig.hear(bid(3, 1.0))
+    rig.wait(TO_DECISION_S)
     assert rig.routing.empty()
     assert rig.mesh.get_neighbours() == {}
     assert "FLIGHT_DECIDED" in rig.kinds()
@@ -603,3 +628,283 @@ def test_a_node_in_flight_does_not_negotiate():
         rig.hear(bid(3, 9.0))
     assert rig.sent(BID) == []
     assert len(rig.engine.goals) == 1
+
+
+# Occupied places -----------------------------------------------------------------------------
+
+
+def test_a_place_on_which_a_neighbour_stands_is_occupied():
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S)
+    rig.hear(place(3, 8.3), place(4, 30.0))  # 2's place is at 8
+    assert rig.sent(BID) == [own_bid(3, -1.0), own_bid(4, -1.0)]
+    assert rig.mesh.get_repair_status().endswith("the place of 2 is occupied by 3")
+
+
+def test_a_place_from_which_all_neighbours_keep_clear_is_free():
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S)
+    rig.hear(place(3, 8.6), place(4, 30.0))
+    assert rig.sent(BID) == [own_bid(3, 8.0), own_bid(4, 8.0)]
+
+
+def test_a_place_is_occupied_while_its_owner_answers_over_whatever_route():
+    rig = group_rig(3)
+    rig.wait_until(EMERGENCY_S - 1.0)
+    rig.routing.other_can_communicate_with_node(3, 2)
+    rig.wait_until(EMERGENCY_S)
+    assert packet("01 01 02 03 02") in rig.sent(REQUEST)  # asks the owner itself
+    rig.hear(place(3, 30.0), "02 03 01 01 01 00 00 f0 41")  # 2 lives, somewhere else
+    assert rig.sent(BID) == [own_bid(3, -1.0)]
+
+
+def test_after_two_rounds_without_a_flier_the_place_of_the_gateway_counts():
+    rig = group_rig(2, 3)
+    rig.antenna.dead = set()
+    rig.wait_until(BIDS_S)
+    for round_s in (0.0, 40.0):
+        rig.wait_until(BIDS_S + round_s)
+        assert own_bid(3, -1.0) in rig.sent(BID)
+        rig.hear(bid(2, -1.0), bid(3, -1.0))
+        rig.wait(TO_DECISION_S)
+    rig.wait_until(BIDS_S + 80.0)
+    assert own_bid(3, 1 / 9) in rig.sent(BID)  # the nearest flies: 1 / (1 + 8 m)
+    rig.hear(bid(2, -1.0), bid(3, -1.0))
+    rig.wait(TO_DECISION_S)
+    assert rig.engine.goals == [BESIDE_GATEWAY]
+
+
+# Which drone flies ---------------------------------------------------------------------------
+
+
+def test_a_drone_that_cannot_fly_does_not_bid_and_says_why():
+    rig = group_rig(3)
+    rig.engine.grounded = "the battery is empty"
+    rig.wait_until(BIDS_S)
+    assert rig.sent(BID) == [own_bid(3, -1.0)]
+    assert "cannot fly: the battery is empty" in rig.mesh.get_repair_status()
+
+
+def test_a_lone_drone_that_cannot_fly_stays():
+    rig = lone_rig()
+    rig.engine.grounded = "the battery is empty"
+    rig.wait_until(200.0)
+    assert rig.engine.goals == []
+    assert "FLIGHT_DECIDED" not in rig.kinds()
+
+
+def test_an_order_to_a_drone_that_cannot_fly_is_refused_and_counted():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.engine.grounded = "the battery is empty"
+    rig.hear("00 02 06 01 01 00 00 80 3f")
+    assert rig.engine.goals == []
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.mesh.complaints.counts["order refused"] == 1
+
+
+def test_a_better_bid_is_passed_on_to_the_other_neighbours_and_a_worse_one_is_not():
+    rig = group_rig(3, 4, 5)
+    rig.wait_until(BIDS_S)
+    rig.forget()
+    rig.hear("09 03 07 01 01 00 00 10 41")  # 9 bids 9, and 3 passes it on
+    assert rig.sent(BID) == [
+        packet("09 01 07 04 04 00 00 10 41"),
+        packet("09 01 07 05 05 00 00 10 41"),
+    ]
+    rig.hear("08 04 07 01 01 00 00 80 40")
+    assert rig.sent(BID) == []
+
+
+def test_the_winner_announces_its_flight():
+    rig = group_rig(3)
+    rig.wait_until(BIDS_S)
+    rig.forget()
+    rig.hear(bid(3, 1.0))
+    rig.wait(TO_DECISION_S)
+    assert rig.sent(BID) == [own_bid(3, TOOK_OFF)]
+
+
+def test_a_winner_that_takes_off_is_waited_for():
+    rig = group_rig(3, 4)
+    rig.wait_until(BIDS_S)
+    rig.hear(bid(3, 99.0), bid(4, 1.0))
+    rig.wait(TO_DECISION_S)
+    rig.hear(bid(3, TOOK_OFF))
+    rig.wait(20.0)
+    assert rig.engine.goals == []
+
+
+def test_a_winner_that_does_not_take_off_within_5_s_is_passed_over():
+    """It died after its bid."""
+    rig = group_rig(3, 4)
+    rig.wait_until(BIDS_S)
+    rig.hear(bid(3, 99.0), bid(4, 1.0))
+    rig.wait(TO_DECISION_S + 4.8)
+    rig.forget()
+    rig.wait(0.2)
+    assert rig.sent(BID) == [own_bid(3, 8.0), own_bid(4, 8.0)]
+    rig.hear(bid(4, 1.0))
+    rig.wait(TO_DECISION_S)
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
+
+
+def test_what_another_drone_found_in_vain_is_no_second_choice():
+    rig = group_rig(2, 3)
+    rig.antenna.dead = set()
+    for round_s in (0.0, 40.0, 80.0):
+        rig.wait_until(BIDS_S + round_s)
+        rig.hear(bid(3, IN_VAIN), bid(2, -1.0))
+        rig.wait(TO_DECISION_S)
+    assert rig.engine.goals == []
+    assert "another drone flew to the gateway in vain" in rig.mesh.get_repair_status()
+
+
+def test_after_a_flight_of_another_drone_to_the_gateway_there_is_none_for_a_minute():
+    rig = group_rig(3)
+    rig.hear("02 02 01 01 01 00 60 9c 45")  # the place of 2 is nowhere to fly
+    rig.antenna.dead = {2}
+    rig.wait_until(EMERGENCY_S - 1.0)
+    rig.hear(bid(3, TOOK_OFF_HOME))
+    rig.wait_until(EMERGENCY_S + 50.0)
+    assert rig.engine.goals == []
+    rig.wait_until(EMERGENCY_S + 120.0)
+    assert len(rig.engine.goals) == 1
+
+
+# Silence -------------------------------------------------------------------------------------
+
+
+def silent_rig():
+    """As lone_rig, with neighbours 3 and 4, which die together with 2: its medium may be down."""
+    rig = group_rig(3, 4)
+    rig.antenna.dead = {2, 3, 4}
+    return rig
+
+
+def test_a_drone_whose_neighbours_fell_silent_together_waits_five_times_as_long():
+    rig = silent_rig()
+    rig.wait_until(155.0)
+    assert rig.engine.goals == []
+    rig.wait_until(176.0)
+    assert len(rig.engine.goals) == 1
+
+
+def test_it_flies_to_a_spot_near_the_place_that_belongs_to_it_alone():
+    rig = silent_rig()
+    rig.wait_until(176.0)
+    (goal,) = rig.engine.goals
+    assert 0.5 <= goal.distance_m(NEIGHBOUR_PLACE) < 7.0
+    assert goal == own_spot(NEIGHBOUR_PLACE, 1, 0.5, [NEIGHBOUR_PLACE, Location(4.0, 0.0, 0.0)])
+
+
+def test_a_node_that_is_heard_again_gives_the_mesh_time_to_recover():
+    rig = silent_rig()
+    rig.wait_until(150.0)
+    rig.antenna.dead = {2, 4}
+    rig.know_neighbour(3)
+    rig.wait_until(174.0)
+    assert rig.engine.goals == []
+    assert rig.sent(BID) == []
+
+
+# In flight -----------------------------------------------------------------------------------
+
+
+def flying_rig():
+    """As lone_rig, in flight to the place of 2."""
+    rig = lone_rig()
+    rig.wait_until(46.0)
+    assert rig.engine.goals == [NEIGHBOUR_PLACE]
+    rig.forget()
+    return rig
+
+
+def test_in_flight_it_asks_all_nodes_in_range_once_a_second_where_they_are():
+    rig = flying_rig()
+    fly(rig, Location(11.0, 0.0, 2.0))
+    fly(rig, Location(10.0, 0.0, 2.0))
+    assert rig.broadcasts() == [packet("01 01 02 fe fe")] * 2
+
+
+def test_in_flight_it_does_not_take_up_a_connection():
+    rig = flying_rig()
+    fly(rig, Location(10.0, 0.0, 2.0))
+    rig.hear("00 09 04 01 01 01 00 01")
+    assert not rig.mesh.get_connected_to_gateway()
+
+
+def test_it_lands_beside_a_drone_that_stands_on_its_goal():
+    rig = flying_rig()
+    fly(rig, Location(10.0, 0.0, 2.0))
+    rig.hear(place(9, 8.1))
+    assert len(rig.engine.goals) == 2
+    assert rig.engine.goals[-1].distance_m(Location(8.1, 0.0, 0.0)) >= 0.5
+    assert rig.engine.goals[-1].distance_m(NEIGHBOUR_PLACE) < 1.2
+
+
+def test_if_it_hears_that_its_goal_is_taken_it_stops_where_it_is_connected():
+    rig = flying_rig()
+    fly(rig, Location(10.0, 0.0, 2.0))
+    rig.hear("02 02 01 01 01 00 00 00 41")  # 2 lives there after all
+    fly(rig, Location(9.5, 0.0, 2.0))
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.engine.goals[-1] == Location(9.5, 0.0, 0.0)
+
+
+def test_it_stops_where_it_is_connected_if_a_gateway_reached_its_group():
+    rig = group_rig(3)
+    rig.wait_until(BIDS_S)
+    rig.hear(bid(3, 1.0))
+    rig.wait(TO_DECISION_S)
+    fly(rig, Location(10.0, 0.0, 2.0))
+    rig.hear("00 03 04 01 01 01 00 05")
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.engine.goals == [NEIGHBOUR_PLACE, Location(10.0, 0.0, 0.0)]
+
+
+def test_on_the_ground_it_asks_again_and_moves_aside_for_a_drone_that_it_did_not_hear_before():
+    rig = flying_rig()
+    fly(rig, NEIGHBOUR_PLACE)
+    assert "LANDED" not in rig.kinds()
+    rig.hear(place(9, 8.2))
+    assert rig.engine.goals[-1].distance_m(Location(8.2, 0.0, 0.0)) >= 0.5
+    fly(rig, rig.engine.goals[-1])
+    rig.wait(1.0)
+    assert rig.kinds().count("LANDED") == 1
+
+
+# The place of the gateway --------------------------------------------------------------------
+
+
+def test_a_next_hop_passes_on_where_the_gateway_is():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 80 40")
+    assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
+    assert rig.mesh.places.gateway_seen_s == -10.0  # ten seconds ago
+    rig.hear("09 09 02 01 01")
+    (answer,) = rig.sent(LOCATION)
+    assert answer[19:] == bytes.fromhex("0b 00 00 00 80 40").ljust(13, b"\0")
+
+
+def test_news_of_the_gateway_that_are_older_change_nothing():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 3f")
+    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 80 40")
+    assert rig.mesh.places.gateway == Location(1.0, 0.0, 0.0)
+
+
+def test_the_gateway_itself_is_asked_before_its_place_is_three_periods_old():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 3f")
+    asked_s = []
+    for check_s in (5.0, 15.0, 25.0):
+        rig.wait_until(check_s)
+        rig.hear("00 02 04 01 01 01 00 01")
+        if packet("01 01 02 02 00") in rig.sent(REQUEST):
+            asked_s.append(check_s)
+    assert asked_s == [25.0]

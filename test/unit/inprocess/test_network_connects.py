@@ -233,10 +233,10 @@ RECORDED = [
     "21.640 3 DISCONNECTED 0",
     "61.640 3 EMERGENCY 255",
     "61.640 3 FLIGHT_DECIDED 2",
-    "64.640 3 LANDED 255",
-    "64.652 3 CONNECTED 0 2 hops",
+    "65.240 3 LANDED 255",
+    "65.252 3 CONNECTED 0 2 hops",
 ]
-RECORDED_PACKETS = 161
+RECORDED_PACKETS = 167
 
 
 def test_a_recorded_run_of_layout_201_without_node_2():

@@ -1,0 +1,166 @@
+"""RepairFlight: a flight for a repair, which ends beside other drones and not on them."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
+from drone_mesh.communication.messages import Message, MessageType
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.spots import free_spot
+from drone_mesh.communication.timing import LANDED_WITHIN_M
+from drone_mesh.drone.interfaces import Location
+
+ASK_AGAIN_S = 0.3  # our choice: an answer takes some milliseconds
+ASKS_ON_GROUND = 2  # our choice: a lossy medium loses a question now and then
+LEG = 2.0 / 3.0  # of the range, our choice: at half that height it hears what is below
+FRESH_S = 5.0  # our choice: a drone that said where it is may have moved after this time
+
+
+class RepairFlight:
+    """One flight of one drone, from the take-off until it stands clear of the others.
+
+    Once a second it asks all nodes in range for their places. If one stands on its goal it goes to
+    a spot beside that, and no farther than it needs to be connected. On the ground it asks again.
+    """
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        introduce: Callable[[], None],
+        owner: int,
+        place: Location,
+        goal: Location,
+        options: RepairOptions,
+    ) -> None:
+        """To `goal`, at or near the `place` of node `owner`. `introduce` broadcasts a PRESENT."""
+        self.goal = goal
+        self._owner, self._place = owner, place
+        self._at_place = goal == place
+        self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
+        self.stops_when_connected = False
+        self.asks_left = 0  # on the ground
+        self._wanted = place
+        self._origin = parts.pilot.location() or goal
+        self._parts = parts
+        self._introduce = introduce
+        self._clearance_m = options.clearance_m
+        self._leg_m = LEG * options.range_m
+        self._diversions = 0
+        self._leg_from: Location | None = None
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether it has landed, and looks whether it stands clear."""
+        return self.asks_left > 0
+
+    def start(self) -> None:
+        """Take off."""
+        self._fly_on()
+
+    def each_second(self) -> None:
+        """It is still in flight."""
+        self._ask_all_for_places()
+        if self.stops_when_connected:
+            self._introduce()
+
+    def stop_when_connected(self) -> None:
+        """Going on is pointless: be connected, and stop there."""
+        self.stops_when_connected = True
+
+    def stop_here(self) -> None:
+        """Land at the nearest free spot."""
+        here = self._parts.pilot.location()
+        if here is not None and not self.on_ground:
+            below = Location(here.latitude, here.longitude, self.goal.height)
+            if below.distance_m(self.goal) >= self._clearance_m:
+                self._wanted = below
+                self._go_to(below if self._is_free(below) else self._spot())
+
+    def on_place(self, node: int, place: Location) -> None:
+        """Another node says where it is; keep clear of it."""
+        if node == self._owner and place.distance_m(self._place) < self._clearance_m:
+            self.stop_when_connected()
+        if place.distance_m(self.goal) < self._clearance_m:
+            self.stop_when_connected()
+            self._diversions += 1
+            self._go_to(self._spot())
+
+    def arrived(self) -> bool:
+        """It is on the ground. False: that was one leg; else it asks which nodes are there."""
+        here = self._parts.pilot.location()
+        if self._leg_is_short(here):
+            self._fly_on()
+            return False
+        self.asks_left = ASKS_ON_GROUND
+        self._ask_all_for_places()
+        return True
+
+    def ask_again(self) -> bool:
+        """The answers have had their time. False: it stands clear, and the flight is over."""
+        self.asks_left -= 1
+        if self.on_ground:
+            self._ask_all_for_places()
+        return self.on_ground
+
+    def _go_to(self, goal: Location) -> None:
+        self.goal = goal
+        self.asks_left = 0
+        self._fly_on()
+
+    def _fly_on(self) -> None:
+        """On towards the goal.
+
+        A flight that may end where the drone is connected goes in legs: it climbs by half of each
+        leg, and higher up it would hear no node on the ground.
+        """
+        here = self._parts.pilot.location()
+        self._leg_from = here
+        goal = self.goal
+        if self.stops_when_connected and here is not None:
+            distance_m = here.distance_m(goal)
+            if distance_m > self._leg_m:
+                goal = _between(here, goal, self._leg_m / distance_m)
+        self._parts.pilot.fly_to(goal, step_back=True)
+
+    def _leg_is_short(self, here: Location | None) -> bool:
+        """Whether this was not the last leg, and the drone moves at all."""
+        if (
+            here is None
+            or self._leg_from is None
+            or here.distance_m(self._leg_from) < LANDED_WITHIN_M
+        ):
+            return False
+        return here.distance_m(self.goal) > LANDED_WITHIN_M
+
+    def _spot(self) -> Location:
+        """Two drones that divert at the same time pass over different numbers of spots."""
+        skip = self._parts.node_id % 5 if self._diversions > 1 else 0
+        return free_spot(self._wanted, self._origin, self._clearance_m, self._others(), skip)
+
+    def _is_free(self, spot: Location) -> bool:
+        return all(spot.distance_m(other) >= self._clearance_m for other in self._others())
+
+    def _others(self) -> list[Location]:
+        """Where drones are; a place that the goal keeps clear of counts as well."""
+        now_s, me = self._parts.now_s, self._parts.node_id
+        kept_free = [] if self._at_place else [self._place]
+        return kept_free + [
+            heard.place
+            for node, heard in self._parts.neighbours.places().items()
+            if node != me and now_s - heard.heard_s <= FRESH_S
+        ]
+
+    def _ask_all_for_places(self) -> None:
+        ask_all_for_places(self._parts.antenna, self._parts.node_id)
+
+
+def _between(start: Location, end: Location, share: float) -> Location:
+    return Location(*(a + (b - a) * share for a, b in zip(start, end)))
+
+
+def ask_all_for_places(antenna: IWirelessCommunication, me: int) -> None:
+    """Ask each node in range where it is."""
+    question = Message(me, me, MessageType.REQUESTLOCATION, BROADCAST, BROADCAST)
+    antenna.broadcast_message(question.to_payload())

@@ -1,0 +1,28 @@
+"""What can be adjusted about the repair of a mesh."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drone_mesh.errors import ConfigurationError
+
+DEFAULT_REPAIR = "thesis"
+RANGE_M = 9.0  # docs/protocol.md, "Wireless signal simulator": in range is nearer than this
+CLEARANCE_M = 0.5  # docs/protocol.md, "Negotiation": a drone nearer than this stands on a place
+
+
+@dataclass(frozen=True)
+class RepairOptions:
+    """Adjustable numbers of the repair of one node."""
+
+    clearance_m: float = CLEARANCE_M  # drones come to rest no nearer to each other than this
+    range_m: float = RANGE_M  # how far a radio reaches, as far as the node knows
+    avoid_wrecks: bool = False  # whether a drone that is switched off occupies its place
+
+    def __post_init__(self) -> None:
+        """Raises ConfigurationError for a number outside its range."""
+        if not (math.isfinite(self.clearance_m) and self.clearance_m > 0):
+            raise ConfigurationError(f"clearance {self.clearance_m}: must be above 0 metres")
+        if not (math.isfinite(self.range_m) and self.range_m > 0):
+            raise ConfigurationError(f"range {self.range_m}: must be above 0 metres")

@@ -1,0 +1,69 @@
+"""The medium, or the gateway, is gone for a while: what flies, and where it stands in the end."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from scenarios import events, fleet
+
+GRIDS = [(24, 5), pytest.param(99, 10, marks=pytest.mark.slow)]
+CONNECTED_WITHIN_S = 15.0
+CLEARANCE_M = 0.5
+
+
+def standing(network):
+    return {node: network.location(node) for node in network.nodes}
+
+
+def closest_m(network):
+    places = standing(network).values()
+    return min(one.distance_m(other) for one, other in itertools.combinations(places, 2))
+
+
+def still_where_they_were(network, before):
+    return sum(network.location(node).distance_m(place) < 0.1 for node, place in before.items())
+
+
+@pytest.mark.parametrize(("routers", "gridsize"), GRIDS)
+@pytest.mark.parametrize("gone_s", [35.0, 60.0, 120.0, 600.0])
+@pytest.mark.parametrize("registered", [True, False], ids=["simulator", "jammer"])
+def test_after_a_blackout_all_are_connected_and_no_drone_stands_on_another(
+    routers, gridsize, gone_s, registered
+):
+    """A simulator that restarts registers the antennas again; after a jammer nothing does."""
+    network = fleet(routers, gridsize)
+    network.run_for(30.0)
+    assert network.all_connected()
+    before = standing(network)
+    network.air.loss = 1.0
+    network.run_for(gone_s)
+    network.air.loss = 0.0
+    for node in network.nodes.values():
+        if registered:
+            node.component.on_antenna_registered(network.clock.now_s)
+            node.plan()
+    assert network.run_until(network.all_connected, within_s=CONNECTED_WITHIN_S)
+    network.run_for(60.0)
+    assert network.all_connected()
+    assert closest_m(network) >= CLEARANCE_M
+    if gone_s <= 120.0:
+        assert still_where_they_were(network, before) >= 0.9 * len(before)
+
+
+@pytest.mark.parametrize(("routers", "gridsize"), GRIDS)
+@pytest.mark.parametrize("gone_s", [45.0, 120.0, 300.0, 600.0])
+def test_while_the_gateway_is_off_at_most_one_drone_a_minute_flies_and_none_stands_on_another(
+    routers, gridsize, gone_s
+):
+    network = fleet(routers, gridsize)
+    network.run_for(30.0)
+    network.power(0, False)
+    network.run_for(gone_s)
+    flights_s = [at_s for at_s, _node, _to in events(network, "FLIGHT_DECIDED")]
+    assert all(later - one >= 60.0 for one, later in zip(flights_s, flights_s[1:]))
+    network.power(0, True)
+    assert network.run_until(network.all_connected, within_s=CONNECTED_WITHIN_S)
+    network.run_for(60.0)
+    assert network.all_connected()
+    assert closest_m(network) >= CLEARANCE_M

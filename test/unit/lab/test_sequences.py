@@ -1,0 +1,32 @@
+"""Random misfortunes: the repair never harms, and heals what can be healed."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from drone_mesh.lab.sequence import run_sequence
+from drone_mesh.lab.sequences import harm, main
+
+SEQUENCES, AT_ONCE = 300, 10
+
+
+@pytest.mark.parametrize("first", range(0, SEQUENCES, AT_ONCE))
+def test_no_sequence_ends_with_stacked_drones_or_a_needless_flight_or_a_node_given_up(first):
+    outcomes = [run_sequence(seed) for seed in range(first, first + AT_ONCE)]
+    assert [outcome for outcome in outcomes if harm(outcome)] == []
+
+
+def test_the_same_seed_gives_the_same_outcome():
+    assert run_sequence(3) == run_sequence(3)
+
+
+def test_the_command_goes_on_where_it_was_stopped(tmp_path, capsys):
+    table = tmp_path / "outcomes.csv"
+    assert main(["--runs", "2", "--csv", str(table)]) == 0
+    assert main(["--runs", "3", "--csv", str(table)]) == 0
+    logging.disable(logging.NOTSET)
+    lines = table.read_text(encoding="utf-8").splitlines()
+    assert [line.split(",")[0] for line in lines] == ["seed", "0", "1", "2"]
+    assert "3 sequences, seeds 0..2" in capsys.readouterr().out
