@@ -16,6 +16,7 @@ from drone_mesh.drone.interfaces import Location
 LOCATION, REQUEST, PRESENT, HEARTBEAT, MISSING, BID = 1, 2, 3, 4, 5, 7
 GATEWAY_AT_0_4 = "00 00 01 01 01 00 00 80 40"  # latitude 4
 BESIDE_GATEWAY = Location(pytest.approx(4.55), pytest.approx(0.0), 0.0)  # coming from the north
+A_LEG_FROM_12 = Location(pytest.approx(6.0), pytest.approx(0.0), 0.0)  # 6 m towards the gateway
 NEIGHBOUR_2_AT_0_8 = "02 02 01 01 01 00 00 00 41"  # latitude 8
 NEIGHBOUR_PLACE = Location(8.0, 0.0, 0.0)
 
@@ -172,7 +173,7 @@ def test_after_the_landing_the_time_without_a_gateway_counts_from_the_next_check
     rig.wait_until(84.9)
     assert len(rig.engine.goals) == 1
     rig.wait_until(85.1)
-    assert rig.engine.goals[1:] == [BESIDE_GATEWAY]
+    assert rig.engine.goals[1:] == [Location(pytest.approx(14.0), pytest.approx(0.0), 0.0)]
 
 
 def test_an_order_ends_the_time_without_a_gateway():
@@ -332,7 +333,7 @@ def test_a_router_that_knows_no_other_place_flies_to_the_gateway():
     assert rig.mesh.get_last_good_known_location_id() == 255
     rig.antenna.dead = {2}
     rig.wait_until(60.0)
-    assert rig.engine.goals[:1] == [BESIDE_GATEWAY]
+    assert rig.engine.goals[:1] == [A_LEG_FROM_12]
 
 
 def test_after_one_step_back_the_next_one_is_to_the_gateway():
@@ -368,7 +369,7 @@ def test_a_next_hop_that_says_nonsense_does_not_hide_the_place_of_the_gateway():
     rig.hear("02 02 01 01 01 00 60 9c 45")
     rig.antenna.dead = {2}
     rig.wait_until(60.0)
-    assert rig.engine.goals[:1] == [BESIDE_GATEWAY]
+    assert rig.engine.goals[:1] == [A_LEG_FROM_12]
 
 
 # Negotiation ---------------------------------------------------------------------------------
@@ -466,7 +467,7 @@ def test_a_router_that_knows_only_the_place_of_the_gateway_bids_for_flying_there
     assert rig.sent(BID) == [own_bid(3, 8.0)]
     rig.hear(bid(3, 1.0))
     rig.wait(TO_DECISION_S)
-    assert rig.engine.goals == [BESIDE_GATEWAY]
+    assert rig.engine.goals == [A_LEG_FROM_12]
 
 
 def test_a_router_that_does_not_know_its_location_does_not_bid():
@@ -671,7 +672,7 @@ def test_after_two_rounds_without_a_flier_the_place_of_the_gateway_counts():
     assert own_bid(3, 1 / 9) in rig.sent(BID)  # the nearest flies: 1 / (1 + 8 m)
     rig.hear(bid(2, -1.0), bid(3, -1.0))
     rig.wait(TO_DECISION_S)
-    assert rig.engine.goals == [BESIDE_GATEWAY]
+    assert rig.engine.goals == [A_LEG_FROM_12]
 
 
 # Which drone flies ---------------------------------------------------------------------------
@@ -825,6 +826,25 @@ def test_in_flight_it_asks_all_nodes_in_range_once_a_second_where_they_are():
     fly(rig, Location(11.0, 0.0, 2.0))
     fly(rig, Location(10.0, 0.0, 2.0))
     assert rig.broadcasts() == [packet("01 01 02 fe fe")] * 2
+
+
+def test_to_the_gateway_it_flies_in_legs_and_presents_itself():
+    """So low that it hears nodes on the ground: it lands where it is connected."""
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 40")
+    rig.antenna.dead = {2}
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert rig.engine.goals == [A_LEG_FROM_12]
+    rig.forget()
+    fly(rig, Location(9.0, 0.0, 3.0))
+    assert packet("01 01 03 fe fe ff") in rig.broadcasts()
+    fly(rig, Location(6.0, 0.0, 0.0))
+    assert rig.engine.goals == [A_LEG_FROM_12, BESIDE_GATEWAY]
+    fly(rig, Location(5.3, 0.0, 0.2))
+    rig.hear("00 00 04 01 01 01 00 00")
+    assert rig.engine.goals[-1] == Location(5.3, 0.0, 0.0)
 
 
 def test_in_flight_it_does_not_take_up_a_connection():
