@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from conftest import Visit
 
 # The fleet: gateway 0 at (-1, 0); 17 routers in rows of 6, 6 m apart, in range below 9 m.
@@ -270,3 +272,139 @@ def test_a_finger_that_moves_the_map_sends_no_drone_away(start_console, visit):
     page.wait_for("the map moved", lambda: on_screen(page, *PLACES[9])[0] > start[0] + 30)
     page.page.wait_for_timeout(500)
     assert page.page.locator("#nodes tr[data-condition=flying]").count() == 0
+
+
+def test_a_node_is_found_by_typing_its_id(page):
+    page.page.keyboard.press("/")
+    page.page.keyboard.type("14")
+    page.page.keyboard.press("Enter")
+    assert page.page.inner_text("#node-name") == "Router 14"
+    page.page.keyboard.press("/")
+    page.page.keyboard.type("99")
+    page.page.keyboard.press("Enter")
+    page.page.wait_for_selector("#toasts :text('no node 99')")
+    assert page.page.inner_text("#node-name") == "Router 14"
+
+
+def test_a_node_that_is_found_comes_into_view(page):
+    for _ in range(12):
+        page.page.click("#zoom-in")
+    page.page.fill("#find", "17")
+    page.page.press("#find", "Enter")
+    box = page.page.locator("#map").bounding_box()
+    assert box is not None
+    page.wait_for(
+        "17 is in view",
+        lambda: (
+            box["x"] < on_screen(page, *PLACES[17])[0] < box["x"] + box["width"]
+            and box["y"] < on_screen(page, *PLACES[17])[1] < box["y"] + box["height"]
+        ),
+    )
+
+
+def test_a_crowd_of_events_and_ids_is_a_handful_of_tab_stops(page):
+    page.page.check("#show-neighbours")
+    page.page.click("#nodes tr[data-id='8']")
+    page.wait_for("its neighbours", lambda: page.page.locator("#node-facts button").count() > 8)
+    assert page.page.locator("#events button").count() > 50
+    stops = page.page.evaluate(
+        "[...document.querySelectorAll('button, input, select, [tabindex]')]"
+        ".filter((e) => e.tabIndex >= 0 && e.checkVisibility()).length"
+    )
+    assert stops < 50
+    page.page.focus("#events")
+    page.page.keyboard.press("ArrowDown")
+    page.page.keyboard.press("ArrowDown")
+    chosen = page.page.evaluate("document.activeElement.textContent")
+    page.page.keyboard.press("Enter")
+    assert page.page.inner_text("#node-name").split()[1] == chosen
+
+
+def test_the_clock_is_not_announced_and_every_button_has_a_name_in_words(page):
+    assert page.page.get_attribute("#clock", "role") == "timer"
+    assert page.page.locator("output").count() == 0
+    for name in ("Zoom in", "Zoom out", "Light or dark theme", "List of keys", "Close"):
+        assert page.page.get_by_label(name, exact=True).count() == 1, name
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1400, 880), (390, 780)], ids=["desk", "phone"])
+def test_axe_finds_no_violation(start_console, visit, scheme, size):
+    width, height = size
+    page = visit(
+        start_console(*FAST).url,
+        viewport={"width": width, "height": height},
+        color_scheme=scheme,
+    )
+    page.wait_for_drones(len(PLACES))
+    page.page.keyboard.press("n")
+    page.page.keyboard.press("p")
+    page.page.wait_for_selector(".toast")
+    for tab in ("map", "nodes", "events", "charts") if width < 500 else ("map",):
+        page.page.evaluate(f"document.querySelector('nav button[data-tab={tab}]').click()")
+        results = Axe().run(page.page)
+        assert results.violations_count == 0, results.generate_report()
+
+
+def test_the_whole_table_fits_beside_the_map_at_1400_pixels(start_console, visit):
+    console = start_console("--routers", "253", "--gridsize", "16", "--spacing", "6", *FAST)
+    page = visit(console.url, viewport={"width": 1400, "height": 880})
+    page.wait_for_drones(254)
+    wide, room = page.page.evaluate(
+        "(({ scrollWidth, clientWidth }) => [scrollWidth, clientWidth])"
+        "(document.querySelector('#nodes-card .scroll'))"
+    )
+    assert wide <= room
+
+
+def test_charts_have_several_times_and_no_false_start(page):
+    page.wait_for(
+        "times below each chart",
+        lambda: all(
+            int(page.page.get_attribute(f"#chart-{name}", "data-ticks") or 0) >= 2
+            for name in ("share", "rate", "hops")
+        ),
+        within_s=20.0,
+    )
+
+
+def test_on_a_phone_the_selected_node_its_switch_and_its_close_button_stay_on_the_screen(
+    start_console, visit
+):
+    page = visit(start_console(*FAST).url, viewport={"width": 390, "height": 780}, has_touch=True)
+    page.wait_for_drones(len(PLACES))
+    page.page.keyboard.press("n")
+    page.page.keyboard.press("p")  # the gateway is off: every router gets lost
+    page.page.select_option("#speed", "10")
+    page.page.fill("#find", "17")
+    page.page.press("#find", "Enter")
+    page.wait_for(
+        "17 is lost",
+        lambda: page.page.inner_text("#node-condition") == "not connected to a gateway",
+        within_s=20.0,
+    )
+    for selector in ("#node-close", "#power", "#fly-form button"):
+        box = page.page.locator(selector).bounding_box()
+        assert box is not None
+        assert box["x"] >= 0, selector
+        assert box["x"] + box["width"] <= 390, selector
+    top = page.page.locator("#map-top").bounding_box()
+    card = page.page.locator("#map-card").bounding_box()
+    assert top is not None
+    assert card is not None
+    for place in PLACES:
+        x, y = on_screen(page, *place)
+        assert card["x"] <= x <= card["x"] + card["width"], place
+        assert top["y"] + top["height"] <= y <= card["y"] + card["height"], place
+
+
+def test_drones_at_one_position_are_fanned_out_and_each_can_be_selected(start_console, visit):
+    page = visit(start_console("--routers", "4", "--spacing", "0.05", *FAST).url)
+    page.wait_for_drones(5)
+    radius = float(page.page.get_attribute("#map-note", "data-radius"))
+    distance = 1.15 * radius / math.sin(math.pi / 4)
+    for number, node in enumerate((1, 2, 3, 4)):
+        x, y = on_screen(page, 0.05 * number, 0.0)
+        angle = math.pi / 2 - 2 * math.pi * number / 4
+        page.page.mouse.click(x + distance * math.cos(angle), y - distance * math.sin(angle))
+        assert page.page.inner_text("#node-name") == f"Router {node}"

@@ -133,7 +133,14 @@ class ToolsTest(unittest.TestCase):
         finished = run("status", "--bag", str(bag))
         self.assertEqual(finished.returncode, 0, finished.stderr)
         self.assertIn("2 of 2 routers connected, 1 switched off", finished.stdout)
+        early = run("status", "--bag", str(bag), "--at", "0")
+        self.assertEqual(early.returncode, 2)
+        self.assertRegex(early.stderr, r"no state up to 0 s; the recording starts at \d+\.\d s")
         self.assertEqual(run("snapshot", "--bag", str(bag), f"{self.folder}/bag.png").returncode, 0)
+        picture = run("snapshot", "--bag", str(bag), f"{self.folder}/bag.xyz")
+        self.assertEqual(picture.returncode, 2)
+        self.assertIn("must end in .png", picture.stderr)
+        self.assertFalse((self.folder / "bag.xyz").exists())
         for picture in ("live.png", "bag.png"):
             self.assertEqual((self.folder / picture).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         finished = run(

@@ -175,3 +175,11 @@ def test_a_frame_carries_each_link_once_under_its_use_at_the_lower_id():
     assert frame(store, 0)["nodes"]["1"]["lost_links"] == "200"
     store.update_mesh(MeshStatus(9.0, nodes), wall_s=0.3 + JUST_LOST_S)
     assert frame(store, 0)["nodes"]["1"]["lost_links"] == "0"
+
+
+def test_nodes_at_one_position_come_with_their_slots():
+    store = FrameStore()
+    nodes = [NodeStatus(node, position=(2.0, 2.0, float(node))) for node in (1, 2)]
+    store.update_mesh(MeshStatus(1.0, [*nodes, NodeStatus(3)]), wall_s=0.0)
+    slots = {node: fields["slot"] for node, fields in frame(store, 0)["nodes"].items()}
+    assert slots == {"1": [0, 2], "2": [1, 2], "3": None}

@@ -44,7 +44,7 @@ function fly(id, x, y, z) {
   order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: height });
 }
 
-const map = new MapView(mesh, byId("map"), byId("map-note"), (id, x, y) => fly(id, x, y));
+const map = new MapView(mesh, byId("map-card"), (id, x, y) => fly(id, x, y));
 new NodeTable(mesh, byId("nodes"));
 const panel = new NodePanel(
   mesh,
@@ -56,15 +56,21 @@ const charts = new Charts(mesh);
 
 // The header
 
+/** Writes a text only if it changed: a screen reader announces each write to a live region. */
+function setText(id, text) {
+  if (byId(id).textContent !== text) byId(id).textContent = text;
+}
+
 function showHead() {
   const { t, achieved, factor, paused, summary, severity } = mesh.clock;
   if (t === undefined) return;
-  byId("clock").textContent = paused
-    ? `${t.toFixed(1)} s, paused`
-    : `${t.toFixed(1)} s, ${achieved.toFixed(1)}×`;
-  byId("summary").textContent = summary;
+  setText(
+    "clock",
+    paused ? `${t.toFixed(1)} s, paused` : `${t.toFixed(1)} s, ${achieved.toFixed(1)}×`,
+  );
+  setText("summary", summary);
   byId("summary").dataset.severity = severity;
-  byId("pause").textContent = paused ? "Go on" : "Pause";
+  setText("pause", paused ? "Resume" : "Pause");
   byId("pause").setAttribute("aria-pressed", paused);
   const speed = byId("speed");
   if (document.activeElement !== speed) {
@@ -76,7 +82,7 @@ function showHead() {
 
 function showLink() {
   const text = connection.open ? mesh.link : "no connection to the console, trying again";
-  byId("link").textContent = text;
+  setText("link", text);
   byId("link").dataset.severity = 2;
   byId("link").hidden = !text;
 }
@@ -117,6 +123,16 @@ byId("show-known").addEventListener("change", (event) =>
 byId("show-ranges").addEventListener("change", (event) =>
   map.setOption("ranges", event.target.checked),
 );
+byId("find-form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const text = byId("find").value.trim();
+  const id = /^\d+$/.test(text) ? Number(text) : null;
+  if (!mesh.nodes.has(id)) return toast(`no node ${text || "without an id"}`, true);
+  mesh.select(id);
+  map.show(id);
+  byId("find").value = "";
+  byId("map").focus();
+});
 byId("help-button").addEventListener("click", () => byId("help").showModal());
 
 for (const tab of document.querySelectorAll("nav button")) {
@@ -151,6 +167,7 @@ const KEYS = {
   " ": () => byId("pause").click(),
   n: () => mesh.selectNext(1),
   b: () => mesh.selectNext(-1),
+  "/": () => byId("find").focus(),
   p: () => panel.switchPower(),
   g: () => panel.focusGoal(),
   f: () => map.fit(),

@@ -2,8 +2,7 @@
 
 const MIN_SCALE = 0.05; // px per m: 10 km on 500 px
 const MAX_SCALE = 400;
-const MARGIN_PX = 50;
-const TOOLS_PX = 44; // the buttons at the top cover that much more
+const MARGIN_PX = 32;
 
 export class Camera {
   constructor() {
@@ -42,8 +41,8 @@ export class Camera {
     this.y += y - ny;
   }
 
-  /** Shows all these [x, y], none smaller than a few metres across. */
-  fit(points) {
+  /** Shows all these [x, y], at least a few metres across; `top` and `bottom` px are covered. */
+  fit(points, top, bottom) {
     if (!points.length) return;
     const xs = points.map((p) => p[0]);
     const ys = points.map((p) => p[1]);
@@ -51,8 +50,8 @@ export class Camera {
     const [low, high] = [Math.min(...ys), Math.max(...ys)];
     this.x = (left + right) / 2;
     const wide = Math.max(this.width - 2 * MARGIN_PX, 60) / Math.max(right - left, 3);
-    const tall = Math.max(this.height - 2 * MARGIN_PX - TOOLS_PX, 60) / Math.max(high - low, 3);
+    const tall = Math.max(this.height - 2 * MARGIN_PX - top - bottom, 60) / Math.max(high - low, 3);
     this.scale = Math.min(MAX_SCALE, Math.max(MIN_SCALE, Math.min(wide, tall)));
-    this.y = (low + high) / 2 + TOOLS_PX / 2 / this.scale;
+    this.y = (low + high) / 2 + (top - bottom) / 2 / this.scale;
   }
 }

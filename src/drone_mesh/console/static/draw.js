@@ -57,13 +57,13 @@ export function drawingOrder(mesh) {
 }
 
 /**
- * Returns the counts {drones, links, linksDrawn, routeLinks, lostLinks}; links are the known and the route links.
+ * Returns the counts {drones, links, linksDrawn, routeLinks, lostLinks} and the radius of drones, px; links are the known and the route links.
  * `drag` is {id, x, y} of a drone that is being dragged, in metres, or null.
  */
 export function drawMesh(context, camera, mesh, colours, options, drag) {
   context.clearRect(0, 0, camera.width, camera.height);
   context.lineCap = "round";
-  drawGrid(context, camera, colours);
+  drawGrid(context, camera, colours, options.covered);
   const selected = mesh.nodes.get(mesh.selected);
   if (options.ranges)
     for (const node of mesh.nodes.values()) drawRange(context, camera, mesh, node, colours, 0.35);
@@ -75,6 +75,7 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
     linksDrawn: 0,
     routeLinks: 0,
     lostLinks: 0,
+    radius,
   };
   const ends = (links) => links.map(([a, b]) => [mesh.nodes.get(a), mesh.nodes.get(b)]);
 
@@ -132,9 +133,9 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
   return drawn;
 }
 
-function drawGrid(context, camera, colours) {
+function drawGrid(context, camera, colours, { top, bottom }) {
   const step = niceStep(70 / camera.scale);
-  const [left, top] = camera.toWorld(0, 0);
+  const [left, high] = camera.toWorld(0, 0);
   const [right, low] = camera.toWorld(camera.width, camera.height);
   context.strokeStyle = colours.grid;
   context.fillStyle = colours.muted;
@@ -148,14 +149,14 @@ function drawGrid(context, camera, colours) {
     context.moveTo(px, 0);
     context.lineTo(px, camera.height);
     if (px > 60 && px < camera.width - 20)
-      context.fillText(metres(x, step), px, camera.height - 42);
+      context.fillText(metres(x, step), px, camera.height - bottom - 8);
   }
   context.textAlign = "right";
-  for (let y = Math.ceil(low / step) * step; y <= top; y += step) {
+  for (let y = Math.ceil(low / step) * step; y <= high; y += step) {
     const py = Math.round(camera.toScreen(0, y)[1]) + 0.5;
     context.moveTo(0, py);
     context.lineTo(camera.width, py);
-    if (py > 60 && py < camera.height - 50)
+    if (py > top + 12 && py < camera.height - bottom - 24)
       context.fillText(metres(y, step), camera.width - 8, py - 4);
   }
   context.stroke();

@@ -1,5 +1,6 @@
 // The log of events, newest first.
 
+import { arrowKeys } from "./arrows.js";
 import { idLink } from "./panel.js";
 
 const ROWS_SHOWN = 300;
@@ -30,6 +31,7 @@ export class EventLog {
     mesh.addEventListener("select", () => this.onlySelected.checked && this.#rebuild());
     for (const box of [showNeighbours, onlySelected])
       box.addEventListener("change", () => this.#rebuild());
+    arrowKeys(list, ".id-link");
   }
 
   #wanted(event) {
@@ -64,10 +66,10 @@ export class EventLog {
     time.textContent = `${event.t.toFixed(1)} s`;
     const text = document.createElement("span");
     text.className = TONE[event.kind] ?? "";
-    text.append(idLink(this.mesh, event.node), ` ${event.kind}`);
+    text.append(idLink(this.mesh, event.node, -1), ` ${event.kind}`);
     event.peers
       .slice(0, PEERS_SHOWN)
-      .forEach((peer, index) => text.append(index ? ", " : " ", idLink(this.mesh, peer)));
+      .forEach((peer, index) => text.append(index ? ", " : " ", idLink(this.mesh, peer, -1)));
     if (event.peers.length > PEERS_SHOWN)
       text.append(` and ${event.peers.length - PEERS_SHOWN} more`);
     if (event.detail) text.append(` (${event.detail})`);

@@ -7,21 +7,26 @@ const DRAG_AFTER_PX = 6;
 const NEAR_PX = 8; // how far beside a drone a click still means it
 const KEY_STEP_PX = 60;
 const ZOOM_STEP = 1.3;
+const IN_VIEW_PX = 24; // a node closer to the edge is not in view
 
 export class MapView {
   /** `fly(id, x, y)` is called when a drone was dragged to (x, y). */
-  constructor(mesh, canvas, note, fly) {
+  constructor(mesh, card, fly) {
     this.mesh = mesh;
-    this.canvas = canvas;
-    this.note = note;
+    this.canvas = card.querySelector("canvas");
+    this.top = card.querySelector("#map-top");
+    this.note = card.querySelector("#map-note");
+    this.legend = card.querySelector(".legend");
     this.fly = fly;
     this.camera = new Camera();
     this.options = { known: true, ranges: false };
     this.colours = readColours();
     this.drag = null;
     this.fitted = false; // to the first mesh that was seen
+    this.moved = false; // by a person, since it was fitted
     this.pointers = new Map();
     this.pending = false;
+    const canvas = this.canvas;
     new ResizeObserver(() => this.#resize()).observe(canvas);
     for (const what of ["frame", "select"]) mesh.addEventListener(what, () => this.redraw());
     canvas.addEventListener("pointerdown", (event) => this.#down(event));
@@ -49,7 +54,21 @@ export class MapView {
   }
 
   zoom(factor) {
+    this.moved = true;
     this.camera.zoom(factor);
+    this.redraw();
+  }
+
+  /** Moves the map if this node is not in view. */
+  show(id) {
+    const node = this.mesh.nodes.get(id);
+    if (!node?.position) return;
+    const [x, y] = this.camera.toScreen(node.position[0], node.position[1]);
+    const { top, bottom } = this.#covered();
+    const [left, low] = [IN_VIEW_PX, this.camera.height - bottom - IN_VIEW_PX];
+    const px = Math.min(this.camera.width - left, Math.max(left, x));
+    const py = Math.min(low, Math.max(top + IN_VIEW_PX, y));
+    this.camera.pan(px - x, py - y);
     this.redraw();
   }
 
@@ -59,7 +78,9 @@ export class MapView {
       if (node.position) points.push(node.position);
       if (node.path.length) points.push(node.path.slice(-3));
     }
-    this.camera.fit(points);
+    const { top, bottom } = this.#covered();
+    this.camera.fit(points, top, bottom);
+    this.moved = false;
     this.redraw();
   }
 
@@ -81,7 +102,8 @@ export class MapView {
     const context = this.canvas.getContext("2d");
     const ratio = window.devicePixelRatio;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    const drawn = drawMesh(context, this.camera, this.mesh, this.colours, this.options, this.drag);
+    const options = { ...this.options, covered: this.#covered() };
+    const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.drag);
     this.#describe(drawn);
   }
 
@@ -96,6 +118,14 @@ export class MapView {
     Object.assign(this.note.dataset, drawn, { x, y, scale });
   }
 
+  /** How much of the canvas is covered by what stands on it, px. */
+  #covered() {
+    return {
+      top: this.top.offsetTop + this.top.offsetHeight,
+      bottom: this.legend.offsetHeight && this.camera.height - this.legend.offsetTop,
+    };
+  }
+
   #resize() {
     const ratio = window.devicePixelRatio;
     const { clientWidth, clientHeight } = this.canvas;
@@ -104,6 +134,8 @@ export class MapView {
     this.canvas.height = Math.round(clientHeight * ratio);
     this.camera.width = clientWidth;
     this.camera.height = clientHeight;
+    if (this.fitted && !this.moved) this.fit();
+    else if (this.mesh.selected !== null) this.show(this.mesh.selected);
     this.#draw();
   }
 
@@ -153,13 +185,17 @@ export class MapView {
       const [x, y] = this.camera.toWorld(event.offsetX, event.offsetY);
       this.drag = { id: pointer.node, x, y };
       this.mesh.select(pointer.node);
-    } else if (pointer.moved) this.camera.pan(dx, dy);
+    } else if (pointer.moved) {
+      this.moved = true;
+      this.camera.pan(dx, dy);
+    }
     pointer.x = event.offsetX;
     pointer.y = event.offsetY;
     this.redraw();
   }
 
   #pinch(pointer, event) {
+    this.moved = true;
     const other = [...this.pointers.values()].find((one) => one !== pointer);
     const before = Math.hypot(pointer.x - other.x, pointer.y - other.y);
     const after = Math.hypot(event.offsetX - other.x, event.offsetY - other.y);
@@ -186,6 +222,7 @@ export class MapView {
 
   #wheel(event) {
     event.preventDefault();
+    this.moved = true;
     this.camera.zoom(Math.exp(-event.deltaY * 0.0015), event.offsetX, event.offsetY);
     this.redraw();
   }
@@ -198,6 +235,7 @@ export class MapView {
     else if (event.key === "+" || event.key === "=") this.camera.zoom(ZOOM_STEP);
     else if (event.key === "-") this.camera.zoom(1 / ZOOM_STEP);
     else return;
+    this.moved = true;
     event.preventDefault();
     this.redraw();
   }

@@ -1,5 +1,6 @@
 // The selected node: its facts, its power switch, and where to send its drone.
 
+import { arrowKeys } from "./arrows.js";
 import { orDash } from "./mesh.js";
 
 export class NodePanel {
@@ -32,6 +33,7 @@ export class NodePanel {
     if (!node) return;
     setText(byId("node-name"), `${node.role === 1 ? "Gateway" : "Router"} ${node.id}`);
     setText(byId("node-condition"), node.trouble || node.condition);
+    byId("node-condition").title = node.trouble || node.condition;
     byId("node-condition").dataset.colour = node.colour;
     setText(byId("power"), node.on ? "Switch off" : "Switch on");
     this.#facts(node);
@@ -56,9 +58,22 @@ export class NodePanel {
     const shown = JSON.stringify(facts);
     if (list.dataset.shown === shown) return;
     list.dataset.shown = shown;
+    const [row, id] = this.#focused(list);
     list.replaceChildren(
       ...facts.map(([name, value, options]) => this.#fact(name, value, options)),
     );
+    if (row >= 0) this.#linkIn(list.children[row], id)?.focus();
+  }
+
+  /** [row, id] of the link in the list that has the focus; a new list gives it back. */
+  #focused(list) {
+    const link = document.activeElement;
+    return [[...list.children].findIndex((box) => box.contains(link)), link?.textContent];
+  }
+
+  #linkIn(box, id) {
+    const links = [...box.querySelectorAll(".id-link")];
+    return links.find((link) => link.textContent === id) ?? links[0];
   }
 
   #neighbours(node) {
@@ -79,11 +94,12 @@ export class NodePanel {
       value.forEach((item, index) => {
         const [id, age] = [item].flat();
         if (index) dd.append(glue);
-        dd.append(idLink(this.mesh, id));
+        dd.append(idLink(this.mesh, id, index ? -1 : 0));
         if (age !== undefined) dd.append(` (${age === 255 ? "255+" : age})`);
       });
       dd.append(after);
     }
+    arrowKeys(dd, ".id-link");
     box.append(dt, dd);
     return box;
   }
@@ -131,12 +147,14 @@ export class NodePanel {
   }
 }
 
-/** A button that selects this node. */
-export function idLink(mesh, id) {
+/** A button that selects this node. `tabIndex` -1: only the arrow keys reach it. */
+export function idLink(mesh, id, tabIndex = 0) {
   const link = document.createElement("button");
   link.type = "button";
   link.className = "id-link";
   link.textContent = id;
+  link.tabIndex = tabIndex;
+  link.setAttribute("aria-label", `node ${id}`);
   link.addEventListener("click", () => mesh.select(id));
   return link;
 }
