@@ -35,7 +35,7 @@ def complete(*words: str) -> list[str]:
         (("scripts/run", "routers:=", "--ro"), ["--ros-args"]),
         (("./scripts/test", ""), ["unit", "lint", "rostest", "--help"]),
         (("scripts/test", "li"), ["lint"]),
-        (("scripts/test", "rostest", "test/rostest/rep"), ["test/rostest/repair.test"]),
+        (("scripts/test", "rostest", "test/rostest/repa"), ["test/rostest/repair.test"]),
         (("scripts/test", "lint", ""), []),
     ],
 )

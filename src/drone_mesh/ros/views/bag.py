@@ -31,6 +31,12 @@ def read_events(path: Path) -> Iterator[EventRecord]:
             yield event_record(message)
 
 
+def topics_in_bag(path: Path) -> set[str]:
+    """Names of all topics in the bag. Raises BagUnusable."""
+    with _open(path) as bag:
+        return set(bag.get_type_and_topic_info().topics)
+
+
 def _open(path: Path) -> rosbag.Bag:
     try:
         return rosbag.Bag(str(path))

@@ -1,0 +1,86 @@
+"""rosrun drone_mesh replay: plays a recorded run with one clock; used by replay.launch."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import rosgraph
+import rospy
+
+from drone_mesh.errors import MeshError
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import require_master, run_tool
+from drone_mesh.ros.views.bag import BagUnusable, topics_in_bag
+
+# Topics that rosbag must not publish: --clock makes the time, and nodes make the log of now.
+NOT_PLAYED = {names.CLOCK_TOPIC, "/rosout", "/rosout_agg"}
+
+
+class AlreadyATime(MeshError):
+    """A simulation, or another recording, publishes /clock on this master."""
+
+    def __init__(self, nodes: list[str]) -> None:
+        super().__init__(
+            f"{', '.join(nodes)} already publishes {names.CLOCK_TOPIC}: stop it, or set "
+            "ROS_MASTER_URI to a master of its own"
+        )
+
+
+def main() -> None:
+    """Entry point of nodes/replay."""
+    options = _parser().parse_args(rospy.myargv()[1:])
+    run_tool("replay", lambda: _run(options))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rosrun drone_mesh replay",
+        description="Play a recorded run as if it ran now, for rviz, the console and your own "
+        "nodes. The recorded clock is left out, since rosbag makes one: with both, time would run "
+        "backwards.",
+        epilog="The space bar pauses. Exit code: 2 unusable bag or no free master, otherwise that "
+        "of rosbag play.",
+    )
+    parser.add_argument("bag", type=Path, help="the bag of the recorded run")
+    parser.add_argument(
+        "--rate", type=_rate, default=1.0, metavar="R", help="seconds of the bag per second (1)"
+    )
+    parser.add_argument(
+        "--start", type=_seconds, default=0.0, metavar="S", help="seconds of the bag to skip (0)"
+    )
+    return parser
+
+
+def _rate(text: str) -> float:
+    rate = float(text)
+    if not 0.001 <= rate <= 1000.0:
+        raise argparse.ArgumentTypeError(f"{text}: want 0.001..1000")
+    return rate
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 <= seconds < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text}: want 0 or more")
+    return seconds
+
+
+def _run(options: argparse.Namespace) -> int:
+    topics = topics_in_bag(options.bag)
+    if names.STATE_TOPIC not in topics:
+        raise BagUnusable(f"{options.bag}: contains no {names.STATE_TOPIC}")
+    require_master()
+    publishers, _subscribers, _services = rosgraph.Master("/replay").getSystemState()
+    others = dict(publishers).get(names.CLOCK_TOPIC, [])
+    if others:
+        raise AlreadyATime(others)
+    rospy.set_param(names.SIM_TIME_PARAM, True)
+    command = ["rosrun", "rosbag", "play", "--clock", "--keep-alive"]
+    command += ["--rate", str(options.rate), "--start", str(options.start), str(options.bag)]
+    command += ["--topics", *sorted(topics - NOT_PLAYED)]
+    remappings = [word for word in sys.argv[1:] if ":=" in word]
+    sys.stdout.flush()
+    os.execvp(command[0], command + remappings)
