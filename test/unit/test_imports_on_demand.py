@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 WEB = {"fastapi", "fastapi_offline", "starlette", "uvicorn", "websockets"}
 REPORT = {"jinja2", "matplotlib"}
 SIMULATION = {"numpy", "pybullet", "rospy"}
+AUTOPILOT = {"pymap3d", "pymavlink"}
 
 
 @functools.lru_cache(maxsize=None)
@@ -65,8 +66,8 @@ def loaded_by(program: Path) -> set[str]:
         ("mesh_markers", WEB | REPORT),
         ("console", REPORT | {"fastapi", "pybullet"}),
         ("report", WEB | {"pybullet"}),
-        ("raspberry_router", WEB | REPORT | SIMULATION),
-        ("raspberry_gateway", WEB | REPORT | SIMULATION),
+        ("raspberry_router", WEB | REPORT | SIMULATION | AUTOPILOT),
+        ("raspberry_gateway", WEB | REPORT | SIMULATION | AUTOPILOT),
     ],
 )
 def test_a_program_does_not_load_what_only_others_need(program: str, unwanted: set[str]) -> None:

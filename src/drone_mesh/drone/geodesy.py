@@ -14,8 +14,6 @@ import struct
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import pymap3d
-
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError
 
@@ -79,6 +77,8 @@ class Origin:
 
     def to_frame(self, place: EarthPlace) -> Location:
         """The place in metres of the common frame."""
+        import pymap3d  # with numpy, most of a second on a Pi; only frames on the earth need it
+
         east, north, _ = pymap3d.geodetic2enu(
             place.latitude_deg,
             place.longitude_deg,
@@ -91,6 +91,8 @@ class Origin:
 
     def to_earth(self, location: Location) -> EarthPlace:
         """The place on the earth of a location in the common frame."""
+        import pymap3d
+
         up = 0.0  # of the surface at the origin's height, which curves away below the plane
         latitude_deg = longitude_deg = math.nan
         for _ in range(_SURFACE_STEPS):
