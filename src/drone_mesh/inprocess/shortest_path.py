@@ -22,6 +22,10 @@ class LinkMap:
         self._next_hops: dict[int, dict[int, int]] = {}  # by destination, by node
         self._looked_s = -LOOK_EVERY_S
 
+    def neighbours(self, node: int) -> frozenset[int]:
+        """The nodes that `node` can send to now."""
+        return frozenset(self._links(node))
+
     def next_hop(self, node: int, destination: int) -> int:
         """The neighbour of `node` on a shortest path, the lowest id of several, or NO_ROUTE."""
         now_s = self._clock.now_s
@@ -56,9 +60,27 @@ class ShortestPath(ChildTableTree):
         self._links = links
         self._node_id = node_id
 
+    def maintain_routing(self) -> None:
+        """Introduce this node again, and check each neighbour with a heartbeat."""
+        assert self._essentials is not None
+        self._essentials.search_other_nodes_in_range()
+        self._essentials.send_heartbeats(sorted(self.get_set_of_children()))
+
     def get_direction_to_node(self, node: int) -> int:
         """As the links are now."""
         return self._links.next_hop(self._node_id, node)
+
+    def get_set_of_children(self) -> frozenset[int]:
+        """The neighbours, as the links are now."""
+        return self._links.neighbours(self._node_id)
+
+    def get_amount_of_children(self) -> int:
+        """The number of neighbours."""
+        return len(self.get_set_of_children())
+
+    def empty(self) -> bool:
+        """Whether there is no neighbour."""
+        return not self.get_set_of_children()
 
     def gateway_lost(self, gateway: int) -> bool:
         """There is nothing to forget, and nothing that neighbours should know."""

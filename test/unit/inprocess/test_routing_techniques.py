@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
+import scenarios
 
 from drone_mesh.communication.routing import ROUTING_TECHNIQUES
 from drone_mesh.inprocess import Network
@@ -61,6 +62,37 @@ def test_of_100_nodes_30_die_and_all_that_have_a_path_stay_or_come_back(techniqu
     network.run_for(20.0)
     with_path = network.shortest_hops()
     assert network.run_until(lambda: network.all_connected(with_path), within_s=40.0)
+
+
+@pytest.mark.parametrize("technique", FOR_CROWDS)
+def test_254_nodes_connect(technique):
+    network = grid(technique, nodes=254)
+    assert network.run_until(network.all_connected, within_s=15.0)
+
+
+@pytest.mark.parametrize("technique", ALL)
+def test_layout_101_finds_the_detour_when_router_4_is_off(technique):
+    network = scenarios.layout(101, routing=technique)
+    assert network.run_until(network.all_connected, within_s=15.0)
+    network.run_for(20.0)
+    network.power(4, False)
+    network.run_for(11.0)
+    assert network.run_until(lambda: network.connected(6), within_s=40.0)
+    network.run_for(11.0)
+    assert network.connected(6)
+
+
+@pytest.mark.parametrize("technique", ALL)
+@pytest.mark.parametrize(("case", "off"), [(201, (2,)), (202, (1,))])
+def test_the_layouts_that_need_a_flight_are_repaired(technique, case, off):
+    network = scenarios.layout(case, routing=technique)
+    assert network.run_until(network.all_connected, within_s=15.0)
+    network.run_for(25.0)
+    for node in off:
+        network.power(node, False)
+    network.run_for(31.0)
+    assert scenarios.run_until(network, network.all_connected, within_s=180.0)
+    assert scenarios.flown(network)
 
 
 @pytest.fixture(scope="module")
