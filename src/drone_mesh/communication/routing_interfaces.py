@@ -26,6 +26,10 @@ class IRoutingEssentials(abc.ABC):
         """The gateway that this node uses, itself for a gateway; NO_ROUTE while it knows none."""
 
     @abc.abstractmethod
+    def get_connected_to_gateway(self) -> bool:
+        """Whether that gateway answered the last heartbeat, or may still answer it."""
+
+    @abc.abstractmethod
     def now_s(self) -> float:
         """The time of the current call, in seconds of the component's clock."""
 

@@ -14,6 +14,7 @@ class RecordingEssentials(IRoutingEssentials):
         self.gateway = gateway
         self.technique = technique
         self.gone = set(gone)
+        self.connected = True
         self.time_s = 0.0
         self.wake_s = None
         self.asked = []
@@ -25,6 +26,9 @@ class RecordingEssentials(IRoutingEssentials):
 
     def get_preferred_gateway(self):
         return self.gateway
+
+    def get_connected_to_gateway(self):
+        return self.connected
 
     def now_s(self):
         return self.time_s

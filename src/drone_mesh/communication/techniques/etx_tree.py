@@ -98,8 +98,8 @@ class EtxTree(GatewayRoutes):
 
     def _rank(self, gateway: int) -> int:
         assert self._essentials is not None
-        if gateway == NO_ROUTE:
-            return 0
+        if not self._essentials.get_connected_to_gateway():
+            return 0  # or nodes that are cut off would count each other's ranks up for ever
         if gateway == self._essentials.get_node_id():
             return ROOT_RANK
         parent = self.next_hop_to_gateway(gateway)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections import OrderedDict
 from typing import Sequence
@@ -12,6 +13,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import MessageType
 
 REMEMBERED = 512  # our choice: packets that a node recognises; a heartbeat lives a second
+REACHABLE_S = 20.0  # our choice: two check periods
 SEQUENCE = struct.Struct("<H")
 SAME_PACKET_S = 0.5  # docs/protocol.md, "Circulating packets": after that it is another packet
 
@@ -26,6 +28,7 @@ class Flooding(ChildTableTree):
         super().__init__()
         self._seen_s: OrderedDict[bytes, float] = OrderedDict()
         self._hops: dict[int, int] = {}  # of neighbours, to their gateway
+        self._heard_s: dict[int, float] = {}  # by creator
         self._sequence = 0
 
     def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
@@ -35,6 +38,7 @@ class Flooding(ChildTableTree):
             self._hops[from_] = messages.hops(payload)
             return True
         assert self._essentials is not None
+        self._heard_s[creator] = self._essentials.now_s()
         now_s, copy = self._essentials.now_s(), _identity(payload, kind)
         is_first = now_s - self._seen_s.get(copy, -SAME_PACKET_S) >= SAME_PACKET_S
         if is_first:
@@ -52,10 +56,17 @@ class Flooding(ChildTableTree):
         return tuple(sorted(children - {came_from, creator}))
 
     def get_direction_to_node(self, node: int) -> int:
-        """For people and for repair: the neighbour with the fewest hops to its gateway."""
+        """For people and for repair: the neighbour with the fewest hops to its gateway.
+
+        NO_ROUTE for a node that was not heard lately, although a packet for it would be flooded.
+        """
         children = self.get_set_of_children()
-        if node in children or not children:
-            return node if children else NO_ROUTE
+        if node in children:
+            return node
+        if self._essentials is None or not children:
+            return NO_ROUTE
+        if self._essentials.now_s() - self._heard_s.get(node, -math.inf) > REACHABLE_S:
+            return NO_ROUTE
         return min(children, key=lambda child: (self._hops.get(child, NO_ROUTE), child))
 
     def extension(self, kind: int, room: int) -> bytes:
@@ -74,6 +85,7 @@ class Flooding(ChildTableTree):
 
     def gateway_lost(self, gateway: int) -> bool:
         """There is no route to drop, and nothing that neighbours should know."""
+        self._heard_s.pop(gateway, None)
         return False
 
     def cant_communicate_with_node(self, node: int) -> int:

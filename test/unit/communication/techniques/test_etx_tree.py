@@ -51,6 +51,12 @@ def test_a_router_advertises_its_parent_plus_the_link(tree):
     assert tree.extension(MessageType.PRESENT, 25) == bytes.fromhex(ONE_HOP)
 
 
+def test_a_router_whose_gateway_does_not_answer_advertises_no_rank(tree):
+    hear(tree, present(5, ROOT))
+    tree.essentials.connected = False
+    assert tree.extension(MessageType.PRESENT, 25) == b""
+
+
 def test_heartbeats_and_routers_without_a_parent_carry_no_bytes(tree):
     assert tree.extension(MessageType.HEARTBEAT, 24) == b""
     assert tree.extension(MessageType.PRESENT, 25) == b""

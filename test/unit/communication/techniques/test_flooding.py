@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from routing_rig import hear, present, started
+from routing_rig import hear, next_hop, present, started
 
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.techniques.flooding import Flooding
@@ -54,6 +54,13 @@ def test_a_packet_goes_to_all_neighbours_but_its_sender_and_its_creator(flooding
 
 def test_a_neighbour_gets_its_packets_directly(flooding):
     assert flooding.directions(6, came_from=5, creator=0) == (6,)
+
+
+def test_a_node_that_was_not_heard_lately_counts_as_out_of_reach(flooding):
+    hear(flooding, heartbeat(via=5, sequence=1, hops=2))
+    assert next_hop(flooding, 0) == 5
+    flooding.essentials.time_s = 21.0
+    assert next_hop(flooding, 0) is None
 
 
 def test_the_memory_of_packets_is_bounded(flooding):
