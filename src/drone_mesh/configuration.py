@@ -42,6 +42,7 @@ class FactoryConfiguration:
     gridsize: int = Field(6, ge=1, le=MAX_DRONES, description="a whole number of routers in a row")
     spacing: float = Field(1.0, gt=0, le=1000, description="metres")  # between routers
     gui: bool = Field(False)
+    drones: Literal["builtin", "external"] = Field("builtin")  # external: other nodes fly them
     real_time_factor: float = Field(
         1.0,
         description=(
@@ -60,7 +61,7 @@ class FactoryConfiguration:
     debug: bool = Field(True)
 
     @property
-    def drones(self) -> int:
+    def fleet_size(self) -> int:
         """Number of drones; their ids are 0 to one less."""
         return self.gateways + self.routers
 

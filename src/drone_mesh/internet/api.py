@@ -14,12 +14,14 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi_offline import FastAPIOffline
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, IGatewayCommands, KnownNode
+from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
+from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.internet.asking import AnswerLate, GatewayDesk, NotCarriedOut
 from drone_mesh.internet.request_guard import RequestGuard
@@ -53,6 +55,38 @@ class Ready(BaseModel):
     gateway: int = Field(description="Its node id.")
 
 
+def _number(value: object) -> object:
+    if isinstance(value, (bool, str)):
+        raise ValueError("not a number")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_number)]
+WholeNumber = Annotated[int, BeforeValidator(_number)]
+
+
+class FrameGoal(BaseModel, extra="forbid"):
+    """A place in the common frame of the drones."""
+
+    latitude: Number = Field(
+        ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False, description="y, metres"
+    )
+    longitude: Number = Field(
+        ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False, description="x, metres"
+    )
+    height: WholeNumber = Field(
+        ge=0, le=int(MAX_HEIGHT_M), description="whole metres above the origin"
+    )
+
+
+class EarthGoal(BaseModel, extra="forbid"):
+    """A place on the earth (WGS84)."""
+
+    latitude_deg: Number = Field(ge=-90, le=90, allow_inf_nan=False)
+    longitude_deg: Number = Field(ge=-180, le=180, allow_inf_nan=False)
+    altitude_m: Number = Field(allow_inf_nan=False, description="above sea level, as the origin's")
+
+
 class OrderSent(BaseModel):
     """The order was sent through the mesh. The arrival is not reported."""
 
@@ -60,6 +94,12 @@ class OrderSent(BaseModel):
     latitude: float = Field(description="y, metres")
     longitude: float = Field(description="x, metres")
     height: int = Field(description="metres")
+
+
+class GoalSent(OrderSent):
+    """An order that was given in a body."""
+
+    earth: Optional[EarthGoal] = Field(description="The same in degrees; null: no origin.")
 
 
 class NodeReport(BaseModel):
@@ -78,8 +118,11 @@ class NodeReports(BaseModel):
     nodes: List[NodeReport]
 
 
-def make_api(desk: GatewayDesk, access: Access) -> FastAPI:
-    """The application. Its page /docs loads nothing from the internet."""
+def make_api(desk: GatewayDesk, access: Access, origin: Optional[Origin] = None) -> FastAPI:
+    """The application. Its page /docs loads nothing from the internet.
+
+    With the origin of the common frame, goals may be given in degrees.
+    """
     app = FastAPIOffline(
         title="drone_mesh gateway",
         description="Sends drones to places and lists the nodes that this gateway knows.",
@@ -134,24 +177,50 @@ def make_api(desk: GatewayDesk, access: Access) -> FastAPI:
         id: DroneId, latitude: Coordinate, longitude: Coordinate, height: Height
     ) -> OrderSent:
         """Send a drone to a place, through the mesh."""
-        order = OrderSent(drone=id, latitude=latitude, longitude=longitude, height=height)
+        await send(id, Location(latitude, longitude, float(height)))
+        return OrderSent(drone=id, latitude=latitude, longitude=longitude, height=height)
+
+    @app.post(
+        "/drones/{id}/goal",
+        dependencies=guards,
+        responses={
+            **order_refusals,
+            400: {"model": Refusal, "description": "The body is no text"},
+            409: {"model": Refusal, "description": "No origin"},
+        },
+    )
+    async def set_goal(id: DroneId, goal: Union[FrameGoal, EarthGoal]) -> GoalSent:
+        """Send a drone to a place, in metres or in degrees, through the mesh."""
+        if isinstance(goal, FrameGoal):
+            place = Location(goal.latitude, goal.longitude, float(goal.height))
+        elif origin is not None:
+            place = origin.to_frame(EarthPlace(**goal.model_dump()))
+            place = place._replace(height=float(round(place.height)))
+        else:
+            raise HTTPException(
+                409, "this gateway has no origin (--origin): give the goal in metres"
+            )
+        await send(id, place)
+        earth = None if origin is None else EarthGoal(**origin.to_earth(place)._asdict())
+        return GoalSent(
+            drone=id,
+            latitude=place.latitude,
+            longitude=place.longitude,
+            height=int(place.height),
+            earth=earth,
+        )
+
+    async def send(drone: int, place: Location) -> None:
         taken = await desk.ask(
             lambda gateway, now_s: gateway.send_goal_request_to_drone(
-                id, latitude, longitude, height, now_s
+                drone, place.latitude, place.longitude, int(place.height), now_s
             )
         )
         if not taken:
             raise HTTPException(
-                503, f"the gateway has no route to drone {id}, which stays where it is"
+                503, f"the gateway has no route to drone {drone}, which stays where it is"
             )
-        _log.info(
-            "drone %d: order sent, to latitude %g m, longitude %g m, height %d m",
-            id,
-            latitude,
-            longitude,
-            height,
-        )
-        return order
+        _log.info("drone %d: order sent, to %s", drone, place.in_words())
 
     return app
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import logging
+from typing import Iterable
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk, Submit
-from drone_mesh.web.access import access_for
+from drone_mesh.web.access import access_for, own_names
 from drone_mesh.web.server_thread import ServerThread
+from drone_mesh.web.tls import Certificate
 
 ANSWER_WITHIN_S = 2.0  # our choice: over ten times the duration of an order to a lost node
 MOST_CONNECTIONS = 64  # our choice; more are answered 503
@@ -30,20 +33,25 @@ class HttpInternet(IInternetConnection):
         port: int = DEFAULT_PORT,
         token: str = "",
         answer_within_s: float = ANSWER_WITHIN_S,
+        certificate: Certificate | None = None,
+        names: Iterable[str] = (),
+        origin: Origin | None = None,
     ) -> None:
         """Take the port (0: any free one).
 
         `submit` runs a function on the thread that owns the gateway. Without a token only this
-        machine may send requests. Raises ConfigurationError for an address that is not available,
-        or that other machines can reach while there is no token.
+        machine may send requests; with one, `names` are those of this machine that may be asked
+        for. With an `origin` goals may be given in degrees. Raises ConfigurationError for an
+        address that is not available, or that other machines can reach while there is no token.
         """
-        access = access_for(bind_address, token)
+        access = access_for(bind_address, token, own_names(*names) if token else ())
         self._desk = GatewayDesk(submit, answer_within_s)
         self._server = ServerThread(
-            make_api(self._desk, access),
+            make_api(self._desk, access, origin),
             bind_address,
             port,
             name="http",
+            certificate=certificate,
             ws="none",
             limit_concurrency=MOST_CONNECTIONS,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.errors import ConfigurationError
@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def http_internet(
-    submit: Submit, address: str = DEFAULT_ADDRESS, port: int = DEFAULT_PORT, token: str = ""
+    submit: Submit,
+    address: str = DEFAULT_ADDRESS,
+    port: int = DEFAULT_PORT,
+    token: str = "",
+    **settings: Any,
 ) -> IInternetConnection:
     """An HttpInternet, see there. Raises ConfigurationError also if its libraries are missing."""
     try:  # they take a second to load, and only gateways with HTTP need them
@@ -22,4 +26,4 @@ def http_internet(
         raise ConfigurationError(
             f"orders over HTTP need the Python package {error.name}: pip install 'drone_mesh[http]'"
         ) from error
-    return HttpInternet(submit, address, port, token)
+    return HttpInternet(submit, address, port, token, **settings)

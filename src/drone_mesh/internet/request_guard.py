@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from collections import Counter
 from typing import TYPE_CHECKING
 
@@ -12,10 +14,39 @@ from drone_mesh.web.access import Access, AccessDenied
 from drone_mesh.web.server_thread import MAX_HEAD_BYTES
 
 if TYPE_CHECKING:
-    from starlette.types import ASGIApp, Receive, Scope, Send
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-MOST_BODY_BYTES = 1024  # our choice: no request needs a body; clients that send "{}" may
+MOST_BODY_BYTES = 1024  # our choice: five times the longest goal in JSON
+MOST_DISCARDED_BYTES = 10_000_000  # our choice: of a body that is refused
+BODY_WITHIN_S = 2.0  # our choice
 MOST_TARGET_BYTES = 1024  # our choice: five times the longest valid address
+
+
+class _PromptBody:
+    """Hands out a request's body; a client that is slow with it counts as gone."""
+
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
+        self._complete = False
+
+    async def __call__(self) -> Message:
+        if self._complete:
+            return await self._receive()  # waits for the client to go
+        try:
+            message = await asyncio.wait_for(self._receive(), BODY_WITHIN_S)
+        except asyncio.TimeoutError:
+            return {"type": "http.disconnect"}
+        self._complete = not message.get("more_body", False)
+        return message
+
+
+async def _discard_body(receive: Receive) -> None:
+    left_bytes = MOST_DISCARDED_BYTES
+    while left_bytes > 0:
+        message = await receive()
+        left_bytes -= len(message.get("body", b""))
+        if not message.get("more_body", False):
+            return
 
 
 class RequestGuard:
@@ -29,11 +60,15 @@ class RequestGuard:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         refusal = self._refusal(scope) if scope["type"] == "http" else None
         if refusal is None:
-            await self._app(scope, receive, send)
+            body = _PromptBody(receive) if scope["type"] == "http" else receive
+            await self._app(scope, body, send)
             return
         status, reason = refusal
         self.refused[status] += 1
-        # The body of such a request is not read.
+        if status == 413 and "expect" not in Headers(scope=scope):
+            # Who is still sending would get a reset and not the answer.
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(_discard_body(receive), BODY_WITHIN_S)
         response = JSONResponse({"detail": reason}, status, headers={"Connection": "close"})
         await response(scope, receive, send)
 
@@ -45,12 +80,12 @@ class RequestGuard:
         if sum(len(name) + len(value) for name, value in headers.raw) > MAX_HEAD_BYTES:
             return 431, f"the headers are longer than {MAX_HEAD_BYTES} bytes"
         if "transfer-encoding" in headers:
-            return 411, "Content-Length is missing; no request needs a body"
+            return 411, "Content-Length is missing"
         length = headers.get("content-length", "0")
         if not (length.isascii() and length.isdigit()):
             return 400, "invalid Content-Length"
         if len(length) > 9 or int(length) > MOST_BODY_BYTES:
-            return 413, f"the body is larger than {MOST_BODY_BYTES} bytes; no request needs one"
+            return 413, f"the body is larger than {MOST_BODY_BYTES} bytes"
         try:
             host = headers.get("host", "")
             self._access.check_host(host)

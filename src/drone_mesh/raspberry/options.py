@@ -22,6 +22,7 @@ from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options,
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
+from drone_mesh.web.tls import Certificate
 
 MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
 TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
@@ -47,6 +48,8 @@ class HttpOptions:
     address: str
     port: int
     token: str  # empty: none
+    names: tuple[str, ...] = ()  # of this machine, beside its host name
+    certificate: Certificate | None = None  # None: plain HTTP
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,14 @@ def parse_gateway(
         help="file with the token that requests must carry, at least 16 characters; without this "
         f"option the environment variable {TOKEN_VARIABLE} is used",
     )
+    http.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        help="another name by which clients ask for this machine; may be given several times",
+    )
+    http.add_argument("--cert", metavar="FILE", type=Path, help="certificate (PEM), for HTTPS")
+    http.add_argument("--key", metavar="FILE", type=Path, help="its private key (PEM)")
     return _options(parser, parser.parse_args(arguments), environment)
 
 
@@ -283,7 +294,10 @@ def _http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) ->
         access_for(parsed.bind, token)
     except ConfigurationError as error:
         raise ConfigurationError(f"{error} (--token-file, or {TOKEN_VARIABLE})") from error
-    return HttpOptions(parsed.bind, parsed.port, token)
+    if (parsed.cert is None) != (parsed.key is None):
+        raise ConfigurationError("--cert and --key are needed together")
+    certificate = None if parsed.cert is None else Certificate(parsed.cert, parsed.key)
+    return HttpOptions(parsed.bind, parsed.port, token, tuple(parsed.name), certificate)
 
 
 def _whole(lowest: int, highest: int) -> Callable[[str], int]:

@@ -152,7 +152,12 @@ def _internet(options: Options) -> MakeInternet | None:
     http = options.http
     if http is None:
         return None
-    return lambda submit: http_internet(submit, http.address, http.port, http.token)
+    settings = {
+        "certificate": http.certificate,
+        "names": http.names,
+        "origin": options.flight.origin,
+    }
+    return lambda submit: http_internet(submit, http.address, http.port, http.token, **settings)
 
 
 class _NoInternet(IInternetConnection):

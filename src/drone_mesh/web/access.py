@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import socket
 from dataclasses import dataclass
+from typing import Iterable
 from urllib.parse import urlsplit
 
 from drone_mesh.errors import ConfigurationError, MeshError
@@ -23,14 +25,23 @@ class AccessDenied(MeshError):
 
 @dataclass(frozen=True)
 class Access:
-    """The rules of one server. Without a token only loopback names are answered."""
+    """The rules of one server. Without a token only loopback names are answered.
+
+    With a token: these names, if any are given, and all addresses in numbers, which cannot be
+    rebound; without any names, all.
+    """
 
     token: str | None = None
+    names: frozenset[str] = frozenset()
 
     def check_host(self, host: str) -> None:
         """`host` is the Host header."""
-        if self.token is None and not is_loopback(_host_name(f"//{host}")):
-            raise AccessDenied(f"{host!r} is not a loopback name of this machine")
+        name = _host_name(f"//{host}")
+        if self.token is None:
+            if not is_loopback(name):
+                raise AccessDenied(f"{host!r} is not a loopback name of this machine")
+        elif self.names and name.lower() not in self.names and not _is_address(name):
+            raise AccessDenied(f"{host!r} is not a name of this machine; --name adds one")
 
     def check_origin(self, origin: str | None, host: str) -> None:
         """`origin` is the Origin header; the requesting page must be ours."""
@@ -49,15 +60,24 @@ class Access:
             )
 
 
-def access_for(bind_address: str, token: str) -> Access:
-    """The rules for a server that listens at this address; an empty token means none."""
+def access_for(bind_address: str, token: str, names: Iterable[str] = ()) -> Access:
+    """The rules for a server that listens at this address; an empty token means none.
+
+    `names` are those that it is asked by, beside addresses in numbers; none: any, with a token.
+    """
     if token and len(token) < SHORTEST_TOKEN:
         raise ConfigurationError(f"token: must have at least {SHORTEST_TOKEN} characters")
     if not token and not is_loopback(bind_address):
         raise ConfigurationError(
             f"address {bind_address}: other machines can reach it; set a token, or use 127.0.0.1"
         )
-    return Access(token or None)
+    return Access(token or None, frozenset(name.lower() for name in names))
+
+
+def own_names(*more: str) -> frozenset[str]:
+    """What this machine is called, and these."""
+    name = socket.gethostname().lower()
+    return frozenset({"localhost", name, f"{name}.local", *(other.lower() for other in more)})
 
 
 def is_loopback(name: str) -> bool:
@@ -68,6 +88,14 @@ def is_loopback(name: str) -> bool:
         return ipaddress.ip_address(name).is_loopback
     except ValueError:
         return False
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
 
 
 def _authority(origin: str) -> str:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Callable
 import uvicorn
 
 from drone_mesh.web.listening import listen
+from drone_mesh.web.prompt_protocol import PromptProtocol
+from drone_mesh.web.tls import Certificate
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
@@ -26,13 +28,24 @@ class ServerThread:
     """
 
     def __init__(
-        self, app: ASGIApp, bind_address: str, port: int, name: str, **settings: Any
+        self,
+        app: ASGIApp,
+        bind_address: str,
+        port: int,
+        name: str,
+        certificate: Certificate | None = None,
+        **settings: Any,
     ) -> None:
         """Take the port (0: any free one). `name` is the thread's, `settings` are uvicorn's.
+
+        With a certificate it speaks HTTPS and nothing else.
 
         Raises ConfigurationError if the port is not available.
         """
         self._bind_address = bind_address
+        self._scheme = "http" if certificate is None else "https"
+        if certificate is not None:
+            settings.update(ssl_certfile=certificate.cert, ssl_keyfile=certificate.key)
         self._socket = listen(bind_address, port)
         self.port: int = self._socket.getsockname()[1]
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -42,10 +55,10 @@ class ServerThread:
             uvicorn.Config(
                 app,
                 loop="asyncio",
-                http="h11",
+                http=PromptProtocol,
                 lifespan="off",
                 log_config=None,
-                log_level=logging.WARNING,
+                log_level=logging.ERROR,  # one line per refused connection would be a flood
                 access_log=False,
                 server_header=False,
                 proxy_headers=False,
@@ -59,7 +72,7 @@ class ServerThread:
     def url(self) -> str:
         """Address of the server, without a path."""
         name = f"[{self._bind_address}]" if ":" in self._bind_address else self._bind_address
-        return f"http://{name}:{self.port}"
+        return f"{self._scheme}://{name}:{self.port}"
 
     def start(self) -> None:
         """Begin to serve; returns when `in_loop` can be used."""

@@ -46,6 +46,7 @@ class DroneEngine(IDroneEngine):
         self._box = box
         self._half_height_m = half_height_m
         self._goals: deque[Vector] = deque()  # filled by any thread, emptied by the world's
+        self._followed: Vector | None = None  # set by any thread, taken by the world's
         self._listeners: list[StateListener] = []
         self._state = DroneState(centre, None, world.now_s)
 
@@ -72,6 +73,11 @@ class DroneEngine(IDroneEngine):
         self._goals.append(Location(latitude, longitude, height + self._half_height_m).to_vector())
         self._world.wake(self)
 
+    def follow(self, centre: Vector) -> None:
+        """Stand at this place from the next step on: somebody else flies the drone. Any thread."""
+        self._followed = centre
+        self._world.wake(self)
+
     def get_location(self) -> Location:
         """Where the underside is, in metres, after the last step. Never raises LocationUnknown."""
         x, y, z = self._state.position
@@ -81,6 +87,9 @@ class DroneEngine(IDroneEngine):
         """Take the goals that wait, fly on to `now_s`; True while in flight. For the world."""
         while self._goals:
             self._take_goal(self._goals.popleft(), now_s)
+        followed, self._followed = self._followed, None
+        if followed is not None:
+            self._move(followed, None, now_s)
         path = self._state.path
         if path is None:
             return False
@@ -88,11 +97,14 @@ class DroneEngine(IDroneEngine):
         # Only a drone that comes down can arrive: a flight straight up passes its goal on the way.
         if path.is_descending(now_s) and _is_close(position, path.goal):
             position, path = path.goal, None
+        self._move(position, path, now_s)
+        return path is not None
+
+    def _move(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
         self._world.move_box(self._box, position)
         self._state = DroneState(position, path, now_s)
         for listener in self._listeners:
             listener(self._state)
-        return path is not None
 
     def _take_goal(self, goal: Vector, now_s: float) -> None:
         position, path, _ = self._state

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable, Iterator
+from typing import Any, Callable, Iterator
 
 import httpx
 import pytest
@@ -26,6 +26,7 @@ class MeshWithHttp:
         token: str = "",
         answer_within_s: float = 10.0,
         before: Callable[[Network], None] = lambda network: None,
+        **settings: Any,
     ) -> None:
         self.network = Network(seed=1)
         self.network.add_gateway(0, 0.0, 0.0)
@@ -39,7 +40,7 @@ class MeshWithHttp:
         self.gateway = gateway
         self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_is_poked=True)
         self.internet = HttpInternet(
-            self.executor.submit, port=0, token=token, answer_within_s=answer_within_s
+            self.executor.submit, port=0, token=token, answer_within_s=answer_within_s, **settings
         )
         self.executor.start()
         self.internet.connect(gateway)

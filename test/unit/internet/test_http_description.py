@@ -36,6 +36,7 @@ def test_the_description_names_all_operations_and_what_may_come_back(mesh):
     assert answers == {
         ("get", "/ready"): ["200", "401", "503", "504"],
         ("get", "/nodes"): ["200", "401", "503", "504"],
+        ("post", "/drones/{id}/goal"): ["200", "400", "401", "409", "422", "503", "504"],
         ("post", "/DroneMovement/{id}/{latitude}/{longitude}/{height}"): [
             "200",
             "401",

@@ -1,90 +1,146 @@
-"""Emulated radios and simulated MAVLink vehicles together: the whole way of a flight."""
+"""Emulated radios and simulated MAVLink vehicles together, under a virtual clock.
+
+Mesh software, radio driver and MAVLink pilot are the real ones; chips, air and vehicles are not.
+"""
 
 from __future__ import annotations
 
-import contextlib
-import time
+import random
+import sys
 from pathlib import Path
-from typing import Callable, Iterator
+from typing import Any
 
 import pytest
 
-from drone_mesh.drone.interfaces import Location
+sys.path.insert(0, str(Path(__file__).parents[1] / "drone"))
+from mavlink_bench import ALL, ORIGIN, Wire
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from drone_mesh.communication.assembly import assemble_component
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, PX4, Autopilot
+from drone_mesh.drone.mavlink.limits import FlightLimits
+from drone_mesh.drone.mavlink.pilot import MavlinkPilot
+from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
+from drone_mesh.errors import LocationUnknown
+from drone_mesh.inprocess.emulated_mesh import EmulatedMesh, EmulatedNode
+from drone_mesh.inprocess.network import NoInternet
 from drone_mesh.layouts import Layouts
-from drone_mesh.raspberry.emulated_air import EmulatedAir
-from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
-from drone_mesh.raspberry.node import RadioNode
-from drone_mesh.raspberry.options import parse_router
-from drone_mesh.raspberry.program import without_internet
+from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.nrf24.emulator.links import IdealDisc
+from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 
-PATIENCE_S = 100.0
-SCALE = 11.0  # the range of an emulated radio is that many times the 9 m of the layout's
+STEP_S = 0.05
+LIMITS = FlightLimits(speed_m_s=4.0, cruise_height_m=3.0, layer_m=0.5)
 GATEWAY = Location(latitude=0.0, longitude=-1.0, height=0.0)
-LAYOUT_202 = {
-    0: GATEWAY,
-    **dict(Layouts.load(Path(__file__).parents[3] / "config" / "casus.yaml").orders(202)),
-}
-OPTIONS = "--emulated 6 --drones mavlink --check-period 2 --connection-lost-after 4 --speed 15"
+CASUS = Path(__file__).parents[3] / "config" / "casus.yaml"
+LAYOUT_202 = {0: GATEWAY, **dict(Layouts.load(CASUS).orders(202))}
 
 
-class LayoutAir(EmulatedAir):
-    """The nodes stand as in layout 202."""
+class VirtualEngine(IDroneEngine):
+    """A MAVLink pilot with its vehicle at the other end of a line, driven by the air's clock."""
 
-    def place(self, node_id: int) -> Location:
-        place = LAYOUT_202[node_id]
-        return Location(SCALE * place.latitude, SCALE * place.longitude, float(place.height))
+    def __init__(self, mesh: EmulatedMesh, node_id: int, home: Location, kind: Autopilot) -> None:
+        self._mesh, self._node_id = mesh, node_id
+        self._down = Wire(OUR_SYSTEM_ID, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
+        self._up = Wire(1, mavlink.MAV_COMP_ID_AUTOPILOT1)
+        self.vehicle = MavlinkVehicle(kind, Origin(*ORIGIN.to_earth(home)), self._up.send)
+        self.pilot = MavlinkPilot(node_id, ORIGIN, LIMITS, ALL, self._down.send)
+        self._goals: list[tuple[Location, bool]] = []
+        self._status = self.pilot.status(mesh.now_s())
+        self._step(None)
+
+    def _step(self, _argument: Any) -> None:
+        now_s = self._mesh.now_s()
+        self.vehicle.tick(now_s)
+        for message in self._up.take():
+            self.pilot.on_message(message, now_s)
+        while self._goals:
+            self.pilot.set_goal(*self._goals.pop(0), now_s)
+        self.pilot.tick(now_s)
+        for message in self._down.take():
+            self.vehicle.on_message(message, now_s)
+        self._status = self.pilot.status(now_s)
+        node = self._mesh.nodes.get(self._node_id)
+        if node is not None and self._status.location is not None:
+            node.chip.position = self._status.location.to_vector()
+        self._mesh.clock.call_at(round((now_s + STEP_S) * NS_PER_S), self._step, None)
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        self._goals.append((Location(latitude, longitude, height), height <= 0.0))
+
+    def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
+        hover_m = LIMITS.layer_height_m(self._node_id)
+        self._goals.append((Location(latitude, longitude, hover_m), False))
+
+    def get_location(self) -> Location:
+        if self._status.location is None:
+            raise LocationUnknown(self._status.location_trouble)
+        return self._status.location
+
+    def why_not_fly(self) -> str:
+        return self._status.why_not_fly
+
+    def is_flying(self) -> bool:
+        return bool(self._goals) or self._status.is_flying
 
 
-@pytest.fixture
-def mesh() -> Iterator[tuple[EmulatedFleet, dict[int, RadioNode]]]:
-    """Layout 202 without hardware: driver, mesh software and engine are the real ones."""
-    options = parse_router(OPTIONS.split(), {})
-    with contextlib.ExitStack() as stack:
-        air = LayoutAir(options.radio, options.emulated)
-        stack.callback(air.close)
-        fleet = EmulatedFleet(options.fleet, options.flight, air)
-        stack.callback(fleet.close)
-        nodes = {}
-        for node_id in LAYOUT_202:
-            internet = None if node_id else without_internet
-            radio = air.radio(node_id, options.radio)
-            node = RadioNode(radio, fleet.engine(node_id), options, internet)
-            stack.callback(node.stop)
-            nodes[node_id] = node
-        for vehicle in fleet.vehicles:
-            vehicle.body.speed_m_s = 20.0
-        yield fleet, nodes
+class FlyingMesh(EmulatedMesh):
+    """Each node has a vehicle."""
 
+    def __init__(self, kind: Autopilot, seed: int) -> None:
+        timing = MeshTiming(check_period_s=5.0, connection_lost_after_s=15.0)
+        super().__init__(VirtualClock(), IdealDisc(9.0), seed, timing=timing)
+        self.engines: dict[int, VirtualEngine] = {}
+        self._kind = kind
 
-def test_layout_202_without_node_1_is_repaired_by_a_drone_that_really_flies(mesh) -> None:
-    fleet, nodes = mesh
-
-    def wait_for(what: str, holds: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + PATIENCE_S
-        while not holds():
-            assert time.monotonic() < deadline, f"not within {PATIENCE_S:g} s: {what}"
-            fleet.move_radios()
-            time.sleep(0.2)
-
-    def connected(*node_ids: int) -> bool:
-        return all(nodes[node_id].component.get_connected_to_gateway() for node_id in node_ids)
-
-    for node in nodes.values():
+    def add(self, node_id: int, place: Location) -> None:
+        rng = random.Random(f"{self._seed} {node_id}")
+        node = EmulatedNode(self.air, node_id, place.to_vector(), self._settings, rng)
+        self.engines[node_id] = VirtualEngine(self, node_id, place, self._kind)
+        node.component = assemble_component(
+            node_id,
+            node.antenna,
+            self.engines[node_id],
+            rng,
+            internet=None if node_id else NoInternet(),
+            timing=self._timing,
+            observer=self.events.append,
+        )
+        self.nodes[node_id] = node
         node.start()
-    wait_for("all can fly", lambda: all(node.engine.can_fly() for node in nodes.values()))
-    wait_for("all are connected", lambda: connected(*nodes))
-    wait_for(
-        "each knows where to step back to",
-        lambda: all(
-            nodes[n].component.get_last_good_known_location_id() in nodes for n in (2, 3, 4, 5)
-        ),
-    )
-    nodes[1].stop()
-    wait_for("2 has lost its connection", lambda: not connected(2))
-    wait_for("2, 3, 4 and 5 are connected again", lambda: connected(2, 3, 4, 5))
-    wait_for("2 has arrived", lambda: not nodes[2].engine.is_flying())
-    place = nodes[2].engine.get_location()
-    goal = LAYOUT_202[1]
-    assert place.latitude == pytest.approx(SCALE * goal.latitude, abs=1.5)
-    assert place.longitude == pytest.approx(SCALE * goal.longitude, abs=1.5)
-    assert place.height > 5.0  # it hovers; nobody ordered it to land
+
+
+@pytest.mark.parametrize("kind", [ARDUPILOT, PX4], ids=lambda a: a.name)
+def test_layout_202_without_node_1_is_repaired_by_drones_that_really_fly(kind: Autopilot) -> None:
+    mesh = FlyingMesh(kind, seed=3)
+    for node_id, place in LAYOUT_202.items():
+        mesh.add(node_id, place._replace(height=0.0))
+    try:
+        assert mesh.run_until(mesh.all_connected, within_s=60.0)
+        mesh.run_for(30.0)  # everything is reported, and each knows where to step back to
+        assert all(engine.can_fly() for engine in mesh.engines.values())
+        mesh.power(1, False)
+        mesh.run_for(10.0)
+        assert not mesh.all_connected()
+        assert mesh.run_until(mesh.all_connected, within_s=240.0)
+        mesh.run_for(30.0)
+        assert mesh.all_connected()
+        flown = {
+            node_id
+            for node_id, engine in mesh.engines.items()
+            if engine.get_location().distance_m(LAYOUT_202[node_id]) > 0.5
+        }
+        assert 2 in flown
+        assert 1 not in flown
+        place, goal = mesh.engines[2].get_location(), LAYOUT_202[1]
+        assert place.latitude == pytest.approx(goal.latitude, abs=1.2)
+        assert place.longitude == pytest.approx(goal.longitude, abs=1.2)
+        for node_id in flown:  # they hover: nobody ordered them to land
+            height_m = LIMITS.layer_height_m(node_id)
+            assert mesh.engines[node_id].get_location().height == pytest.approx(height_m, abs=1.0)
+            assert mesh.engines[node_id].vehicle.body.armed
+    finally:
+        mesh.stop()

@@ -81,9 +81,9 @@ class DroneManager:
         if request.ID > MAX_NODE_ID:
             raise rospy.ServiceException(f"invalid drone id {request.ID}: must be 0..{MAX_NODE_ID}")
         fleet = fleet_if_known()
-        if fleet is not None and fleet.drones <= request.ID:
+        if fleet is not None and fleet.fleet_size <= request.ID:
             raise rospy.ServiceException(
-                f"drone {request.ID} is not in this fleet: its ids are 0..{fleet.drones - 1}"
+                f"drone {request.ID} is not in this fleet: its ids are 0..{fleet.fleet_size - 1}"
             )
         if not self._gateway_is_there():
             _log.warning("drone %d: order dropped, there is no gateway", request.ID)
@@ -111,7 +111,7 @@ class DroneManager:
         if not self._gateway_is_there():
             raise rospy.ServiceException("no gateway is running")
         fleet = fleet_if_known()
-        drones = MAX_NODE_ID + 1 if fleet is None else fleet.drones
+        drones = MAX_NODE_ID + 1 if fleet is None else fleet.fleet_size
         missing = [order.node_id for order in orders if order.node_id >= drones]
         sent, no_route = self._order([o for o in orders if o.node_id < drones], fleet)
         summary = OrderSummary(sent, no_route, missing)

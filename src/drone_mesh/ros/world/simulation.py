@@ -12,6 +12,7 @@ from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.world.drone_views import drone_views
 from drone_mesh.ros.world.engine_server import EngineServer, PositionReporter
+from drone_mesh.ros.world.external_engines import ExternalEngines
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.world.world_runner import WorldRunner
@@ -47,11 +48,14 @@ class Simulation:
 
     def run(self, stop: OrderlyStop) -> None:
         """Offer the engines, start the nodes, and step until `stop` is requested."""
-        reporter = PositionReporter(self._drones)
-        for drone in self._drones:
-            if stop.requested():
-                return
-            EngineServer(drone, reporter)
+        if self._parameters.configuration.drones == "external":
+            ExternalEngines(self._drones)
+        else:
+            reporter = PositionReporter(self._drones)
+            for drone in self._drones:
+                if stop.requested():
+                    return
+                EngineServer(drone, reporter)
         host = self._start_host(stop)
         set_fleet_parameter(self._parameters.configuration)
         MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM).start()

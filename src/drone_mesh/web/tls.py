@@ -1,0 +1,26 @@
+"""The certificate of a server that speaks HTTPS."""
+
+from __future__ import annotations
+
+import ssl
+from dataclasses import dataclass
+from pathlib import Path
+
+from drone_mesh.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """PEM files: the certificate with its chain, and its private key."""
+
+    cert: Path
+    key: Path
+
+    def __post_init__(self) -> None:
+        """Raises ConfigurationError unless both can be read and belong together."""
+        try:
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.cert, self.key)
+        except (OSError, ssl.SSLError) as error:
+            raise ConfigurationError(
+                f"--cert {self.cert} and --key {self.key} cannot be used: {error}"
+            ) from error

@@ -1,0 +1,22 @@
+"""A drone that somebody else flies."""
+
+from __future__ import annotations
+
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.world.drones import RouterDrone
+from drone_mesh.world.still_world import StillWorld
+
+
+def test_a_followed_drone_is_where_it_was_last_reported_and_its_listeners_are_told() -> None:
+    world = StillWorld()
+    drone = RouterDrone(world, 1, 0.0, 0.0)
+    states = []
+    drone.engine.add_listener(states.append)
+    drone.engine.follow((3.0, 4.0, 2.05))
+    drone.engine.follow((3.0, 5.0, 2.05))
+    world.step()
+    assert world.centres[drone.box] == (3.0, 5.0, 2.05)
+    assert drone.engine.get_location().distance_m(Location(5.0, 3.0, 2.0)) < 1e-9
+    assert [state.position for state in states] == [(3.0, 5.0, 2.05)]
+    world.step()
+    assert len(states) == 1
