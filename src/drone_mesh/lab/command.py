@@ -104,6 +104,8 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     show.add_argument("results", type=Path)
     show.add_argument("run_id", metavar="RUN", help="its id, or the beginning of it")
     show.add_argument("--page", type=Path, metavar="FILE", help="write a report page about it")
+    show.add_argument("--console", action="store_true", help="serve it with a time line")
+    show.add_argument("--port", type=int, default=9081, help="of --console (default 9081)")
     show.set_defaults(run=_show)
 
     compare = commands.add_parser("compare", help="paired difference of two cells, per seed")

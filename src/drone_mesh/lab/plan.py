@@ -40,7 +40,8 @@ class Plan:
         self.cells: Sequence[Cell] = loaded.cells
         self.seeds = loaded.experiment.seeds if seeds is None else seeds
         self.own_metrics = tuple(name for name in loaded.experiment.metrics if ":" in name)
-        self._texts = [canonical(cell.scenario) for cell in self.cells]
+        self._texts = [as_json(cell.scenario) for cell in self.cells]
+        self._identities = [identity(cell.scenario) for cell in self.cells]
 
     def __len__(self) -> int:
         return len(self.cells) * self.seeds
@@ -49,8 +50,8 @@ class Plan:
         experiment = self.loaded.experiment
         folder = str(self.loaded.folder.resolve())
         for repetition in range(self.seeds):
-            for cell, text in enumerate(self._texts):
-                run = run_id(text, experiment.seed, repetition, self.own_metrics)
+            for cell, (text, what) in enumerate(zip(self._texts, self._identities)):
+                run = run_id(what, experiment.seed, repetition, self.own_metrics)
                 spec = RunSpec(
                     run, text, experiment.seed, repetition, self.own_metrics, folder,
                     experiment.timeout_s,
@@ -66,16 +67,24 @@ class Plan:
         return list(columns)
 
 
-def canonical(scenario: Scenario) -> str:
-    """The scenario with all its defaults, as one JSON text that is equal for equal scenarios."""
+def as_json(scenario: Scenario) -> str:
+    """The scenario with all its defaults."""
     return json.dumps(scenario.model_dump(mode="json", exclude_none=True), separators=(",", ":"))
 
 
-def run_id(scenario: str, seed: int, repetition: int, own_metrics: Sequence[str]) -> str:
+def identity(scenario: Scenario) -> Any:
+    """What makes a scenario another one: what differs from the defaults.
+
+    So a parameter that a later version adds does not make old runs new ones; a default that a
+    later version changes has to raise SCHEMA.
+    """
+    return scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+
+
+def run_id(what: Any, seed: int, repetition: int, own_metrics: Sequence[str]) -> str:
     """Names a run by what it is: its parameters, seed and what is measured, not by its time."""
-    what = json.dumps([SCHEMA, json.loads(scenario), seed, repetition, list(own_metrics)],
-                      sort_keys=True)  # fmt: skip
-    return hashlib.sha256(what.encode()).hexdigest()[:16]
+    text = json.dumps([SCHEMA, what, seed, repetition, list(own_metrics)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def flatten(content: Any, before: str = "") -> dict[str, str]:

@@ -64,12 +64,18 @@ def show_run(options: argparse.Namespace) -> int:
     results = load_results(options.results)
     shown = replay(results, options.run_id)
     title = f"{results.loaded.experiment.name} {shown.planned.spec.run}"
+    verdict = explain_hash(results, shown)
     if options.page is not None:
         _write_page(options, shown, title)
+    elif options.console:
+        from drone_mesh.lab.replay_server import serve_replay
+
+        print(verdict)  # before it serves, which lasts until Ctrl-C
+        serve_replay(shown.states, shown.record.events, title, options.port)
     else:
         _print_story(shown)
-    verdict = explain_hash(results, shown)
-    print(verdict)
+    if not options.console:
+        print(verdict)
     return 0 if "another run" not in verdict else 1
 
 
