@@ -5,6 +5,9 @@ docs/radio.md, "Checklist G: driver in this project".
 
 from __future__ import annotations
 
+import random
+from functools import partial
+
 import pytest
 from chip_lab import PAYLOAD
 
@@ -86,3 +89,41 @@ def test_row_60_our_packets_and_broadcasts_reach_them(lab, theirs):
     assert theirs.read() == b"\x0b" * 32
     assert not theirs.available()
     assert ours.chip.warnings == []
+
+
+def test_their_packets_are_acknowledged_in_the_middle_of_ten_of_ours(lab, theirs):
+    """Ours send to each other all the time, by rules of access that theirs does not know."""
+    rng = random.Random(1)
+    ours = [lab.driver(node, 10.0 * node) for node in range(10)]
+    ending = []
+
+    def chatter(driver):
+        while not ending:
+            lab.clock.sleep(rng.expovariate(5.0))
+            other = rng.choice([node for node in range(10) if node != driver.node_id])
+            driver.send(other, bytes(rng.choices(range(256), k=32)))
+
+    def listen(driver):
+        got = []
+        while not ending:
+            got += [received.payload for received in driver.receive(0.1)]
+        return got
+
+    def send():
+        theirs.listen = False
+        theirs.open_tx_pipe(bytes.fromhex("05 68 52 4D 54"))
+        confirmed = []
+        for number in range(40):
+            lab.clock.sleep(0.2)
+            if theirs.send(bytes((number,)) * 32) is True:
+                confirmed.append(number)
+            theirs.flush_tx()
+        ending.append(True)
+        return confirmed
+
+    tasks = [partial(chatter, driver) for driver in ours] + [partial(listen, d) for d in ours]
+    confirmed, *results = lab.at_once(send, *tasks)
+    heard_by_5 = results[10 + 5]
+    assert len(confirmed) >= 38  # 16 frames each, and no one sends all the time
+    assert {bytes((number,)) * 32 for number in confirmed} <= set(heard_by_5)
+    assert [warning for driver in ours for warning in driver.chip.warnings] == []
