@@ -52,6 +52,7 @@ class FactoryConfiguration:
     )
     max_distance: float = Field(MAX_DISTANCE_M, gt=0, le=10_000, description="metres")
     radio: Literal["virtual", "nrf24"] = Field("virtual")  # nrf24: the driver on emulated chips
+    data_rate: Literal["250k", "1M", "2M"] = Field("250k")  # of the channel, with radio nrf24
     internet: Literal["mock", "http"] = Field("mock")  # http: gateways also take HTTP orders
     routing: str = Field(
         "child_table_tree", min_length=1, description="the name of a routing technique"

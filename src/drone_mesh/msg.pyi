@@ -131,6 +131,10 @@ class NodeState(Message, NodeStatus):
     position: Sequence[float]
     path: Sequence[float]
     report_age: float
+    airtime: float
+    tries: float
+    queue: int
+    given_up: int
     def __init__(
         self,
         id: int = ...,
@@ -149,6 +153,10 @@ class NodeState(Message, NodeStatus):
         position: Sequence[float] = ...,
         path: Sequence[float] = ...,
         report_age: float = ...,
+        airtime: float = ...,
+        tries: float = ...,
+        queue: int = ...,
+        given_up: int = ...,
     ) -> None: ...
 
 class RequestGatewayDroneFlight(Message):

@@ -27,6 +27,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
+from drone_mesh.communication.medium import ChannelUse
 from drone_mesh.communication.messages import HeartbeatMessage, IntroduceMessage, MessageType
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import (
@@ -253,6 +254,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     def get_repair_status(self) -> str:
         """What the repair does and why, in a few words; empty while nothing is to be repaired."""
         return ""
+
+    def get_channel_use(self) -> ChannelUse:
+        """What the antenna does on a shared channel."""
+        return self._antenna.channel_use()
 
     def get_goal(self) -> Location | None:
         """Where the drone is flying to; None while it is not."""

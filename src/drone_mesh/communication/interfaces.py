@@ -10,7 +10,7 @@ from __future__ import annotations
 import abc
 from typing import NamedTuple, Sequence
 
-from drone_mesh.communication.medium import UNDISTURBED, Medium
+from drone_mesh.communication.medium import UNDISTURBED, ChannelUse, Medium
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
@@ -111,6 +111,10 @@ class IWirelessCommunication(abc.ABC):
     def medium(self) -> Medium:
         """What it sends on. Never changes."""
         return UNDISTURBED
+
+    def channel_use(self) -> ChannelUse:
+        """What this node does on a shared channel. Any thread."""
+        return ChannelUse()
 
     def patience(self) -> float:
         """For how many check periods the mesh should not probe again what is known to work.

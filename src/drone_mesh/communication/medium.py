@@ -38,3 +38,13 @@ class Medium:
 
 
 UNDISTURBED = Medium()
+
+
+@dataclass(frozen=True)
+class ChannelUse:
+    """What one node does on a shared channel; all zero on another medium."""
+
+    airtime: float = 0.0  # share of the last second or more that the node's frames took
+    tries: float = 0.0  # per packet with acknowledgement, since the start
+    waiting: int = 0  # packets in its queue now
+    given_up: int = 0  # packets that no try could deliver, since the start

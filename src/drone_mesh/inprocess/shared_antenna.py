@@ -13,7 +13,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
@@ -22,7 +22,7 @@ from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
 from drone_mesh.nrf24.medium_access import EVERYBODY, Fate, MediumAccess, Outgoing
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
-from drone_mesh.nrf24.statistics import RadioStatistics
+from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
 SETTLING_S = SETTLING_NS / NS_PER_S
@@ -67,12 +67,16 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         self._last_taken: Outgoing | None = None  # the packet that came last on the own address
         self._unread = 0  # payloads in the FIFO
         self._radio = RadioStatistics()
+        self._meter = ChannelMeter(self._clock.now_s)
 
     # IWirelessCommunication ------------------------------------------------------------------
 
     @property
     def medium(self) -> Medium:
         return self._medium
+
+    def channel_use(self) -> ChannelUse:
+        return self._meter.read(self.statistics(), self._clock.now_s)
 
     def patience(self) -> float:
         return self.access.patience

@@ -14,7 +14,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
@@ -23,7 +23,7 @@ from drone_mesh.nrf24.pace import medium_of
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.nrf24.sender import Sender
 from drone_mesh.nrf24.settings import BROADCAST_PIPE
-from drone_mesh.nrf24.statistics import RadioStatistics
+from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.nrf24.transceiver import Received
 
 logger = logging.getLogger(__name__)
@@ -57,6 +57,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._runtime = runtime or SystemRuntime()
         self._sender = Sender(radio, self._runtime, self._given_up)
         self._medium = medium_of(radio.settings)
+        self._meter = ChannelMeter(self._runtime.now_s())
         self._on_payload = on_payload
         self._mesh: IMeshNetwork | None = None
         self._receiving: Task | None = None
@@ -70,6 +71,9 @@ class NRF24HighLevelInterface(IWirelessCommunication):
     @property
     def medium(self) -> Medium:
         return self._medium
+
+    def channel_use(self) -> ChannelUse:
+        return self._meter.read(self.statistics(), self._runtime.now_s())
 
     def patience(self) -> float:
         return self._sender.patience

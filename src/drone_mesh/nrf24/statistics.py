@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drone_mesh.communication.medium import ChannelUse
+
 
 @dataclass
 class RadioStatistics:
@@ -28,3 +30,25 @@ class RadioStatistics:
     def tries_per_packet(self) -> float:
         """Of packets that were delivered or given up; 1 while there are none."""
         return 1.0 + self.tries / self.sent if self.sent else 1.0
+
+
+AIRTIME_WINDOW_S = 1.0  # our choice: the share of airtime is taken over at least this time
+
+
+class ChannelMeter:
+    """Makes the figures for people from the counters of one radio. One thread at a time."""
+
+    def __init__(self, now_s: float) -> None:
+        self._since_s = now_s
+        self._airtime_s = 0.0
+        self._share = 0.0
+
+    def read(self, statistics: RadioStatistics, now_s: float) -> ChannelUse:
+        """The figures now."""
+        passed_s = now_s - self._since_s
+        if passed_s >= AIRTIME_WINDOW_S:
+            self._share = (statistics.airtime_s - self._airtime_s) / passed_s
+            self._since_s, self._airtime_s = now_s, statistics.airtime_s
+        return ChannelUse(
+            self._share, statistics.tries_per_packet, statistics.waiting, statistics.lost
+        )

@@ -37,6 +37,10 @@ class NodeStatus:
     position: Sequence[float] = UNKNOWN_POSITION  # (3,) m, map frame, of the underside
     path: Sequence[float] = ()  # (3 * waypoints,) m, map frame
     report_age: float = 0.0  # wall seconds
+    airtime: float = 0.0  # share of the time that its frames occupy a shared channel
+    tries: float = 0.0  # per packet on a shared channel; 0 on another medium
+    queue: int = 0  # packets that wait to be sent
+    given_up: int = 0  # packets that no try could deliver
 
 
 @dataclass(frozen=True)

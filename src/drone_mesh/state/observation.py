@@ -28,6 +28,9 @@ def describe_component(
     status.fallback = component.get_last_good_known_location_id()
     status.known_nodes = component.get_router_tech_table_size()
     status.total_messages = component.get_total_message_sent()
+    use = component.get_channel_use()
+    status.airtime, status.tries = use.airtime, use.tries
+    status.queue, status.given_up = use.waiting, use.given_up
     heard_s = component.get_neighbours()
     # numpy, because a crowd of 254 has 36,000 neighbours to list twice a second.
     ids = np.fromiter(heard_s, np.uint8, len(heard_s))

@@ -17,6 +17,7 @@ _HEADINGS = (
     "node", "kind", "power", "connected", "gateway", "hops", "neighbours", "known", "sent",
     "position (x, y, z)", "route", "remark",
 )  # fmt: skip
+_CHANNEL_HEADINGS = ("airtime", "tries", "queue", "given up")  # of a shared channel
 
 
 def mesh_table(mesh: MeshStatus, colours: bool) -> str:
@@ -25,9 +26,13 @@ def mesh_table(mesh: MeshStatus, colours: bool) -> str:
     summary = summarise(mesh.nodes, list(troubles.values()))
     speed = "paused" if mesh.paused else f"speed {mesh.achieved_real_time_factor:.2g}x"
     heading = f"t = {mesh.stamp_s:.1f} s, {speed}: {summary.text}"
+    headings: tuple[str, ...] = _HEADINGS
     rows = [_row(node, troubles.get(node.id)) for node in mesh.nodes]
-    widths = [max(len(row[i]) for row in [_HEADINGS, *rows]) for i in range(len(_HEADINGS))]
-    lines = [_line(_HEADINGS, widths), *(_line(row, widths) for row in rows)]
+    if any(node.tries for node in mesh.nodes):
+        headings = _HEADINGS[:-1] + _CHANNEL_HEADINGS + _HEADINGS[-1:]
+        rows = [row[:-1] + _channel(node) + row[-1:] for row, node in zip(rows, mesh.nodes)]
+    widths = [max(len(row[i]) for row in [headings, *rows]) for i in range(len(headings))]
+    lines = [_line(headings, widths), *(_line(row, widths) for row in rows)]
     if colours:
         heading = ansi(heading, summary.severity)
         lines[0] = f"{_BOLD}{lines[0]}{_PLAIN}"
@@ -53,6 +58,15 @@ def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
         _position(node),
         _route(node.route),
         trouble.text if trouble else "",
+    )
+
+
+def _channel(node: NodeStatus) -> tuple[str, ...]:
+    return (
+        f"{100 * node.airtime:.1f} %",
+        f"{node.tries:.2f}",
+        str(node.queue),
+        str(node.given_up),
     )
 
 

@@ -61,3 +61,16 @@ def test_a_paused_mesh_says_so():
     assert mesh_table(MeshStatus(1.0, [], paused=True), colours=False).startswith(
         "t = 1.0 s, paused"
     )
+
+
+def test_on_a_shared_channel_the_table_shows_what_each_node_does_on_it():
+    nodes = [
+        NodeStatus(
+            0, Role.GATEWAY, connected=True, airtime=0.0123, tries=1.25, queue=3, given_up=2
+        ),
+        NodeStatus(1, connected=True, tries=1.0),
+    ]
+    lines = mesh_table(MeshStatus(1.0, nodes), colours=False).splitlines()
+    assert "airtime  tries  queue  given up" in lines[1]
+    assert "1.2 %    1.25   3      2" in lines[2]
+    assert "0.0 %    1.00   0      0" in lines[3]

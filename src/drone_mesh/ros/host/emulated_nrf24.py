@@ -9,10 +9,12 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
+from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.execution import Seat
 from drone_mesh.msg import NRF24
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.statistics import RadioStatistics
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.host.antenna_panel import AntennaPanel
 
@@ -25,8 +27,7 @@ class EmulatedNRF24(IWirelessCommunication):
     Publishes: /Node/<id> (NRF24): the received packets; /Nodes/<id>/debug (NodeDebugInfo)
     Services:  /Nodes/<id>/powerSwitch (PowerSwitch)
 
-    Sends are queued. Setting the chip up blocks the executor's worker for milliseconds, so each
-    node has a worker of its own, as on a Pi.
+    A send only queues the packet; two threads of the antenna send and receive.
     """
 
     def __init__(self, node_id: int, radio: NRF24LowLevelInterface, seat: Seat) -> None:
@@ -48,16 +49,30 @@ class EmulatedNRF24(IWirelessCommunication):
         self._panel.stop()
         self._antenna.stop_antenna()
 
+    @property
+    def medium(self) -> Medium:
+        return self._antenna.medium
+
+    def patience(self) -> float:
+        return self._antenna.patience()
+
+    def channel_use(self) -> ChannelUse:
+        return self._antenna.channel_use()
+
+    def statistics(self) -> RadioStatistics:
+        """The counters of the radio."""
+        return self._antenna.statistics()
+
     def fall_silent(self) -> None:
         """Make every send fail at once from now on. Any thread."""
         self._antenna.fall_silent()
 
     def send_message_to(self, payload: bytes) -> bool:
-        """To the node in byte 3. False: no acknowledgement after all retries."""
+        """Queue it for the node in byte 3. False: invalid, no power, or too many wait."""
         return self._antenna.send_message_to(payload)
 
     def broadcast_message(self, payload: bytes) -> None:
-        """One frame, for every node in range."""
+        """Queue one frame for every node in range."""
         self._antenna.broadcast_message(payload)
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:

@@ -8,12 +8,13 @@ import random
 from typing import Callable, Iterable
 
 from drone_mesh.execution import MeshExecutor, Seat
+from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.nrf24.settings import DataRate, RadioSettings
 from drone_mesh.ros.host.emulated_nrf24 import EmulatedNRF24
 from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
@@ -22,9 +23,10 @@ _log = logging.getLogger(__name__)
 
 
 class EmulatedRadios:
-    """The real driver on emulated chips, in wall time; each node has a worker of its own.
+    """The real driver on emulated chips, in wall time.
 
-    The world's thread sets the positions, in each step in which a drone moves.
+    The antennas queue what the nodes send, so that no send waits for its chip, and one worker
+    drives all nodes. The world's thread sets the positions, in each step in which a drone moves.
     """
 
     own_threads = True
@@ -35,6 +37,7 @@ class EmulatedRadios:
         self,
         drones: Iterable[VirtualDrone],
         max_distance_m: float,
+        rate: DataRate,
         seed: int,
         clock: Callable[[], float],
     ) -> None:
@@ -44,31 +47,49 @@ class EmulatedRadios:
         """
         self._wall_clock = WallClock()
         links = LogDistance.with_edge_at(max_distance_m, random.Random(f"{seed} links"))
-        air = Air(self._wall_clock, links, random.Random(f"{seed} air"))
+        self._air = Air(self._wall_clock, links, random.Random(f"{seed} air"))
+        self._settings = RadioSettings(data_rate=rate)
         self._seed = seed
-        self._clock = clock
+        self._executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_node")
+        self._airtime_s, self._measured_s = 0.0, 0.0
         self._chips: dict[int, EmulatedChip] = {}
         self._antennas: list[EmulatedNRF24] = []
-        self._executors: list[MeshExecutor] = []  # one per node
         for drone in drones:
-            chip = EmulatedChip(air, f"node {drone.node_id}", drone.engine.state.position)
+            chip = EmulatedChip(self._air, f"node {drone.node_id}", drone.engine.state.position)
             drone.engine.add_listener(functools.partial(_carry, chip))
             self._chips[drone.node_id] = chip
         _log.info(
-            "radio nrf24: the real driver on %d emulated chips, range %g m",
+            "radio nrf24: the real driver on %d emulated chips, range %g m, %d kbit/s",
             len(self._chips),
             max_distance_m,
+            rate.value // 1000,
         )
 
+    def figures(self) -> dict[str, float]:
+        """Of the air and all radios. One thread."""
+        with self._wall_clock.access():
+            frames, collisions = self._air.frames, self._air.collisions
+            airtime_s, now_s = self._air.airtime_s, self._wall_clock.now_ns / NS_PER_S
+        share = (airtime_s - self._airtime_s) / max(now_s - self._measured_s, 1e-9)
+        self._airtime_s, self._measured_s = airtime_s, now_s
+        radios = [antenna.statistics() for antenna in list(self._antennas)]
+        tries, sent = (sum(r.tries for r in radios), sum(r.sent for r in radios))
+        return {
+            "frames": frames,
+            "collisions": collisions,
+            "airtime share": round(share, 3),
+            "tries per packet": round(1 + tries / max(sent, 1), 2),
+            "packets waiting": sum(radio.waiting for radio in radios),
+            "packets given up": sum(radio.lost for radio in radios),
+        }
+
     def start(self) -> None:
-        """Nothing to do: the air is there."""
+        """Start the worker."""
+        self._executor.start()
 
     def seat(self) -> Seat:
-        """A worker of its own, as on a Pi: setting a chip up blocks it for milliseconds."""
-        executor = MeshExecutor(self._clock, clock_is_poked=True, name="mesh_node")
-        executor.start()
-        self._executors.append(executor)
-        return executor.seat()
+        """A place in the worker of all nodes."""
+        return self._executor.seat()
 
     def antenna(self, node_id: int, seat: Seat) -> EmulatedNRF24:
         """The antenna of a node, with a driver for its chip."""
@@ -78,7 +99,7 @@ class EmulatedRadios:
             chip.ce,
             chip.irq,
             node_id=node_id,
-            settings=RadioSettings(),
+            settings=self._settings,
             runtime=self._wall_clock.runtime,
             rng=random.Random(f"{self._seed} radio {node_id}"),
         )
@@ -88,8 +109,7 @@ class EmulatedRadios:
 
     def time_advanced(self) -> None:
         """Simulated time was moved."""
-        for executor in list(self._executors):
-            executor.time_advanced()
+        self._executor.time_advanced()
 
     def fall_silent(self) -> None:
         """Make every send of every node fail at once from now on."""
@@ -97,9 +117,8 @@ class EmulatedRadios:
             antenna.fall_silent()
 
     def close(self) -> None:
-        """Stop the workers and the air; returns when their threads have ended."""
-        for executor in self._executors:
-            executor.stop()
+        """Stop the worker and the air; returns when their threads have ended."""
+        self._executor.stop()
         self._wall_clock.close()
 
 

@@ -119,6 +119,7 @@ class MeshHost:
         return {
             WORST_LAG: self.executor.take_worst_lag_s(),
             LOST_IN_RANGE: self._radios.never_handed_over,
+            **self._radios.figures(),
         }
 
     def _submit_start(self, node_id: int, on_start: Callable[[], None]) -> None:

@@ -24,6 +24,9 @@ class Radios(Protocol):
     def never_handed_over(self) -> int:
         """Packets, since the start, that the simulated air never received."""
 
+    def figures(self) -> dict[str, float]:
+        """Of the channel that all nodes share, for people; empty if they do not share one."""
+
     def start(self) -> None:
         """Get ready; does not wait for it."""
 
@@ -61,6 +64,10 @@ class VirtualRadios:
     def never_handed_over(self) -> int:
         """Packets, since the start, that no simulator accepted."""
         return self._link.never_handed_over
+
+    def figures(self) -> dict[str, float]:
+        """None: packets do not meet on an ideal disc."""
+        return {}
 
     def start(self) -> None:
         """Look for a simulator from now on."""

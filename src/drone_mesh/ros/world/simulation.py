@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from drone_mesh.nrf24.settings import data_rate
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.fleet_parameter import set_fleet_parameter
 from drone_mesh.ros.graph.master_watch import MasterWatch
@@ -73,7 +74,11 @@ class Simulation:
         radios = None
         if configuration.radio == "nrf24":
             radios = EmulatedRadios(
-                self._drones, configuration.max_distance, configuration.seed, lambda: world.now_s
+                self._drones,
+                configuration.max_distance,
+                data_rate(configuration.data_rate),
+                configuration.seed,
+                lambda: world.now_s,
             )
         else:
             _log.info("radio virtual: an ideal disc, range %g m", configuration.max_distance)
