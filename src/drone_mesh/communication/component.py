@@ -18,6 +18,7 @@ from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
 from drone_mesh.communication.forwarding import Forwarding
+from drone_mesh.communication.frames import CommonFrame
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -99,6 +100,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             node_id, routing, self._delivery, self.complaints, self._report
         )
         self.places = KnownPlaces()
+        self._frame = CommonFrame(engine.frame_digest())
         self._pilot = Pilot(engine, self._deadlines, self.complaints)
         self._parts = NodeParts(
             node_id,
@@ -186,6 +188,11 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._routing.can_communicate_with_node(from_)
         elif not self._routing.learn(creator, from_, kind, payload):
             return
+        if kind == _PRESENT and creator == from_ and not self._frame.heard(creator, payload):
+            self.complaints.add("another origin", f"that of node {creator}", now_s)
+        if self._frame.refuses(from_, kind):
+            self._drop("a place from a node whose origin is another, or not known yet", payload)
+            return
         if forward not in (me, BROADCAST):
             if kind == _HEARTBEAT:
                 self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
@@ -272,9 +279,11 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         payload = IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
         room = messages.extension_room(MessageType.PRESENT)
         extension = self._routing.extension(MessageType.PRESENT, room)
-        self._antenna.broadcast_message(
-            messages.extended(payload, extension) if extension else payload
-        )
+        if extension:
+            payload = messages.extended(payload, extension)
+        if self._frame.digest:
+            payload = messages.with_frame_digest(payload, self._frame.digest)
+        self._antenna.broadcast_message(payload)
         if connected:
             self._search_again_s = self._antenna.medium.search_s
         elif self._search_again_s:

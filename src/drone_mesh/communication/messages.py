@@ -259,6 +259,8 @@ AnyMessage = Union[Message, _TypedMessage]
 _GATEWAY_PLACE = struct.Struct("<BBffh")  # age + 1 in seconds, id, latitude, longitude, height
 _GATEWAY_PLACE_AT = HEADER_BYTES + LocationMessage.BODY.size
 _OLDEST_AGE_S = 254
+_FRAME_DIGEST = struct.Struct("<H")
+_FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
 _EXTENSION_AT = {  # places of the first byte behind a body that can be extended
@@ -360,12 +362,13 @@ def hops(payload: bytes) -> int:
 
 def extension_room(kind: int) -> int:
     """The number of bytes behind the body that a routing technique may use; 0 for most types."""
-    return PAYLOAD_BYTES - _EXTENSION_AT[kind] if kind in _EXTENSION_AT else 0
+    return _extension_end(kind) - _EXTENSION_AT[kind] if kind in _EXTENSION_AT else 0
 
 
 def extension(payload: bytes) -> bytes:
     """The bytes behind the body of a PRESENT or a HEARTBEAT; zero where no technique uses them."""
-    return payload[_EXTENSION_AT[payload[_TYPE]] :]
+    kind = payload[_TYPE]
+    return payload[_EXTENSION_AT[kind] : _extension_end(kind)]
 
 
 def extended(payload: bytes, extension: bytes) -> bytes:
@@ -373,10 +376,24 @@ def extended(payload: bytes, extension: bytes) -> bytes:
 
     Raises PacketError if they do not fit.
     """
-    at = _EXTENSION_AT[payload[_TYPE]]
-    if len(extension) > PAYLOAD_BYTES - at:
-        raise PacketError(f"{len(extension)} extension bytes do not fit into {PAYLOAD_BYTES - at}")
+    at, room = _EXTENSION_AT[payload[_TYPE]], extension_room(payload[_TYPE])
+    if len(extension) > room:
+        raise PacketError(f"{len(extension)} extension bytes do not fit into {room}")
     return payload[:at] + extension + payload[at + len(extension) :]
+
+
+def _extension_end(kind: int) -> int:
+    return _FRAME_DIGEST_AT if kind == MessageType.PRESENT else PAYLOAD_BYTES
+
+
+def frame_digest(present: bytes) -> int:
+    """The digest of its creator's origin that a PRESENT carries; 0: it has none."""
+    return int(_FRAME_DIGEST.unpack_from(present, _FRAME_DIGEST_AT)[0])
+
+
+def with_frame_digest(present: bytes, digest: int) -> bytes:
+    """The same PRESENT with this digest."""
+    return present[:_FRAME_DIGEST_AT] + _FRAME_DIGEST.pack(digest)
 
 
 def body(payload: bytes) -> bytes:

@@ -36,7 +36,8 @@ def create_engine(node_id: int, location: Location | None, options: FlightOption
     Raises ConfigurationError if the engine cannot be had.
     """
     if options.drone == GROUND:
-        return GroundEngine(node_id, location)
+        digest = options.origin.digest if options.origin is not None else 0
+        return GroundEngine(node_id, location, digest)
     if options.drone.startswith(MAVLINK):
         return _mavlink_engine(node_id, options)
     return _own_engine(node_id, options.drone)

@@ -9,8 +9,9 @@ from drone_mesh.errors import GoalRefused, LocationUnknown
 class GroundEngine(IDroneEngine):
     """Stays where it is and refuses each goal. Any thread may call it."""
 
-    def __init__(self, node_id: int, location: Location | None) -> None:
+    def __init__(self, node_id: int, location: Location | None, frame_digest: int = 0) -> None:
         """`location` None: it is not known where the node stands."""
+        self._frame_digest = frame_digest
         self._node_id = node_id
         self._location = location
 
@@ -23,6 +24,10 @@ class GroundEngine(IDroneEngine):
         if self._location is None:
             raise LocationUnknown("no position was given; use --latitude and --longitude")
         return self._location
+
+    def frame_digest(self) -> int:
+        """That of --origin."""
+        return self._frame_digest
 
     def why_not_fly(self) -> str:
         """It never flies."""

@@ -74,5 +74,12 @@ class IDroneEngine(abc.ABC):
         """
         self.set_goal(latitude, longitude, height)
 
+    def frame_digest(self) -> int:
+        """A number 1..65535 for the origin that its places are counted from; 0: it has none.
+
+        Nodes take places only from nodes with the same number.
+        """
+        return 0
+
     def close(self) -> None:  # noqa: B027 - most engines hold nothing
         """Release what the engine holds. Called once, after the last other call."""

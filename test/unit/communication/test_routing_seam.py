@@ -59,12 +59,12 @@ def test_extension_bytes_follow_the_body_of_a_heartbeat(rig):
 def test_a_technique_is_told_how_many_bytes_fit(rig):
     rig.hear("02 02 03 01 fe 00 01")
     rig.mesh.search_other_nodes_in_range()
-    assert rig.routing.rooms == {3: 25, 4: 24}
+    assert rig.routing.rooms == {3: 23, 4: 24}
 
 
 def test_extension_bytes_that_do_not_fit_are_an_error_of_the_technique(rig):
     rig.routing.bytes = bytes(26)
-    with pytest.raises(PacketError, match="26 extension bytes do not fit into 25"):
+    with pytest.raises(PacketError, match="26 extension bytes do not fit into 23"):
         rig.mesh.search_other_nodes_in_range()
 
 

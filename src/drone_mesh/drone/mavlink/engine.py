@@ -37,6 +37,7 @@ class MavlinkEngine(IDroneEngine):
     ) -> None:
         """Open the link. Raises ConfigurationError if that cannot be done."""
         self._node_id = node_id
+        self._origin = origin
         self._limits = limits
         self._link = MavlinkLink(address)
         self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send)
@@ -78,6 +79,10 @@ class MavlinkEngine(IDroneEngine):
     def is_flying(self) -> bool:
         """Whether a flight to a goal is under way."""
         return bool(self._goals) or self.status().is_flying
+
+    def frame_digest(self) -> int:
+        """That of --origin."""
+        return self._origin.digest
 
     def status(self) -> PilotStatus:
         """The last look at the drone; without a place if that is too long ago."""

@@ -1,0 +1,35 @@
+"""CommonFrame: whether another node's metres are those of this node.
+
+Drones that count from different origins must not fly to each other's places. Each node's PRESENT
+carries a digest of its origin; a place is taken only from a neighbour with the same one. As each
+neighbour does the same, no place crosses the border between two frames, over any number of hops.
+"""
+
+from __future__ import annotations
+
+from drone_mesh.communication.messages import MessageType, frame_digest
+
+NO_FRAME = 0  # the digest of a node without an origin, and of nodes that know nothing of origins
+_WITH_PLACES = frozenset((int(MessageType.LOCATION), int(MessageType.MOVE_TO_LOCATION)))
+
+
+class CommonFrame:
+    """What the neighbours said of their frames. Belongs to the component's thread."""
+
+    def __init__(self, digest: int) -> None:
+        """`digest` is this node's own."""
+        self.digest = digest
+        self._of: dict[int, int] = {}  # neighbour -> its digest
+
+    def heard(self, neighbour: int, present: bytes) -> bool:
+        """Take a neighbour's PRESENT; whether its frame is ours."""
+        self._of[neighbour] = frame_digest(present)
+        return self._of[neighbour] == self.digest
+
+    def refuses(self, from_: int, kind: int) -> bool:
+        """Whether a packet of this type from this neighbour may hold places of another frame.
+
+        A node with an origin waits for a neighbour's PRESENT; one without takes a neighbour that
+        has not presented itself for one without an origin too.
+        """
+        return kind in _WITH_PLACES and self._of.get(from_, NO_FRAME) != self.digest

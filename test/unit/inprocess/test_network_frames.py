@@ -1,0 +1,81 @@
+"""Nodes that count their metres from different origins."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+from scenarios import line
+
+from drone_mesh.communication.frames import CommonFrame
+from drone_mesh.communication.messages import IntroduceMessage, frame_digest, with_frame_digest
+from drone_mesh.inprocess.drone import InProcessDrone
+
+ONE, OTHER = 0x1234, 0x4321
+LOCATION, HEARTBEAT, MOVE_TO_LOCATION = 1, 4, 6
+
+
+@pytest.fixture
+def two_frames(monkeypatch):
+    """Nodes beyond 10 m count from another origin."""
+    monkeypatch.setattr(
+        InProcessDrone,
+        "frame_digest",
+        lambda self: OTHER if self.get_location().longitude > 10.0 else ONE,
+    )
+
+
+def test_the_digest_stands_in_the_last_two_bytes_of_a_present():
+    present = IntroduceMessage(7, 7, 254, 254, 3, True).to_payload()
+    assert with_frame_digest(present, ONE).hex() == "070703fefe0301" + "00" * 23 + "3412"
+    assert frame_digest(with_frame_digest(present, ONE)) == ONE
+    assert frame_digest(present) == 0
+
+
+def test_places_never_cross_the_border_between_two_frames(two_frames, caplog):
+    caplog.set_level(logging.WARNING)
+    network = line(3, spacing=6.0)  # 0 and 1 count from one origin, 2 and 3 from the other
+    network.run_for(120.0)
+    assert network.all_connected()  # packets without places pass
+    places = {n: node.component.places for n, node in network.nodes.items()}
+    assert places[1].gateway is not None
+    assert places[2].gateway is None
+    assert places[3].gateway is None
+    assert network.order(3, 1.0, 1.0)  # there is a route; the order is dropped on it
+    network.run_for(10.0)
+    assert all(node.drone.path is None for node in network.nodes.values())
+    assert "another origin: that of node 2" in caplog.text
+    network.power(1, False)
+    network.run_for(300.0)
+    assert network.nodes[2].drone.get_location().longitude == 12.0
+    assert network.nodes[3].drone.get_location().longitude == pytest.approx(18.0, abs=6.1)
+
+
+def test_a_mesh_with_one_origin_is_repaired_as_ever(monkeypatch):
+    monkeypatch.setattr(InProcessDrone, "frame_digest", lambda self: ONE)
+    network = line(2, spacing=8.0)
+    network.run_for(40.0)
+    network.power(1, False)
+    assert network.run_until(lambda: network.connected(2), within_s=150.0)
+
+
+@pytest.mark.parametrize(
+    ("own", "heard", "refused"),
+    [
+        (0, None, False),
+        (0, 0, False),
+        (0, ONE, True),
+        (ONE, None, True),
+        (ONE, 0, True),
+        (ONE, OTHER, True),
+        (ONE, ONE, False),
+    ],
+)
+def test_a_place_is_taken_only_from_a_neighbour_with_the_same_origin(own, heard, refused):
+    frame = CommonFrame(own)
+    if heard is not None:
+        present = IntroduceMessage(2, 2, 254, 254, 3, True).to_payload()
+        frame.heard(2, with_frame_digest(present, heard))
+    for kind in (LOCATION, MOVE_TO_LOCATION):
+        assert frame.refuses(2, kind) is refused
+    assert not frame.refuses(2, HEARTBEAT)
