@@ -146,7 +146,13 @@ def make_api(desk: GatewayDesk, access: Access, origin: Optional[Origin] = None)
             raise HTTPException(401, reason, headers={"WWW-Authenticate": "Bearer"})
 
     refusals: Responses = {
+        400: {"model": Refusal, "description": "Invalid Content-Length"},
         401: {"model": Refusal, "description": "Token missing or invalid"},
+        403: {"model": Refusal, "description": "Sent by a page of another site"},
+        411: {"model": Refusal, "description": "A body of unknown length"},
+        413: {"model": Refusal, "description": "Body too large; no request needs one"},
+        414: {"model": Refusal, "description": "Address too long"},
+        431: {"model": Refusal, "description": "Headers too large"},
         503: {"model": Refusal, "description": "Not done; nothing was sent"},
         504: {"model": Refusal, "description": "Started, but not finished in time"},
     }

@@ -33,15 +33,11 @@ def test_the_description_names_all_operations_and_what_may_come_back(mesh):
         for path, methods in paths.items()
         for method, operation in methods.items()
     }
+    by_the_guard = {"400", "403", "411", "413", "414", "431"}
+    always = {"200", "401", "503", "504", *by_the_guard}
     assert answers == {
-        ("get", "/ready"): ["200", "401", "503", "504"],
-        ("get", "/nodes"): ["200", "401", "503", "504"],
-        ("post", "/drones/{id}/goal"): ["200", "400", "401", "409", "422", "503", "504"],
-        ("post", "/DroneMovement/{id}/{latitude}/{longitude}/{height}"): [
-            "200",
-            "401",
-            "422",
-            "503",
-            "504",
-        ],
+        ("get", "/ready"): sorted(always),
+        ("get", "/nodes"): sorted(always),
+        ("post", "/drones/{id}/goal"): sorted(always | {"409", "422"}),
+        ("post", "/DroneMovement/{id}/{latitude}/{longitude}/{height}"): sorted(always | {"422"}),
     }
