@@ -169,7 +169,8 @@ class RadioSettings:
             Register.RX_PW_P4: 0,
             Register.RX_PW_P5: 0,
             Register.DYNPD: 0,
-            Register.FEATURE: EN_DYN_ACK.put(1),
+            # A chip without "+" has no FEATURE, and plain frames need none.
+            Register.FEATURE: EN_DYN_ACK.put(int(self.broadcast_mode is BroadcastMode.NO_ACK)),
         }
         return {
             **{register: bytes((value,)) for register, value in plain.items()},

@@ -19,7 +19,7 @@ class SpiDevice(Protocol):
         """Release the device."""
 
 
-def open_spi(bus: int = 0, device: int = 0) -> SpiDevice:
+def open_spi(bus: int = 0, device: int = 0, hz: int = SPI_HZ) -> SpiDevice:
     """Open /dev/spidev<bus>.<device>; HardwareUnavailable names what is missing and the remedy."""
     path = f"/dev/spidev{bus}.{device}"
     try:
@@ -44,6 +44,6 @@ def open_spi(bus: int = 0, device: int = 0) -> SpiDevice:
     except OSError as error:
         raise HardwareUnavailable(f"cannot open {path}: {error.strerror or error}") from error
     spi.mode = 0
-    spi.max_speed_hz = SPI_HZ
+    spi.max_speed_hz = hz
     opened: SpiDevice = spi
     return opened

@@ -184,7 +184,8 @@ class Transceiver:
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes & ~ENAA[0].mask)
         self.drop()
-        self._write_payload(payload, Command.W_TX_PAYLOAD_NO_ACK)
+        # On a pipe without auto-acknowledgement an ordinary payload asks for none.
+        self._write_payload(payload, Command.W_TX_PAYLOAD if plain else Command.W_TX_PAYLOAD_NO_ACK)
         self._pulse(settings.broadcast_s)
         self._statistics.airtime_s += settings.frame_s
         self._link.write_byte(Register.STATUS, TX_DS.mask)

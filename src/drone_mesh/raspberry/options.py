@@ -6,7 +6,7 @@ import argparse
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Callable, Mapping, Sequence
+from typing import Mapping, Sequence
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_technique
@@ -16,10 +16,11 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
-from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
-from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings
+from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
+from drone_mesh.nrf24.spi import SPI_HZ
 from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
+from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
 from drone_mesh.web.tls import Certificate
@@ -27,7 +28,6 @@ from drone_mesh.web.tls import Certificate
 MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
 TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
 LOG_LEVELS = ("debug", "info", "warning", "error")
-HIGHEST_GPIO = 27  # of the 40-pin header
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
@@ -39,6 +39,7 @@ class Hardware:
     spi: tuple[int, int]  # bus, device
     ce_gpio: int
     irq_gpio: int | None  # None: the radio is polled
+    spi_hz: int = SPI_HZ
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def parse_router(
     )
     node = parser.add_mutually_exclusive_group(required=True)
     node.add_argument(
-        "--id", type=_whole(0, MAX_NODE_ID), help="node id, 0..253, unique in the mesh"
+        "--id", type=whole(0, MAX_NODE_ID), help="node id, 0..253, unique in the mesh"
     )
     _add_emulated(node)
     return _options(parser, parser.parse_args(arguments), environment)
@@ -96,7 +97,7 @@ def parse_gateway(
     node = parser.add_mutually_exclusive_group()
     node.add_argument(
         "--id",
-        type=_whole(0, MAX_NODE_ID),
+        type=whole(0, MAX_NODE_ID),
         default=0,
         help="node id, 0..253, unique in the mesh (default: %(default)s)",
     )
@@ -111,7 +112,7 @@ def parse_gateway(
     )
     http.add_argument(
         "--port",
-        type=_whole(1, MAX_PORT),
+        type=whole(1, MAX_PORT),
         default=DEFAULT_PORT,
         help="TCP port (default: %(default)s)",
     )
@@ -139,37 +140,24 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         description=description,
         epilog="All nodes of a mesh need the same channel, rate, CRC and broadcast mode.",
     )
-    wiring = parser.add_argument_group("wiring")
-    wiring.add_argument(
-        "--spi",
-        type=_spi_device,
-        default=(0, 0),
-        metavar="BUS.DEVICE",
-        help="SPI device, as in /dev/spidevBUS.DEVICE (default: 0.0)",
-    )
-    wiring.add_argument(
-        "--ce",
-        type=_whole(0, HIGHEST_GPIO),
-        default=CE_GPIO,
-        metavar="GPIO",
-        help="GPIO of the CE pin (default: %(default)s, which is pin 22 of the header)",
-    )
-    wiring.add_argument(
-        "--irq",
-        type=_whole(0, HIGHEST_GPIO),
-        metavar="GPIO",
-        help=f"GPIO of the IRQ pin, {IRQ_GPIO} for pin 18 of the header "
-        "(default: not connected, the radio is polled)",
-    )
+    add_wiring_options(parser)
     radio = parser.add_argument_group("radio")
     radio.add_argument(
         "--channel",
-        type=_whole(0, 125),
+        type=whole(0, 125),
         default=1,
         help="0..125, at 2400 + CHANNEL MHz (default: %(default)s)",
     )
     radio.add_argument(
         "--rate", choices=DATA_RATES, default="250k", help="bits per second (default: %(default)s)"
+    )
+    radio.add_argument(
+        "--power",
+        type=int,
+        choices=[power.value for power in TxPower],
+        default=TxPower.DBM_0.value,
+        help="dBm, into the amplifier where a module has one; 100 mW (20 dBm) in all is the limit "
+        "in Europe (default: %(default)s)",
     )
     radio.add_argument(
         "--crc",
@@ -234,7 +222,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
 def _add_emulated(node: argparse._MutuallyExclusiveGroup) -> None:
     node.add_argument(
         "--emulated",
-        type=_whole(2, MOST_EMULATED),
+        type=whole(2, MOST_EMULATED),
         default=0,
         metavar="N",
         help=f"without hardware: run N nodes (2..{MOST_EMULATED}) on emulated radios, a gateway "
@@ -258,10 +246,11 @@ def _options(
         create_routing_technique(parsed.routing)
         return Options(
             node_id=parsed.id or 0,
-            hardware=Hardware(parsed.spi, parsed.ce, parsed.irq),
+            hardware=Hardware(parsed.spi, parsed.ce, parsed.irq, parsed.spi_hz),
             radio=RadioSettings(
                 channel=parsed.channel,
                 data_rate=DATA_RATES[parsed.rate],
+                power=TxPower(parsed.power),
                 crc_bytes=parsed.crc // 8,
                 broadcast_mode=_BROADCASTS[parsed.broadcast],
             ),
@@ -298,27 +287,3 @@ def _http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) ->
         raise ConfigurationError("--cert and --key are needed together")
     certificate = None if parsed.cert is None else Certificate(parsed.cert, parsed.key)
     return HttpOptions(parsed.bind, parsed.port, token, tuple(parsed.name), certificate)
-
-
-def _whole(lowest: int, highest: int) -> Callable[[str], int]:
-    def whole(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            number = lowest - 1
-        if not lowest <= number <= highest:
-            raise argparse.ArgumentTypeError(
-                f"invalid value {text!r}: must be a whole number {lowest}..{highest}"
-            )
-        return number
-
-    return whole
-
-
-def _spi_device(text: str) -> tuple[int, int]:
-    bus, dot, device = text.partition(".")
-    if not (dot and bus.isdecimal() and device.isdecimal()):
-        raise argparse.ArgumentTypeError(
-            f"invalid SPI device {text!r}: must be BUS.DEVICE, as in 0.0"
-        )
-    return int(bus), int(device)

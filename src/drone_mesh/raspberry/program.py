@@ -118,7 +118,7 @@ def _open_radio(
     node_id: int, hardware: Hardware, settings: RadioSettings
 ) -> NRF24LowLevelInterface:
     with contextlib.ExitStack() as opened:
-        spi = open_spi(*hardware.spi)
+        spi = open_spi(*hardware.spi, hardware.spi_hz)
         opened.callback(spi.close)
         ce = GpiodCe(hardware.ce_gpio)
         opened.callback(ce.close)

@@ -139,9 +139,19 @@ class Lab:
         ptx = self.wires("ptx").become_ptx(**settings)
         return ptx, self.wires("prx", 100.0).become_prx(**settings)
 
-    def driver(self, node_id, x_m=0.0, *, irq=True, begin=True, settings=None, **settings_changes):
+    def driver(
+        self,
+        node_id,
+        x_m=0.0,
+        *,
+        irq=True,
+        begin=True,
+        plus=True,
+        settings=None,
+        **settings_changes,
+    ):
         """Our driver on a chip of its own; the chip is `driver.chip`."""
-        chip = EmulatedChip(self.air, f"node {node_id}", (x_m, 0.0, 0.0))
+        chip = EmulatedChip(self.air, f"node {node_id}", (x_m, 0.0, 0.0), ChipVariant(plus=plus))
         self.chips.append(chip)
         driver = NRF24LowLevelInterface(
             chip.spi,

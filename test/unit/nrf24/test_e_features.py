@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from chip_lab import BROADCAST_ADDRESS, PAYLOAD
 
+from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Command, Register
-from drone_mesh.nrf24.settings import BroadcastMode
+from drone_mesh.nrf24.settings import BroadcastMode, DataRate
 
 
 def dynamic(wires, feature=0x04):
@@ -104,3 +105,27 @@ def test_the_polarity_of_the_no_ack_bit_separates_clones_from_genuine_chips(lab)
     prx = lab.wires("genuine", 100.0).become_prx()
     assert ptx.send() == 0x10
     assert prx.unload_all() == [(2, PAYLOAD)]
+
+
+def test_chips_without_plus_work_beside_plus_chips_in_shockburst_mode(lab):
+    """They have no FEATURE register (it reads 0) and no 250 kbit/s."""
+    settings = {"broadcast_mode": BroadcastMode.SHOCKBURST, "data_rate": DataRate.MBPS_1}
+    plain = lab.driver(1, 0.0, plus=False, **settings)
+    plus = lab.driver(2, 10.0, **settings)
+    other_plain = lab.driver(3, 20.0, plus=False, **settings)
+    for sender, receivers in (
+        (plain, (plus, other_plain)),
+        (plus, (plain, other_plain)),
+    ):
+        payload = bytes((sender.node_id,)) * 32
+        assert sender.broadcast(payload)
+        for receiver in receivers:
+            assert [got.payload for got in receiver.receive(0.1)] == [payload]
+            assert sender.send(receiver.node_id, payload)
+            assert [got.payload for got in receiver.receive(0.1)] == [payload]
+    assert plain.chip.registers.read(Register.FEATURE) == b"\0"
+
+
+def test_a_chip_without_plus_is_refused_in_the_mode_that_it_cannot_do(lab):
+    with pytest.raises(RadioError, match="FEATURE was written as 01 and reads as 00"):
+        lab.driver(1, plus=False, data_rate=DataRate.MBPS_1)

@@ -52,7 +52,7 @@ def wired(monkeypatch):
     clock = WallClock()
     chip = EmulatedChip(Air(clock, IdealDisc(), random.Random(1)), "the chip")
     chip.pins = {5: Pin(chip.ce), 6: Pin(chip.irq)}
-    monkeypatch.setattr(program, "open_spi", lambda bus, device: {(0, 1): chip.spi}[bus, device])
+    monkeypatch.setattr(program, "open_spi", lambda *where: {(0, 1): chip.spi}[where[:2]])
     monkeypatch.setattr(program, "GpiodCe", chip.pins.__getitem__)
     monkeypatch.setattr(program, "GpiodIrq", chip.pins.__getitem__)
     yield chip

@@ -11,7 +11,7 @@ from drone_mesh.drone import Location
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
+from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings, TxPower
 from drone_mesh.raspberry.emulated_fleet import FleetOptions
 from drone_mesh.raspberry.options import (
     Hardware,
@@ -43,7 +43,8 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
 
 def test_each_option_reaches_what_it_is_for():
     line = (
-        "--id 253 --spi 1.2 --ce 22 --irq 24 --channel 76 --rate 2M --crc 8 --broadcast shockburst "
+        "--id 253 --spi 1.2 --spi-hz 1000000 --ce 22 --irq 24 --channel 76 --rate 2M --crc 8 "
+        "--power -12 --broadcast shockburst "
         "--check-period 5 --connection-lost-after 60 --latitude 10 --longitude -20.5 "
         "--height 3 --log-level debug --routing drone_mesh.communication.child_table_tree:"
         "ChildTableTree "
@@ -53,10 +54,11 @@ def test_each_option_reaches_what_it_is_for():
     )
     assert parse_router(line.split(), {}) == Options(
         node_id=253,
-        hardware=Hardware((1, 2), ce_gpio=22, irq_gpio=24),
+        hardware=Hardware((1, 2), ce_gpio=22, irq_gpio=24, spi_hz=1_000_000),
         radio=RadioSettings(
             channel=76,
             data_rate=DataRate.MBPS_2,
+            power=TxPower.DBM_MINUS_12,
             crc_bytes=1,
             broadcast_mode=BroadcastMode.SHOCKBURST,
         ),
@@ -108,6 +110,8 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --irq -1", "expected one argument|invalid value '-1'"),
         ("--id 3 --channel 126", "invalid value '126': must be a whole number 0..125"),
         ("--id 3 --rate 3M", "invalid choice: '3M'"),
+        ("--id 3 --power 20", "invalid choice: 20"),
+        ("--id 3 --spi-hz 20000000", "must be a whole number 10000..10000000"),
         ("--id 3 --crc 32", "invalid choice: 32"),
         ("--id 3 --check-period 0", "check_period 0.0: must be above 0 seconds"),
         ("--id 3 --check-period nan", "check_period nan: must be above 0 seconds"),

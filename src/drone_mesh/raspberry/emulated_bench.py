@@ -1,0 +1,49 @@
+"""EmulatedPartner: a radio to try the field tools on, and a node within its reach."""
+
+from __future__ import annotations
+
+import random
+
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.nrf24.emulator.air import Air
+from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.links import LogDistance
+from drone_mesh.nrf24.emulator.wall_clock import WallClock
+from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.nrf24.settings import RadioSettings
+
+PARTNER_ID = 1
+
+
+class EmulatedPartner:
+    """Node 1 at this place; it acknowledges what it receives, and presents nothing itself."""
+
+    def __init__(self, clock: WallClock, settings: RadioSettings, place: Location) -> None:
+        self._air = Air(clock, LogDistance(random.Random()), random.Random())
+        chip = EmulatedChip(self._air, "partner", place.to_vector())
+        self._radio = NRF24LowLevelInterface(
+            chip.spi,
+            chip.ce,
+            chip.irq,
+            node_id=PARTNER_ID,
+            settings=settings,
+            runtime=clock.runtime,
+        )
+        self._radio.begin()
+        self._runtime = clock.runtime
+        self._ended = False
+        self._reading = clock.runtime.start(self._read, "partner")
+
+    def other_chip(self) -> EmulatedChip:
+        """The chip that the tools work on, at (0, 0, 0)."""
+        return EmulatedChip(self._air, "radio")
+
+    def close(self) -> None:
+        """Stop answering."""
+        self._ended = True
+        self._reading.join()
+        self._radio.close()
+
+    def _read(self) -> None:
+        while not self._ended:
+            self._radio.receive(0.1)

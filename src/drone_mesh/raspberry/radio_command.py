@@ -1,0 +1,159 @@
+"""The program raspberry_radio: field tools for one radio, real or emulated."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import platform
+import sys
+import time
+from pathlib import Path
+from typing import Iterator, Sequence
+
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.nrf24.emulator.wall_clock import WallClock
+from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
+from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
+from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
+from drone_mesh.nrf24.spi import SpiDevice, open_spi
+from drone_mesh.raspberry import radio_tests
+from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.emulated_bench import PARTNER_ID, EmulatedPartner
+from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
+
+REPORT_ROUNDS = 20
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one tool; the exit status is 0, 1 if the radio failed, 2 for a wrong option."""
+    options = _parser().parse_args(arguments)
+    try:
+        with _opened(options) as (radio, irq):
+            for line in _tool(options, radio, irq):
+                print(line, flush=True)
+    except MeshError as error:
+        print(f"FAIL {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+    return 0
+
+
+def _tool(options: argparse.Namespace, radio: BenchRadio, irq: IrqPin | None) -> Iterator[str]:
+    if options.tool == "check":
+        return radio_tests.check(radio, irq)
+    if options.tool == "scan":
+        return radio_tests.scan(radio, options.rounds)
+    if options.tool == "range":
+        return radio_tests.measure_range(radio, options.to, options.packets, options.distance)
+    if options.tool == "listen":
+        until_s = time.monotonic() + options.seconds
+        return radio_tests.listen(radio, lambda: time.monotonic() >= until_s)
+    return _report(radio, irq, options.file)
+
+
+def _report(radio: BenchRadio, irq: IrqPin | None, file: Path) -> Iterator[str]:
+    """Check and scan, and what this machine is, into one file."""
+    lines = [
+        f"time {time.strftime('%Y-%m-%d %H:%M:%S %z')}",
+        f"machine {_model()}, {platform.platform()}, Python {platform.python_version()}",
+        f"settings {radio.settings}",
+    ]
+    for part, made in (
+        ("check", radio_tests.check(radio, irq)),
+        ("scan", radio_tests.scan(radio, REPORT_ROUNDS)),
+    ):
+        lines.append(f"== {part}")
+        try:
+            for line in made:
+                lines.append(line)
+                if part == "check":
+                    yield line
+        except MeshError as error:
+            lines.append(f"FAIL {error}")
+            yield lines[-1]
+            break
+    try:
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"{file}: {error.strerror or error}") from error
+    yield f"report written to {file}"
+
+
+def _model() -> str:
+    with contextlib.suppress(OSError):
+        return Path("/proc/device-tree/model").read_text(encoding="ascii").rstrip("\0")
+    return "not a Raspberry Pi"
+
+
+@contextlib.contextmanager
+def _opened(options: argparse.Namespace) -> Iterator[tuple[BenchRadio, IrqPin | None]]:
+    settings = RadioSettings(channel=options.channel, data_rate=DATA_RATES[options.rate])
+    spi: SpiDevice
+    ce: CePin
+    irq: IrqPin | None
+    runtime: Runtime
+    with contextlib.ExitStack() as stack:
+        if options.emulated:
+            clock = WallClock()
+            stack.callback(clock.close)
+            partner = EmulatedPartner(clock, settings, Location(0.0, options.emulated, 0.0))
+            stack.callback(partner.close)
+            chip = partner.other_chip()
+            spi, ce, runtime = chip.spi, chip.ce, clock.runtime
+            irq = chip.irq
+        else:
+            spi, ce, runtime = _hardware(options)
+            irq = None if options.irq is None else GpiodIrq(options.irq)
+        radio = BenchRadio(spi, ce, options.id, settings, runtime)
+        stack.callback(radio.close)
+        yield radio, irq
+
+
+def _hardware(options: argparse.Namespace) -> tuple[SpiDevice, CePin, Runtime]:
+    bus, device = options.spi
+    spi = open_spi(bus, device, options.spi_hz)
+    with contextlib.ExitStack() as opened:
+        opened.callback(spi.close)
+        ce = GpiodCe(options.ce)
+        opened.pop_all()
+    return spi, ce, SystemRuntime()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "raspberry_radio", description="Field tools for one nRF24L01+. Stop the node first."
+    )
+    add_wiring_options(parser)
+    parser.add_argument(
+        "--id",
+        type=whole(0, MAX_NODE_ID),
+        default=MAX_NODE_ID,
+        help="own id (default: %(default)s)",
+    )
+    parser.add_argument("--channel", type=whole(0, 125), default=1, help="(default: %(default)s)")
+    parser.add_argument("--rate", choices=DATA_RATES, default="250k", help="(default: %(default)s)")
+    parser.add_argument(
+        "--emulated",
+        type=float,
+        default=0.0,
+        metavar="METRES",
+        help=f"without hardware: an emulated radio, and node {PARTNER_ID} at this distance",
+    )
+    tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
+    tools.add_parser("check", help="wiring, SPI, CE, supply, IRQ")
+    scan = tools.add_parser("scan", help="the 126 channels as bars, and the quietest ones")
+    scan.add_argument("--rounds", type=whole(1, 10_000), default=100, help="(default: %(default)s)")
+    reach = tools.add_parser("range", help="loss at each power to a running node, as CSV")
+    reach.add_argument("--to", type=whole(0, MAX_NODE_ID), required=True, help="id of that node")
+    reach.add_argument(
+        "--packets", type=whole(1, 100_000), default=1000, help="(default: %(default)s)"
+    )
+    reach.add_argument("--distance", type=float, help="metres, to compare with 2019")
+    ear = tools.add_parser("listen", help="packets to all nodes, and to --id, decoded")
+    ear.add_argument("--seconds", type=float, default=float("inf"), help="(default: until Ctrl-C)")
+    report = tools.add_parser("report", help="check and scan into one file, to send to us")
+    report.add_argument("file", type=Path)
+    return parser

@@ -1,0 +1,168 @@
+"""The field tools' work: check a radio, scan the band, measure a range, listen. Output is lines."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Callable, Iterator
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.nrf24.emulator.measured import measured_losses
+from drone_mesh.nrf24.errors import RadioError
+from drone_mesh.nrf24.gpio import IrqPin
+from drone_mesh.nrf24.registers import Register
+from drone_mesh.nrf24.settings import TxPower
+from drone_mesh.raspberry.bench_radio import BenchRadio
+
+Lines = Iterator[str]
+
+SPI_ROUNDS = 500  # our choice: each writes and reads an address of five bytes
+BURST = 100  # our choice: packets at full power, to make the supply dip
+CHANNELS = 126
+BAR = 40  # columns of a bar
+BAND_END = 83  # the licence-free band ends at 2483.5 MHz
+WIFI = ((1, 12), (6, 37), (11, 62))  # Wi-Fi channel and its middle, as a channel of the radio
+USERS_DATA = 255  # a type that no node processes
+PATTERNS = (bytes(5), b"\xff" * 5, b"\x55" * 5, b"\xaa\x55\xaa\x55\xaa")
+
+
+def check(radio: BenchRadio, irq: IrqPin | None) -> Lines:
+    """Wiring, SPI, registers, CE, supply, IRQ. RadioError for what makes a radio unusable."""
+    radio.set_up()
+    yield "ok   registers: written and read back"
+    radio.stand_by()  # addresses may be written in no other state
+    wrong = sum(not _holds(radio, PATTERNS[n % len(PATTERNS)]) for n in range(SPI_ROUNDS))
+    if wrong:
+        raise RadioError(
+            f"SPI: {wrong} of {SPI_ROUNDS} addresses read back wrong: shorter wires, or a lower "
+            "--spi-hz"
+        )
+    yield f"ok   SPI: {SPI_ROUNDS} addresses written and read back"
+    radio.set_up()
+    radio.broadcast(_probe())
+    yield "ok   CE: a packet was sent"
+    for _ in range(BURST):
+        radio.broadcast(_probe())
+    changed = radio.changed_register()
+    if changed:
+        raise RadioError(
+            f"supply: {changed} lost its setting while {BURST} packets were sent: solder a "
+            "capacitor across the radio's supply, or use another 3.3 V supply"
+        )
+    yield f"ok   supply: the settings survived {BURST} packets at {radio.settings.power.value} dBm"
+    if irq is None:
+        yield "--   IRQ: not checked (--irq)"
+    else:
+        yield _check_irq(radio, irq)
+
+
+def _holds(radio: BenchRadio, pattern: bytes) -> bool:
+    radio.link.write(Register.TX_ADDR, pattern)
+    return radio.link.read(Register.TX_ADDR, len(pattern)) == pattern
+
+
+def _check_irq(radio: BenchRadio, irq: IrqPin) -> str:
+    if irq.wait_low(0.0):
+        return "FAIL IRQ: low although no flag is set: check its wiring"
+    radio.broadcast(_probe(), keep_flags=True)
+    fell = irq.wait_low(0.1)
+    radio.clear_flags()
+    return "ok   IRQ: falls when a packet was sent" if fell else "FAIL IRQ: never falls: wiring?"
+
+
+def scan(radio: BenchRadio, rounds: int, suggest: int = 3) -> Lines:
+    """How often each channel carried a signal of more than -64 dBm, and the quietest channels."""
+    radio.set_up()
+    heard = [0] * CHANNELS
+    for _ in range(rounds):
+        for channel in range(CHANNELS):
+            heard[channel] += radio.hears_carrier(channel)
+    radio.back_to_channel()
+    for channel, count in enumerate(heard):
+        bar = "#" * round(BAR * count / rounds)
+        wifi = [f"Wi-Fi {number}" for number, middle in WIFI if abs(channel - middle) <= 10]
+        note = f"  {wifi[0]}" if wifi and channel % 10 == 2 else ""
+        yield f"{channel:3d} {2400 + channel} MHz {count / rounds:5.0%} {bar}{note}"
+    yield f"quietest in the licence-free band: {' '.join(map(str, quietest(heard, suggest)))}"
+
+
+def quietest(heard: list[int], count: int) -> list[int]:
+    """The channels with the least traffic on themselves and their neighbours, apart from Wi-Fi."""
+
+    def traffic(channel: int) -> tuple[int, int]:
+        near = heard[max(0, channel - 2) : channel + 3]
+        from_wifi = min(abs(channel - middle) for _, middle in WIFI)
+        return sum(near), -min(from_wifi, 15)
+
+    chosen: list[int] = []
+    for channel in sorted(range(1, BAND_END), key=traffic):
+        if all(abs(channel - other) >= 5 for other in chosen):
+            chosen.append(channel)
+    return chosen[:count]
+
+
+def measure_range(radio: BenchRadio, to: int, packets: int, distance_m: float | None) -> Lines:
+    """CSV: packets, losses and retransmissions at each power, to a node that is running."""
+    radio.set_up()
+    address = radio.settings.node_address(to)
+    rate = radio.settings.data_rate.value // 1000
+    yield "rate_kbit_s,power_dbm,packets,lost,retransmissions,loss"
+    for power in reversed(TxPower):
+        radio.set_power(power)
+        sent = [radio.send(address, _probe(to), retransmits=15) for _ in range(packets)]
+        lost = sum(not one.acknowledged for one in sent)
+        again = sum(one.retransmits for one in sent)
+        yield f"{rate},{power.value},{packets},{lost},{again},{lost / packets:.4f}"
+    if distance_m is not None:
+        losses = measured_losses()
+        nearest = min(losses, key=lambda point: abs(point[0] - distance_m))
+        yield (
+            "# measured in 2019 (amplified modules, line of sight, 250 kbit/s) "
+            f"at {nearest[0]:g} m: {nearest[1]:.4f}"
+        )
+
+
+def listen(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
+    """What arrives at the broadcast address and at this node's own, decoded."""
+    radio.set_up()
+    started_s = radio.runtime.now_s()
+    while not ended():
+        payload = radio.receive()
+        if payload is None:
+            radio.runtime.sleep(1e-3)
+        else:
+            yield f"{radio.runtime.now_s() - started_s:9.3f}  {decoded(payload)}"
+
+
+_CLASSES = (
+    messages.LocationMessage,
+    messages.IntroduceMessage,
+    messages.HeartbeatMessage,
+    messages.MissingMessage,
+    messages.GoToLocationMessage,
+    messages.MovementNegotiationMessage,
+)
+_CLASS_OF = {int(kind.TYPE): kind for kind in _CLASSES}
+
+
+def decoded(payload: bytes) -> str:
+    """One packet in words."""
+    creator, from_, kind, to, forward = messages.header(payload)
+    with contextlib.suppress(ValueError):
+        name = MessageType(kind).name
+        head = f"{name} made by {creator}, from {from_} to {to}, for {forward}"
+        form = _CLASS_OF.get(kind)
+        if form is None:
+            return head
+        body = vars(form.from_payload(payload))
+        fields = [f"{key} {body[key]}" for key in body if key not in _HEADER]
+        return f"{head}: {', '.join(fields)}"
+    return f"type {kind} made by {creator}, from {from_} to {to}, for {forward}: {payload.hex()}"
+
+
+_HEADER = ("creator", "from_", "to", "forward")
+
+
+def _probe(to: int = 254) -> bytes:
+    return bytes((253, 253, USERS_DATA, to, to)).ljust(PAYLOAD_BYTES, b"\0")

@@ -1,0 +1,71 @@
+"""Where a radio is connected: options that the programs of a Pi share."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Callable
+
+from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
+from drone_mesh.nrf24.spi import SPI_HZ
+
+HIGHEST_GPIO = 27  # of the 40-pin header
+SPI_HZ_RANGE = (10_000, 10_000_000)  # [DS 8.3.2]: 10 MHz at most
+
+
+def add_wiring_options(parser: argparse.ArgumentParser) -> None:
+    """Add the group to a parser."""
+    wiring = parser.add_argument_group("wiring")
+    wiring.add_argument(
+        "--spi",
+        type=_spi_device,
+        default=(0, 0),
+        metavar="BUS.DEVICE",
+        help="SPI device, as in /dev/spidevBUS.DEVICE (default: 0.0)",
+    )
+    wiring.add_argument(
+        "--ce",
+        type=whole(0, HIGHEST_GPIO),
+        default=CE_GPIO,
+        metavar="GPIO",
+        help="GPIO of the CE pin (default: %(default)s, which is pin 22 of the header)",
+    )
+    wiring.add_argument(
+        "--irq",
+        type=whole(0, HIGHEST_GPIO),
+        metavar="GPIO",
+        help=f"GPIO of the IRQ pin, {IRQ_GPIO} for pin 18 of the header "
+        "(default: not connected, the radio is polled)",
+    )
+    wiring.add_argument(
+        "--spi-hz",
+        type=whole(*SPI_HZ_RANGE),
+        default=SPI_HZ,
+        metavar="HZ",
+        help="SPI clock; 1000000 for long wires (default: %(default)s)",
+    )
+
+
+def whole(lowest: int, highest: int) -> Callable[[str], int]:
+    """A type for argparse: a whole number within these bounds."""
+
+    def number_of(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = lowest - 1
+        if not lowest <= number <= highest:
+            raise argparse.ArgumentTypeError(
+                f"invalid value {text!r}: must be a whole number {lowest}..{highest}"
+            )
+        return number
+
+    return number_of
+
+
+def _spi_device(text: str) -> tuple[int, int]:
+    bus, dot, device = text.partition(".")
+    if not (dot and bus.isdecimal() and device.isdecimal()):
+        raise argparse.ArgumentTypeError(
+            f"invalid SPI device {text!r}: must be BUS.DEVICE, as in 0.0"
+        )
+    return int(bus), int(device)

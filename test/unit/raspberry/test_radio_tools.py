@@ -1,0 +1,183 @@
+"""raspberry_radio on emulated chips: what a good radio shows, and what each fault is called."""
+
+from __future__ import annotations
+
+import random
+import threading
+from typing import Iterator
+
+import pytest
+
+from drone_mesh.communication.messages import IntroduceMessage
+from drone_mesh.nrf24.emulator.air import Air
+from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.links import LogDistance
+from drone_mesh.nrf24.emulator.wall_clock import WallClock
+from drone_mesh.nrf24.errors import RadioError
+from drone_mesh.nrf24.registers import Register
+from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.raspberry import radio_tests
+from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.radio_command import main
+
+SETTINGS = RadioSettings()
+
+
+class NoWire:
+    """A CE pin that is not connected to the chip."""
+
+    value = False
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class Bench:
+    def __init__(self) -> None:
+        self.clock = WallClock()
+        self.air = Air(self.clock, LogDistance(random.Random(1)), random.Random(2))
+        self.chip = EmulatedChip(self.air, "radio")
+        self.radio = self.make(self.chip, 253)
+
+    def make(self, chip: EmulatedChip, node_id: int, ce=None) -> BenchRadio:
+        return BenchRadio(chip.spi, ce or chip.ce, node_id, SETTINGS, self.clock.runtime)
+
+    def check(self) -> list[str]:
+        return list(radio_tests.check(self.radio, self.chip.irq))
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.clock.close()
+
+
+def test_a_good_radio_passes_every_check(bench):
+    lines = bench.check()
+    assert len(lines) == 5
+    assert all(line.startswith("ok ") for line in lines)
+    assert bench.chip.warnings == []
+
+
+def test_without_a_chip_the_wiring_is_named(bench):
+    bench.chip.faults.miso_stuck_at = 0xFF
+    with pytest.raises(RadioError, match="no nRF24L01.* answers on SPI .*check the wiring"):
+        bench.check()
+
+
+def test_a_ce_pin_that_is_not_wired_is_named(bench, monkeypatch):
+    monkeypatch.setattr("drone_mesh.raspberry.bench_radio.SEND_WITHIN_S", 0.02)
+    bench.radio = bench.make(bench.chip, 253, NoWire())
+    with pytest.raises(RadioError, match="is CE wired"):
+        bench.check()
+
+
+def test_a_supply_that_dips_while_it_sends_is_named(bench):
+    lines = radio_tests.check(bench.radio, None)
+    for line in lines:
+        if line.startswith("ok   CE"):
+            break
+    register = bench.radio.link.read_byte(Register.SETUP_AW)
+    bench.radio.link.write_byte(Register.RX_PW_P1, 0)  # what a brown-out leaves behind
+    assert register == 3
+    with pytest.raises(RadioError, match="supply: RX_PW_P1 lost its setting .*capacitor"):
+        list(lines)
+
+
+@pytest.mark.parametrize(("level", "said"), [(False, "low although"), (True, "never falls")])
+def test_an_irq_pin_that_is_stuck_is_named(bench, level, said):
+    bench.chip.faults.irq_stuck_at = level
+    assert said in bench.check()[-1]
+
+
+def test_a_scan_shows_where_another_radio_sends(bench):
+    other = bench.make(EmulatedChip(bench.air, "other", (3.0, 0.0, 0.0)), 7)
+    other.set_up()
+    bench.radio.set_up()
+    ended = threading.Event()
+
+    def send() -> None:
+        while not ended.is_set():
+            other.broadcast(bytes(32))
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        heard = sum(bench.radio.hears_carrier(SETTINGS.channel) for _ in range(300))
+        elsewhere = sum(bench.radio.hears_carrier(90) for _ in range(50))
+    finally:
+        ended.set()
+        sender.join()
+    assert heard > 0
+    assert elsewhere == 0
+    bench.radio.back_to_channel()
+    assert bench.radio.link.read_byte(Register.RF_CH) == SETTINGS.channel
+
+
+def test_the_channels_suggested_are_quiet_apart_and_in_the_band():
+    heard = [9] * 126
+    for channel in (30, 31, 32, 33, 34, 70, 71, 72, 73, 74, 100, 101, 102, 103, 104):
+        heard[channel] = 0
+    chosen = radio_tests.quietest(heard, 2)
+    assert set(chosen) == {32, 72}
+
+
+def test_the_range_tool_counts_what_is_lost_at_each_power(bench):
+    node = bench.make(EmulatedChip(bench.air, "node", (60.0, 0.0, 0.0)), 5)
+    node.set_up()
+    ended = threading.Event()
+
+    def read() -> None:
+        while not ended.is_set():
+            node.receive()
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        lines = list(radio_tests.measure_range(bench.radio, 5, packets=10, distance_m=50.0))
+    finally:
+        ended.set()
+        reader.join()
+    assert lines[0] == "rate_kbit_s,power_dbm,packets,lost,retransmissions,loss"
+    rows = [line.split(",") for line in lines[1:5]]
+    assert [row[1] for row in rows] == ["0", "-6", "-12", "-18"]
+    losses = [float(row[5]) for row in rows]
+    assert losses[0] < 0.5
+    assert losses[3] == 1.0
+    assert lines[5].endswith("at 50 m: 0.0037")
+
+
+def test_what_is_heard_is_decoded(bench):
+    other = bench.make(EmulatedChip(bench.air, "other", (3.0, 0.0, 0.0)), 7)
+    other.set_up()
+    heard: list[str] = []
+    lines = radio_tests.listen(bench.radio, lambda: bool(heard))
+    sender = threading.Timer(
+        0.3, other.broadcast, [IntroduceMessage(7, 7, 254, 254, 2, True).to_payload()]
+    )
+    sender.start()
+    heard.append(next(lines))
+    sender.join()
+    assert "PRESENT made by 7, from 7 to 254, for 254: hops_until_gateway 2" in heard[0]
+
+
+def test_a_packet_of_a_type_that_is_not_known_is_shown_as_bytes():
+    assert radio_tests.decoded(bytes((1, 2, 200, 3, 4)).ljust(32, b"\x05")).startswith(
+        "type 200 made by 1, from 2 to 3, for 4: 0102c803040505"
+    )
+
+
+def test_a_report_holds_checks_scan_and_machine(tmp_path, capsys):
+    file = tmp_path / "report.txt"
+    assert main(["--emulated", "30", "report", str(file)]) == 0
+    text = file.read_text(encoding="utf-8")
+    assert "== check\nok   registers" in text
+    assert "125 2525 MHz" in text
+    assert "Python" in text
+    assert "report written to" in capsys.readouterr().out
+
+
+def test_without_hardware_it_says_what_to_do_and_fails(capsys):
+    assert main(["--spi", "99.0", "check"]) == 1
+    assert capsys.readouterr().err.startswith("FAIL ")
