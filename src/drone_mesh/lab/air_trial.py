@@ -329,7 +329,11 @@ def with_seed(trial: AirTrial, seed: int) -> AirTrial:
 def _links(trial: AirTrial) -> LinkModel:
     links: LinkModel = IdealDisc(MAX_DISTANCE_M)
     if trial.links == "distance":
-        links = LogDistance.with_edge_at(MAX_DISTANCE_M, random.Random(f"{trial.seed} links"))
+        links = LogDistance.with_edge_at(
+            MAX_DISTANCE_M,
+            random.Random(f"{trial.seed} links"),
+            bits_per_s=data_rate(trial.rate).value,
+        )
     if trial.loss:
         rng = random.Random(f"{trial.seed} loss")
         return ScriptedLoss(links, lambda _hop: rng.random() < trial.loss)

@@ -96,15 +96,20 @@ class LogDistance(LinkModel):
 
     @classmethod
     def with_edge_at(
-        cls, range_m: float, rng: random.Random, *, exponent: float = 2.7
+        cls,
+        range_m: float,
+        rng: random.Random,
+        *,
+        exponent: float = 2.7,
+        bits_per_s: int = 250_000,
     ) -> LogDistance:
-        """Distances are stretched so that at `range_m` the power is the sensitivity at 250 kbit/s.
+        """Distances are stretched so that at `range_m` the power is the sensitivity at that rate.
 
         About one frame in four is lost there, when it is sent with 0 dBm.
         """
         model = cls(rng, exponent=exponent)
         at_1_m_dbm = model.received_dbm(1.0, 0.0, 2401)
-        edge_m = 10 ** ((at_1_m_dbm - SENSITIVITY_DBM[250_000]) / (10 * exponent))
+        edge_m = 10 ** ((at_1_m_dbm - SENSITIVITY_DBM[bits_per_s]) / (10 * exponent))
         return cls(rng, exponent=exponent, metres_per_metre=edge_m / range_m)
 
     def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:

@@ -46,7 +46,9 @@ class EmulatedRadios:
         The edge of the range is at `max_distance_m`.
         """
         self._wall_clock = WallClock()
-        links = LogDistance.with_edge_at(max_distance_m, random.Random(f"{seed} links"))
+        links = LogDistance.with_edge_at(
+            max_distance_m, random.Random(f"{seed} links"), bits_per_s=rate.value
+        )
         self._air = Air(self._wall_clock, links, random.Random(f"{seed} air"))
         self._settings = RadioSettings(data_rate=rate)
         self._seed = seed
