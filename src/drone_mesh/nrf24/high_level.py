@@ -29,6 +29,7 @@ from drone_mesh.nrf24.transceiver import Received
 logger = logging.getLogger(__name__)
 
 RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices its end
+DEBUG_PERIOD_S = 10.0  # our choice: one line per check period
 DUPLICATE_S = 0.5  # our choice: the same bytes again within this time are a duplicate
 
 Submit = Callable[[Callable[[float], None]], None]
@@ -144,12 +145,8 @@ class NRF24HighLevelInterface(IWirelessCommunication):
             self._sender.offer(EVERYBODY, readdressed(payload, BROADCAST))
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        """Log one line about the node and the channel every DEBUG_PERIOD_S, or stop doing so."""
         self._info = info if on else None
-
-    @property
-    def debug_info(self) -> IMeshDebugInfo | None:
-        """The information for debugging, or None."""
-        return self._info
 
     def on(self) -> bool:
         return self._powered
@@ -163,8 +160,29 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         if mesh is not None and self._powered and not self._silent:
             self._submit(lambda now_s: mesh.on_undelivered(payload, now_s))
 
+    def _show(self, info: IMeshDebugInfo) -> None:
+        use = self.channel_use()
+        logger.info(
+            "node %d: %s, gateway %d, %d hops, %d nodes known; airtime %.1f %%, %.2f tries per "
+            "packet, %d waiting, %d given up",
+            info.get_node_id(),
+            "connected" if info.get_connected_to_gateway() else "not connected",
+            info.get_preferred_gateway(),
+            info.get_hops_from_gateway_away(),
+            info.get_router_tech_table_size(),
+            100 * use.airtime,
+            use.tries,
+            use.waiting,
+            use.given_up,
+        )
+
     def _receive(self) -> None:
+        show_s = self._runtime.now_s() + DEBUG_PERIOD_S
         while not self._ending:
+            info = self._info
+            if info is not None and self._runtime.now_s() >= show_s:
+                show_s += DEBUG_PERIOD_S
+                self._show(info)
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):
                 self._hand_on(received)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
+
 import pytest
 from chip_lab import Lab
 
-from drone_mesh.communication.interfaces import IMeshNetwork
+from drone_mesh.communication.interfaces import IMeshDebugInfo, IMeshNetwork
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
@@ -164,12 +166,62 @@ def test_statistics_count_what_was_sent_lost_and_seen_twice(lab, nodes):
     assert (heard.received, heard.duplicates) == (3, 1)
 
 
-def test_debugging_mode_keeps_what_is_to_be_shown(nodes):
+class Info(IMeshDebugInfo):
+    """A router that is three hops away from gateway 0."""
+
+    def get_node_id(self):
+        return 1
+
+    def get_connected_to_gateway(self):
+        return True
+
+    def get_total_message_sent(self):
+        return 17
+
+    def get_preferred_gateway(self):
+        return 0
+
+    def get_hops_from_gateway_away(self):
+        return 3
+
+    def get_last_good_known_location_id(self):
+        return 255
+
+    def get_router_tech_table_size(self):
+        return 42
+
+
+def test_debugging_mode_logs_a_line_per_period_until_it_is_switched_off(lab, nodes, caplog):
+    antenna = nodes[1].antenna
+    antenna.send_message_to(packet(2, sender=1))
+    with caplog.at_level(logging.INFO):
+        antenna.debugging_mode(Info(), True)
+        lab.clock.sleep(21.0)
+        antenna.debugging_mode(Info(), False)
+        lab.clock.sleep(20.0)
+    lines = [record.getMessage() for record in caplog.records]
+    assert (
+        lines
+        == [
+            "node 1: connected, gateway 0, 3 hops, 42 nodes known; airtime 0.0 %, 1.00 tries per "
+            "packet, 0 waiting, 0 given up"
+        ]
+        * 2
+    )
+
+
+def test_the_use_of_the_channel_is_measured(lab, nodes):
     antenna = nodes[0].antenna
-    antenna.debugging_mode("info", True)
-    assert antenna.debug_info == "info"
-    antenna.debugging_mode("info", False)
-    assert antenna.debug_info is None
+    antenna.channel_use()
+    for number in range(100):
+        antenna.send_message_to(packet(1, filling=number))
+    lab.clock.sleep(2.0)
+    use = antenna.channel_use()
+    assert use.airtime == pytest.approx(100 * 0.001316 / 2.0, rel=0.2)  # 1.3 ms per frame
+    assert (use.waiting, use.given_up) == (0, 0)
+    assert 1.0 <= use.tries < 1.2
+    antenna.send_message_to(packet(9))
+    assert antenna.channel_use().waiting == 1
 
 
 def test_a_radio_that_is_missing_stops_the_start_with_a_reason():
