@@ -7,7 +7,7 @@ Python 3.8.
 import hmac
 import logging
 import math
-from typing import Any, Dict, List, Optional, Union
+from typing import Any, Callable, Dict, List, Optional, Union
 
 from fastapi import Depends, FastAPI, Path, Request
 from fastapi.exceptions import RequestValidationError
@@ -118,10 +118,16 @@ class NodeReports(BaseModel):
     nodes: List[NodeReport]
 
 
-def make_api(desk: GatewayDesk, access: Access, origin: Optional[Origin] = None) -> FastAPI:
+def make_api(
+    desk: GatewayDesk,
+    access: Access,
+    origin: Optional[Origin] = None,
+    status: Optional[Callable[[], Dict[str, Any]]] = None,
+) -> FastAPI:
     """The application. Its page /docs loads nothing from the internet.
 
-    With the origin of the common frame, goals may be given in degrees.
+    With the origin of the common frame, goals may be given in degrees. `status` is what the node
+    says of itself, from any thread.
     """
     app = FastAPIOffline(
         title="drone_mesh gateway",
@@ -227,6 +233,14 @@ def make_api(desk: GatewayDesk, access: Access, origin: Optional[Origin] = None)
                 503, f"the gateway has no route to drone {drone}, which stays where it is"
             )
         _log.info("drone %d: order sent, to %s", drone, place.in_words())
+
+    if status is not None:
+        read_status = status
+
+        @app.get("/status", dependencies=guards, responses={401: refusals[401]})
+        async def node_status() -> Dict[str, Any]:
+            """What the gateway's own node says of itself: mesh, radio, flight, version."""
+            return read_status()
 
     return app
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import Iterable
+from typing import Any, Callable, Dict, Iterable
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.geodesy import Origin
@@ -36,6 +36,7 @@ class HttpInternet(IInternetConnection):
         certificate: Certificate | None = None,
         names: Iterable[str] = (),
         origin: Origin | None = None,
+        status: Callable[[], Dict[str, Any]] | None = None,
     ) -> None:
         """Take the port (0: any free one).
 
@@ -47,7 +48,7 @@ class HttpInternet(IInternetConnection):
         access = access_for(bind_address, token, own_names(*names) if token else ())
         self._desk = GatewayDesk(submit, answer_within_s)
         self._server = ServerThread(
-            make_api(self._desk, access, origin),
+            make_api(self._desk, access, origin, status),
             bind_address,
             port,
             name="http",

@@ -6,7 +6,7 @@ import dataclasses
 import logging
 import random
 import time
-from typing import Callable
+from typing import Any, Callable, Dict
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IInternetConnection
@@ -15,12 +15,18 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.raspberry.node_status import node_status
 from drone_mesh.raspberry.options import Options
+
+ALIVE_WITHIN_S = 20.0  # our choice: two check periods; systemd's watchdog waits longer
 
 _log = logging.getLogger(__name__)
 
-MakeInternet = Callable[[Callable[[Work], None]], IInternetConnection]
-"""Creates the internet connection of a gateway from `submit`."""
+ReadStatus = Callable[[], Dict[str, Any]]
+"""The status of a node; any thread may call it."""
+
+MakeInternet = Callable[[Callable[[Work], None], ReadStatus], IInternetConnection]
+"""Creates the internet connection of a gateway from `submit` and its node's status."""
 
 
 class RadioNode:
@@ -42,7 +48,9 @@ class RadioNode:
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
         self._seat = self._executor.seat()
         self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
-        self._internet = make_internet(self._seat.submit) if make_internet is not None else None
+        self._internet = (
+            make_internet(self._seat.submit, self.status) if make_internet is not None else None
+        )
         self.component = assemble_component(
             radio.node_id,
             self._antenna,
@@ -54,6 +62,27 @@ class RadioNode:
             observer=_log_event,
         )
         self._started = False
+        self._started_s = self._beat_s = time.monotonic()
+
+    def status(self) -> dict[str, Any]:
+        """What `node_status` says; any thread may call it."""
+        now_s = time.monotonic()
+        return node_status(
+            self.component,
+            self.engine,
+            self._antenna.statistics(),
+            self._antenna.on(),
+            now_s - self._started_s,
+            now_s,
+        )
+
+    def is_alive(self) -> bool:
+        """Whether the node's own thread came to its work lately; to be asked again and again."""
+        self._seat.submit(self._beat)
+        return time.monotonic() - self._beat_s < ALIVE_WITHIN_S
+
+    def _beat(self, now_s: float) -> None:
+        self._beat_s = now_s
 
     def start(self) -> None:
         """Start the radio and the mesh software; RadioError if the chip does not answer."""
@@ -66,7 +95,7 @@ class RadioNode:
         """Stop the software and its thread; power the radio down and release it."""
         if self._started:
             self._started = False
-            self._antenna.switch_power(False)  # remaining sends fail at once
+            self._antenna.fall_silent()  # remaining sends fail at once
             self._seat.submit(lambda _now_s: self.component.stop())
             self._executor.stop()
             counters = dataclasses.asdict(self._antenna.statistics())

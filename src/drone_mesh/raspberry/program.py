@@ -23,10 +23,14 @@ from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import open_spi
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
-from drone_mesh.raspberry.node import MakeInternet, RadioNode
+from drone_mesh.raspberry.node import MakeInternet, RadioNode, ReadStatus
+from drone_mesh.raspberry.node_status import one_line
 from drone_mesh.raspberry.options import Hardware, Options
+from drone_mesh.raspberry.service_manager import ServiceManager
 
 LOOK_PERIOD_S = 0.5  # our choice: how often the main thread looks at the nodes
+ALIVE_PERIOD_S = 5.0  # our choice: several times in WatchdogSec of the units
+STATUS_PERIOD_S = 60.0  # our choice: one line a minute for each node
 LONELY_AFTER_S = 15.0  # our choice: one check period and half of the next
 LONELY_AGAIN_S = 300.0  # our choice: how often the warning is repeated
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -77,11 +81,14 @@ def _run(options: Options, ended: threading.Event) -> None:
         stack.callback(_stop, nodes)
         for node in nodes:
             node.start()
-        watch = _Watch(nodes, options)
+        manager = ServiceManager()
+        manager.ready()
+        watch = _Watch(nodes, options, manager)
         while not ended.wait(LOOK_PERIOD_S):
             watch.look(time.monotonic())
             if fleet is not None:
                 fleet.move_radios()
+        manager.stopping()
         _log.info("stopping")
 
 
@@ -157,7 +164,9 @@ def _internet(options: Options) -> MakeInternet | None:
         "names": http.names,
         "origin": options.flight.origin,
     }
-    return lambda submit: http_internet(submit, http.address, http.port, http.token, **settings)
+    return lambda submit, status: http_internet(
+        submit, http.address, http.port, http.token, status=status, **settings
+    )
 
 
 class _NoInternet(IInternetConnection):
@@ -170,7 +179,7 @@ class _NoInternet(IInternetConnection):
         pass
 
 
-def without_internet(_submit: Callable[[Work], None]) -> IInternetConnection:
+def without_internet(_submit: Callable[[Work], None], _status: ReadStatus) -> IInternetConnection:
     """For a gateway that takes no orders."""
     return _NoInternet()
 
@@ -178,8 +187,13 @@ def without_internet(_submit: Callable[[Work], None]) -> IInternetConnection:
 class _Watch:
     """Logs the progress of the nodes."""
 
-    def __init__(self, nodes: Sequence[RadioNode], options: Options) -> None:
+    def __init__(
+        self, nodes: Sequence[RadioNode], options: Options, manager: ServiceManager
+    ) -> None:
         self._nodes = nodes
+        self._manager = manager
+        self._alive_at_s = time.monotonic()
+        self._status_at_s = self._alive_at_s + STATUS_PERIOD_S
         self._options = options
         self._connected = -1
         self._started_s = time.monotonic()
@@ -187,6 +201,7 @@ class _Watch:
 
     def look(self, now_s: float) -> None:
         """Log what has changed; to be called periodically."""
+        self._tell_status(now_s)
         if len(self._nodes) > 1:
             self._count_connected(now_s)
         elif self._nodes[0].component.get_neighbours():
@@ -198,6 +213,18 @@ class _Watch:
                 "rate and CRC?",
                 self._options.node_id,
             )
+
+    def _tell_status(self, now_s: float) -> None:
+        if now_s >= self._alive_at_s:
+            self._alive_at_s = now_s + ALIVE_PERIOD_S
+            alive = [node.is_alive() for node in self._nodes]
+            if all(alive):
+                self._manager.alive(one_line(self._nodes[0].status()))
+        if now_s >= self._status_at_s:
+            self._status_at_s = now_s + STATUS_PERIOD_S
+            for node in self._nodes:
+                status = node.status()
+                _log.info("node %d: %s", status["node"], one_line(status))
 
     def _count_connected(self, now_s: float) -> None:
         components = [node.component for node in self._nodes]

@@ -1,0 +1,43 @@
+"""The program raspberry_status: a gateway's status as a table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import urllib.error
+import urllib.request
+from typing import Sequence
+
+from drone_mesh.internet import DEFAULT_PORT
+from drone_mesh.raspberry.node_status import table
+from drone_mesh.raspberry.options import TOKEN_VARIABLE
+
+ANSWER_WITHIN_S = 10.0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print it; the exit status is 1 if it cannot be had."""
+    parser = argparse.ArgumentParser(
+        "raspberry_status",
+        description=f"The status of a gateway. {TOKEN_VARIABLE} holds the token, if it needs one.",
+    )
+    parser.add_argument(
+        "url", nargs="?", default=f"http://127.0.0.1:{DEFAULT_PORT}", help="(default: %(default)s)"
+    )
+    url = parser.parse_args(arguments).url.rstrip("/")
+    request = urllib.request.Request(f"{url}/status")
+    token = os.environ.get(TOKEN_VARIABLE, "")
+    if token:
+        request.add_header("Authorization", f"Bearer {token}")
+    try:
+        with urllib.request.urlopen(request, timeout=ANSWER_WITHIN_S) as answer:
+            print(table(json.load(answer)))
+    except urllib.error.HTTPError as error:
+        print(f"raspberry_status: {url}: {json.load(error)['detail']}", file=sys.stderr)
+        return 1
+    except (OSError, ValueError) as error:
+        print(f"raspberry_status: {url}: {error}", file=sys.stderr)
+        return 1
+    return 0
