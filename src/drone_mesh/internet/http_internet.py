@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, Callable, Dict, Iterable
+from typing import Any, Callable, Iterable
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.geodesy import Origin
@@ -36,7 +36,7 @@ class HttpInternet(IInternetConnection):
         certificate: Certificate | None = None,
         names: Iterable[str] = (),
         origin: Origin | None = None,
-        status: Callable[[], Dict[str, Any]] | None = None,
+        status: Callable[[], dict[str, Any]] | None = None,
     ) -> None:
         """Take the port (0: any free one).
 
