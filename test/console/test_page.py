@@ -408,3 +408,17 @@ def test_drones_at_one_position_are_fanned_out_and_each_can_be_selected(start_co
         angle = math.pi / 2 - 2 * math.pi * number / 4
         page.page.mouse.click(x + distance * math.cos(angle), y - distance * math.sin(angle))
         assert page.page.inner_text("#node-name") == f"Router {node}"
+
+
+def test_ids_of_three_digits_fit_into_their_dots(page):
+    widths = page.page.evaluate(
+        """async () => {
+          const { idSize } = await import("/static/draw.js");
+          const context = document.createElement("canvas").getContext("2d");
+          return [8, 10, 13].map((radius) => {
+            context.font = `600 ${idSize(248, radius)}px system-ui, sans-serif`;
+            return context.measureText("248").width / (2 * radius);
+          });
+        }"""
+    )
+    assert max(widths) < 0.95

@@ -29,7 +29,7 @@ export class Charts {
       {
         id: "hops",
         lines: [
-          { colour: "flying", value: (s) => s.most_hops },
+          { colour: "accent", value: (s) => s.most_hops },
           { colour: "gateway", value: (s) => s.mean_hops },
         ],
         text: (v) => `${v[1].toFixed(1)} / ${v[0]}`,

@@ -1,6 +1,7 @@
 // Draws one picture of the mesh on a canvas.
 
-const SMALLEST_ID_PX = 7;
+const DIGIT_WIDTH = 0.7; // of a bold digit, as a share of its height
+const SMALLEST_ID_PX = 6;
 const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and only the selected node's are drawn
 
 /** The palette's colours in the present theme, by name. */
@@ -257,7 +258,7 @@ function drawDrone(context, camera, node, selected, colours, r) {
 
 /** Height of an id's digits, px, so that they fit into a drone of radius `r`. */
 export function idSize(id, r) {
-  return Math.min(0.95 * r, (2 * 0.85 * r) / (0.62 * String(id).length));
+  return Math.min(0.95 * r, (1.6 * r) / (DIGIT_WIDTH * String(id).length));
 }
 
 function drawDrag(context, camera, node, drag, colours, r) {

@@ -1,10 +1,10 @@
-// The map: pan, zoom, choose, drag. Drawing itself is in draw.js.
+// The map: pan, zoom, select, drag. Drawing itself is in draw.js.
 
 import { Camera } from "./camera.js";
 import { drawMesh, drawingOrder, droneRadius, onScreen, readColours } from "./draw.js";
 
 const DRAG_AFTER_PX = 6;
-const NEAR_PX = 8; // how far beside a drone a click still means it
+const NEAR_PX = 8; // a click this close to a drone selects it
 const KEY_STEP_PX = 60;
 const ZOOM_STEP = 1.3;
 const IN_VIEW_PX = 24; // a node closer to the edge is not in view
