@@ -30,6 +30,7 @@ ROUTERS = 5
 ROUNDS_S = 25.0  # simulated; by then each node has asked where the next hop is
 FAST = 4.0  # while no picture is taken
 LIMIT_S = 240.0  # wall time for each thing that is waited for
+FEWEST_COLOURS = 300  # of a drawn screen; an empty one has a handful
 SETTLE_S = 3.0  # until what is on a screen has been drawn
 CHROMIUM_FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
@@ -90,6 +91,19 @@ def take_page(browser: Browser, url: str, name: str, whole: bool, *selectors: st
     page.close()
 
 
+def take_screen(name: str) -> None:
+    """Save the screen as soon as something is drawn on it; rviz takes its time to start."""
+    deadline_s = time.monotonic() + LIMIT_S
+    while True:
+        picture = ImageGrab.grab(xdisplay=SCREEN)
+        if picture.getcolors(FEWEST_COLOURS) is None:
+            picture.save(PICTURES / name)
+            return
+        if time.monotonic() > deadline_s:
+            raise SystemExit(f"timed out: nothing on the screen for {name}")
+        time.sleep(0.5)
+
+
 def take_pictures(browser: Browser, folder: Path) -> None:
     controls, watch = RosControls(), Watch()
     watch.wait_for("all connected", everybody_stands_connected)
@@ -105,7 +119,7 @@ def take_pictures(browser: Browser, folder: Path) -> None:
         watch.wait_for("the repair flies", somebody_flies)
         controls.speed(True, 0.0)
         time.sleep(SETTLE_S)
-        ImageGrab.grab(xdisplay=SCREEN).save(PICTURES / "rviz.png")
+        take_screen("rviz.png")
         console = f"http://127.0.0.1:{CONSOLE_PORT}/"
         take_page(browser, console, "console.png", False, "#nodes tr[data-condition=flying]")
         subprocess.run(["rosrun", "drone_mesh", "snapshot", PICTURES / "world.png"], check=True)

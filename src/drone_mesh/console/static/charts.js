@@ -6,7 +6,7 @@ const LEFT_PX = 34;
 const BOTTOM_PX = 17;
 const TOP_PX = 8;
 const RIGHT_PX = 8;
-const TICK_PX = 50; // room for one time
+const BETWEEN_TIMES_PX = 10;
 const RATE_OVER = 10; // samples; one check period of the mesh at normal speed
 
 export class Charts {
@@ -122,10 +122,11 @@ export class Charts {
     }
     context.stroke();
     context.textAlign = "center";
-    const spacing = niceStep(((end - start) * TICK_PX) / Math.max(width - LEFT_PX, 1) || 1);
+    const room = context.measureText(`${end.toFixed(0)} s`).width + BETWEEN_TIMES_PX;
+    const spacing = niceStep(((end - start) * room) / Math.max(width - LEFT_PX, 1) || 1);
     let ticks = 0;
     for (let t = Math.ceil(start / spacing) * spacing; t <= end; t += spacing) {
-      context.textAlign = x(t) > width - TICK_PX / 2 ? "right" : "center";
+      context.textAlign = x(t) > width - room / 2 ? "right" : "center";
       context.fillText(`${Number(t.toPrecision(6))} s`, Math.min(x(t), width - 1), height - 4);
       ticks++;
     }
