@@ -17,7 +17,7 @@ from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
-from drone_mesh.nrf24.medium_access import EVERYBODY, Outgoing
+from drone_mesh.nrf24.medium_access import ALL_NODES, Outgoing
 from drone_mesh.nrf24.settings import RadioSettings
 
 
@@ -140,7 +140,7 @@ class SharedAir:
         frame.sender.frame_left(frame)
         if frame.answers is not None:
             self._arrive(frame, frame.answers)
-        elif frame.packet.receiver != EVERYBODY:
+        elif frame.packet.receiver != ALL_NODES:
             receiver = self._radios.get(frame.packet.receiver)
             if receiver is not None:
                 self._arrive(frame, receiver)

@@ -19,7 +19,7 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
-from drone_mesh.nrf24.medium_access import EVERYBODY, Fate, MediumAccess, Outgoing
+from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, MediumAccess, Outgoing
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
@@ -106,7 +106,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all."""
         if self.powered:
-            self.access.offer(EVERYBODY, payload, self._clock.now_s)
+            self.access.offer(ALL_NODES, payload, self._clock.now_s)
             self._plan()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
@@ -161,7 +161,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         if frame.answers is not None:
             if self._trying is None and self.powered:
                 self.listening_since_s = now_s + SETTLING_S
-        elif frame.packet.receiver == EVERYBODY:
+        elif frame.packet.receiver == ALL_NODES:
             self._finish(True)
         else:
             self.listening_since_s = now_s + SETTLING_S  # for the acknowledgement
@@ -182,7 +182,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         """TX_DS or MAX_RT; the driver notices when it looks next."""
         self.listening_since_s = None
         now_s, packet = self._clock.now_s, self._trying
-        broadcast = packet is not None and packet.receiver == EVERYBODY
+        broadcast = packet is not None and packet.receiver == ALL_NODES
         expected_s = self._settings.broadcast_s if broadcast else self._settings.acknowledged_s
         looks_s = self._ce_rose_s + CE_PULSE_S + expected_s
         if now_s > looks_s:
@@ -218,7 +218,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         if self._unread == FIFO_DEPTH:
             return
         packet, now_s = frame.packet, self._clock.now_s
-        broadcast = packet.receiver == EVERYBODY
+        broadcast = packet.receiver == ALL_NODES
         if broadcast or packet is not self._last_taken:
             self._unread += 1
             self._clock.call_at(now_s + READ_S, self._read, (frame.sender.node_id, packet))
@@ -238,7 +238,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         mesh = self._mesh
         if mesh is None or not self.powered:
             return
-        broadcast = packet.receiver == EVERYBODY
+        broadcast = packet.receiver == ALL_NODES
         self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1

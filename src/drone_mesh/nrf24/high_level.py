@@ -18,7 +18,7 @@ from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import EVERYBODY
+from drone_mesh.nrf24.medium_access import ALL_NODES
 from drone_mesh.nrf24.pace import medium_of
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.nrf24.sender import Sender
@@ -142,7 +142,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all; each receiver's antenna puts its own id into byte 3."""
         if self._powered and not self._silent and len(payload) == PAYLOAD_BYTES:
-            self._sender.offer(EVERYBODY, readdressed(payload, BROADCAST))
+            self._sender.offer(ALL_NODES, readdressed(payload, BROADCAST))
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Log one line about the node and the channel every DEBUG_PERIOD_S, or stop doing so."""

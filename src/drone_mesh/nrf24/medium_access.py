@@ -31,7 +31,7 @@ from typing import Any
 
 from drone_mesh.errors import ConfigurationError
 
-EVERYBODY = -1  # receiver of a broadcast
+ALL_NODES = -1  # receiver of a broadcast
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class MediumAccess:
     def offer(
         self, receiver: int, payload: bytes, now_s: float, priority: Priority = Priority.CONTROL
     ) -> bool:
-        """Queue a packet for a node, or for EVERYBODY. False: too many packets wait already.
+        """Queue a packet for a node, or for ALL_NODES. False: too many packets wait already.
 
         Bytes that already wait for the same receiver are not queued twice.
         """
@@ -151,7 +151,7 @@ class MediumAccess:
         if self._waiting >= self.rules.queue_length:
             return False
         rules, not_before_s = self.rules, now_s
-        if receiver == EVERYBODY:
+        if receiver == ALL_NODES:
             not_before_s += self._rng.random() * rules.broadcast_jitter_s
         elif now_s - self._broadcast_heard_s < rules.answer_jitter_s:
             not_before_s += self._rng.random() * rules.answer_jitter_s
@@ -192,7 +192,7 @@ class MediumAccess:
         gap_s = rules.gap_s / (1.0 - self.contention)
         self._free_s = now_s + 2.0 * self._rng.random() * gap_s
         counts = self._counts
-        if receiver == EVERYBODY:
+        if receiver == ALL_NODES:
             counts["broadcasts"] += acknowledged
             self._remove(packet)
             return Fate.DELIVERED

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Callable
 
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import EVERYBODY, Fate, Outgoing, Priority
+from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, Outgoing, Priority
 from drone_mesh.nrf24.runtime import Runtime, Task
 
 
@@ -47,7 +47,7 @@ class Sender:
             task.join()
 
     def offer(self, receiver: int, payload: bytes, priority: Priority = Priority.CONTROL) -> bool:
-        """Queue a packet for a node or EVERYBODY. False: the queue is full or closed."""
+        """Queue a packet for a node or ALL_NODES. False: the queue is full or closed."""
         if self._closed:
             return False
         with self._lock:
@@ -89,7 +89,7 @@ class Sender:
 
     def _try(self, packet: Outgoing) -> None:
         radio, payload = self._radio, packet.payload
-        if packet.receiver == EVERYBODY:
+        if packet.receiver == ALL_NODES:
             done = radio.broadcast(payload)
         else:
             retransmits, delay = self._access.retransmits()

@@ -11,7 +11,7 @@ import random
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.nrf24.medium_access import EVERYBODY, AccessRules, Fate, MediumAccess, Priority
+from drone_mesh.nrf24.medium_access import ALL_NODES, AccessRules, Fate, MediumAccess, Priority
 
 CYCLE_S = 0.0026
 RULES = AccessRules.for_cycle(CYCLE_S)
@@ -189,7 +189,7 @@ def test_a_broadcast_and_the_answers_to_one_are_spread():
     waits = []
     for seed in range(200):
         access = MediumAccess(RULES, random.Random(seed))
-        access.offer(EVERYBODY, PACKET, 1.0)
+        access.offer(ALL_NODES, PACKET, 1.0)
         waits.append(access.next_try_s - 1.0)
     assert 0.0 <= min(waits) < 0.1 * RULES.broadcast_jitter_s
     assert 0.9 * RULES.broadcast_jitter_s < max(waits) <= RULES.broadcast_jitter_s

@@ -107,7 +107,7 @@ class Frame:
             crc = frame_crc(address, control, payload, form.crc_bytes)
             bits = bits << 8 * form.crc_bytes | crc
         frame = cls(bits, count + 8 * (len(payload) + form.crc_bytes))
-        # Who is configured alike finds what was put in: no need to search and check again.
+        # A receiver with the same configuration finds what was put in: no need to check again.
         frame._packets[form] = Packet(pid, no_ack_bit, payload, crc)
         return frame
 
