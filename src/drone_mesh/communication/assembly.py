@@ -8,7 +8,9 @@ from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import MeshObserver, ignore_events
-from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.repair_interfaces import IRepairStrategy
+from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
+from drone_mesh.communication.repair_strategies import create_repair_strategy
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.communication.routing import DEFAULT_ROUTING, create_routing_technique
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
@@ -27,17 +29,28 @@ def assemble_component(
     timing: MeshTiming | None = None,
     observer: MeshObserver = ignore_events,
     debug: bool = True,
-    repair: RepairOptions | None = None,
+    repair: str | IRepairStrategy = DEFAULT_REPAIR,
+    repair_options: RepairOptions | None = None,
 ) -> MeshnetworkComponent:
     """A gateway if it has an `internet` side, else a router; not started yet.
 
-    `routing` is a routing technique or the name of one. Raises ConfigurationError for an unknown
-    technique and ValueError for a node id outside 0..253.
+    `routing` is a routing technique or the name of one, `repair` a repair strategy or the name of
+    one. Raises ConfigurationError for an unknown name and ValueError for a node id outside 0..253.
     """
     technique = create_routing_technique(routing) if isinstance(routing, str) else routing
     if internet is None:
+        strategy = create_repair_strategy(repair) if isinstance(repair, str) else repair
         return MeshnetworkRouter(
-            node_id, antenna, engine, technique, rng, timing, observer, debug, repair
+            node_id,
+            antenna,
+            engine,
+            technique,
+            rng,
+            timing,
+            observer,
+            debug,
+            strategy,
+            repair_options,
         )
     return MeshnetworkGateway(
         node_id, antenna, engine, technique, internet, rng, timing, observer, debug

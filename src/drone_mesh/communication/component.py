@@ -183,7 +183,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             return
         if self._neighbours.heard(from_, now_s):
             self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
-            self._on_neighbour_found()
+            self._on_neighbour_found(from_)
         if creator == me:  # it came back and teaches no route
             self._routing.can_communicate_with_node(from_)
         elif not self._routing.learn(creator, from_, kind, payload):
@@ -396,7 +396,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     ) -> None:
         """`node` says where it is, and perhaps where a gateway was."""
 
-    def _on_neighbour_found(self) -> None:
+    def _on_neighbour_found(self, node: int) -> None:
         """A packet arrived from a node that was not a neighbour."""
 
     def _on_neighbour_lost(self, node: int) -> None:

@@ -5,11 +5,20 @@ from __future__ import annotations
 import math
 from typing import AbstractSet, NamedTuple
 
+from drone_mesh.communication.messages import MovementNegotiationMessage
+
 NO_BID = -1.0  # the score of a node that does not fly
 MAX_SCORE_M = 1e9  # our choice: beyond every place there is, and it fits a float32
 TOOK_OFF = 2e9  # in place of a score: the winner takes off
 TOOK_OFF_HOME = 3e9  # the same, and it flies to the gateway's place
 IN_VAIN = 4e9  # in place of NO_BID: it was at the gateway's place, and no gateway answered
+
+
+def as_on_the_air(score: float) -> float:
+    """A score as others read it: two scores that are equal must be equal for both nodes."""
+    return MovementNegotiationMessage.from_payload(
+        MovementNegotiationMessage(0, 0, 0, 0, score).to_payload()
+    ).cost
 
 
 class Bid(NamedTuple):

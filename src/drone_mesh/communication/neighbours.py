@@ -28,6 +28,7 @@ class Neighbours:
         self._heard_s: dict[int, float] = {}
         self._lost_s: dict[int, float] = {}
         self._gateways: dict[int, int] = {}
+        self._hops: dict[int, int] = {}
         self._places: dict[int, HeardPlace] = {}
         self.silent = False  # all neighbours, two or more, were lost together; none was heard since
 
@@ -76,6 +77,14 @@ class Neighbours:
     def gateway_of(self, node: int) -> int:
         """The gateway that `node` named last, or NO_ROUTE."""
         return self._gateways.get(node, NO_ROUTE)
+
+    def has_hops(self, node: int, hops: int) -> None:
+        """`node` introduced itself with so many hops to its gateway; 255: it has none."""
+        self._hops[node] = hops
+
+    def hops_of(self, node: int) -> int:
+        """The hops that `node` named last; 255: none."""
+        return self._hops.get(node, NO_ROUTE)
 
     def is_at(self, node: int, place: Location, now_s: float) -> None:
         """`node`, a neighbour or not, says where it is."""

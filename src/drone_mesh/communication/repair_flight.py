@@ -8,7 +8,7 @@ from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunicatio
 from drone_mesh.communication.messages import Message, MessageType
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair_options import RepairOptions
-from drone_mesh.communication.spots import free_spot
+from drone_mesh.communication.spots import free_spot, towards
 from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.interfaces import Location
 
@@ -37,7 +37,6 @@ class RepairFlight:
         """To `goal`, at or near the `place` of node `owner`. `introduce` broadcasts a PRESENT."""
         self.goal = goal
         self._owner, self._place = owner, place
-        self._at_place = goal == place
         self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
         self.stops_when_connected = False
         self.asks_left = 0  # on the ground
@@ -119,9 +118,7 @@ class RepairFlight:
         self._leg_from = here
         goal = self.goal
         if self.stops_when_connected and here is not None:
-            distance_m = here.distance_m(goal)
-            if distance_m > self._leg_m:
-                goal = _between(here, goal, self._leg_m / distance_m)
+            goal = towards(here, goal, self._leg_m)
         self._parts.pilot.fly_to(goal, step_back=True)
 
     def _leg_is_short(self, here: Location | None) -> bool:
@@ -143,9 +140,10 @@ class RepairFlight:
         return all(spot.distance_m(other) >= self._clearance_m for other in self._others())
 
     def _others(self) -> list[Location]:
-        """Where drones are; a place that the goal keeps clear of counts as well."""
+        """Where other drones are, or may be."""
         now_s, me = self._parts.now_s, self._parts.node_id
-        kept_free = [] if self._at_place else [self._place]
+        gateway = self._parts.places.gateway  # it may stand there, though it is off now
+        kept_free = [] if gateway is None else [gateway]
         return kept_free + [
             heard.place
             for node, heard in self._parts.neighbours.places().items()
@@ -154,10 +152,6 @@ class RepairFlight:
 
     def _ask_all_for_places(self) -> None:
         ask_all_for_places(self._parts.antenna, self._parts.node_id)
-
-
-def _between(start: Location, end: Location, share: float) -> Location:
-    return Location(*(a + (b - a) * share for a, b in zip(start, end)))
 
 
 def ask_all_for_places(antenna: IWirelessCommunication, me: int) -> None:

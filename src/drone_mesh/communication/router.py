@@ -19,9 +19,11 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.messages import GatewayPlace, MovementNegotiationMessage
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
+from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.router_states import Link, Repair, RouterStates
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 
@@ -39,9 +41,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
         timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
-        repair: RepairOptions | None = None,
+        repair: IRepairStrategy | None = None,
+        repair_options: RepairOptions | None = None,
     ) -> None:
-        """As MeshnetworkComponent."""
+        """As MeshnetworkComponent; `repair` is Thesis if it is not given."""
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._states = RouterStates()
         self._connection = GatewayConnection(
@@ -52,7 +55,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._states,
             self._connection,
             self.search_other_nodes_in_range,
-            repair or RepairOptions(),
+            repair or Thesis(),
+            repair_options or RepairOptions(),
         )
 
     def tick(self, now_s: float) -> None:
@@ -108,6 +112,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair.on_antenna_off()
 
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
+        self._neighbours.has_hops(neighbour, hops)
         if not self._repair.may_connect(neighbour, know_gateway):
             return
         if know_gateway and hops <= self._connection.hops:
@@ -161,12 +166,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self.places.next_hop_is_at(node, location)
         self._repair.on_place(node, location)
 
-    def _on_neighbour_found(self) -> None:
-        self._repair.on_neighbour_found()
+    def _on_neighbour_found(self, node: int) -> None:
+        self._repair.on_neighbour_found(node)
 
     def _on_neighbour_lost(self, node: int) -> None:
         self._connection.on_neighbour_lost()
-        self._repair.on_neighbour_lost()
+        self._repair.on_neighbour_lost(node)
 
     def _took_off(self) -> None:
         self._repair.on_ordered_flight()

@@ -17,6 +17,7 @@ from drone_mesh.communication.interfaces import (
     IInternetConnection,
 )
 from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
@@ -27,6 +28,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.drone import InProcessDrone
+from drone_mesh.inprocess.oracle import Oracle
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
@@ -36,6 +38,7 @@ from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 from drone_mesh.state.model import EventRecord, MeshStatus
 
+ORACLE = "oracle"  # the repair that knows everything
 STEP_S = 0.1  # how closely run_until looks
 
 
@@ -130,7 +133,7 @@ class Network:
         radio: str = "disc",
         rate: str = "250k",
         links: LinkModel | None = None,
-        repair: str = DEFAULT_REPAIR,
+        repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
         repair_options: RepairOptions | None = None,
     ) -> None:
         """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file, or
@@ -222,7 +225,8 @@ class Network:
             routing=self._technique(node_id),
             timing=self._timing,
             observer=self._observe,
-            repair=self._repair_options,
+            repair=self._make_repair(),
+            repair_options=self._repair_options,
         )
         self.nodes[node_id] = node
         self.clock.call_at(start_s, Node.start, node)
@@ -333,6 +337,18 @@ class Network:
                 return None
             path.append(step)
         return path
+
+    def _make_repair(self) -> str | IRepairStrategy:
+        if self._repair == ORACLE:
+            return Oracle(self._places_of_connected)
+        return self._repair if isinstance(self._repair, str) else self._repair()
+
+    def _places_of_connected(self) -> dict[int, Location]:
+        return {
+            node_id: node.drone.get_location()
+            for node_id, node in self.nodes.items()
+            if node.antenna.powered and node.component.get_connected_to_gateway()
+        }
 
     def _observe(self, event: MeshEvent) -> None:
         self.events.append(event)

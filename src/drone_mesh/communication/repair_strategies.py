@@ -1,0 +1,34 @@
+"""Repair strategies by name, so that a launch argument can choose one."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.communication.by_name import create_by_name
+from drone_mesh.communication.repair_interfaces import IRepairStrategy
+from drone_mesh.communication.repair_options import DEFAULT_REPAIR
+from drone_mesh.communication.strategies.field import Field
+from drone_mesh.communication.strategies.follow import Follow
+from drone_mesh.communication.strategies.home import Home
+from drone_mesh.communication.strategies.inward import Inward
+from drone_mesh.communication.strategies.nearest import Nearest
+from drone_mesh.communication.strategies.stay import Stay
+from drone_mesh.communication.strategies.thesis import Thesis
+
+REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
+    DEFAULT_REPAIR: Thesis,
+    "field": Field,
+    "follow": Follow,
+    "home": Home,
+    "inward": Inward,
+    "nearest": Nearest,
+    "stay": Stay,
+}
+
+
+def create_repair_strategy(name: str) -> IRepairStrategy:
+    """A new strategy: a name of REPAIR_STRATEGIES, or "package.module:Class" for one of your own.
+
+    Raises ConfigurationError, with the known names, for anything else.
+    """
+    return create_by_name("repair strategy", name, REPAIR_STRATEGIES, IRepairStrategy)

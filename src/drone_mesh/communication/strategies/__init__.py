@@ -1,0 +1,1 @@
+"""Repair strategies that come with drone_mesh; docs/strategies.md compares them."""

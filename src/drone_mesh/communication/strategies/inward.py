@@ -1,0 +1,56 @@
+"""Inward: all neighbours of the lost next hop move towards its place, by half the range at most.
+
+After RIM: Younis, Lee, Abbasi, "A Localized Algorithm for Restoring Internode Connectivity in
+Networks of Moveable Sensors", IEEE TC 59(12), 2010. Only the parts without a gateway move, so one
+move need not suffice: a second one leads to the place itself, and the third way is to the gateway.
+"""
+
+from __future__ import annotations
+
+from drone_mesh.communication.repair_interfaces import Step
+from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.spots import towards
+from drone_mesh.communication.strategies.home import Home
+from drone_mesh.drone.interfaces import Location
+
+KEPT = 0.9  # of the range: how far behind a neighbour that moved a drone may stay; our choice
+MOVES = 2  # towards one lost next hop
+
+
+class Inward(Home):
+    """No election: each neighbour of the dead node moves, and others follow their neighbours."""
+
+    _lost: Step | None = None  # the place of the lost next hop
+    _moves = 0
+
+    def on_gateway_found(self) -> None:
+        """The next loss is another one."""
+        self._lost, self._moves = None, 0
+
+    def on_emergency(self) -> None:
+        """Move inward; if that was in vain, fly home."""
+        mesh, here = self.mesh, self.mesh.own_place()
+        if self._lost is None and mesh.steps and not mesh.steps[0].home:
+            self._lost = mesh.steps[0]
+        if self._lost is None or self._moves >= MOVES or here is None or mesh.why_not_fly():
+            super().on_emergency()
+            return
+        self._moves += 1
+        away_m = here.distance_m(self._lost.place)
+        half_m = mesh.range_m / 2
+        if away_m > half_m or self._moves == MOVES:
+            stop_m = half_m if self._moves < MOVES else max(0.0, away_m - half_m)
+            self._move_to(Step(towards(self._lost.place, here, stop_m), self._lost.owner))
+
+    def on_place(self, node: int, place: Location) -> None:
+        """If a neighbour moves out of reach, follow it as far as is needed."""
+        mesh, here = self.mesh, self.mesh.own_place()
+        may_move = not (mesh.connected or mesh.state is Repair.FLYING or mesh.why_not_fly())
+        if here is None or not may_move or node not in mesh.neighbours():
+            return
+        if here.distance_m(place) > mesh.range_m:
+            self._move_to(Step(towards(place, here, KEPT * mesh.range_m), node))
+
+    def _move_to(self, step: Step) -> None:
+        self.mesh.tell_place(step.place)
+        self.mesh.fly(step)

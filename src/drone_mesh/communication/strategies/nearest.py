@@ -1,0 +1,25 @@
+"""Nearest: of a group, the drone that is nearest to the place of its lost next hop takes it.
+
+After DARA: Abbasi, Younis, Akkaya, "Movement-Assisted Connectivity Restoration in Wireless Sensor
+and Actor Networks", IEEE TPDS 20(9), 2009; only the parts without a gateway act. The children that
+the drone leaves behind lose their gateway, and repeat the same: the cascade of DARA.
+"""
+
+from __future__ import annotations
+
+from drone_mesh.communication.election import NO_BID
+from drone_mesh.communication.repair_interfaces import Step
+from drone_mesh.communication.strategies.thesis import Thesis
+
+
+class Nearest(Thesis):
+    """As Thesis, with another score."""
+
+    def _score(self, step: Step) -> float:
+        """Above 1 for a first choice, else up to 1; the shorter the flight the higher."""
+        own = self.mesh.own_place()
+        if own is None:
+            self.reason = "does not know where it is"
+            return NO_BID
+        score = 1.0 / (1.0 + own.distance_m(step.place))
+        return score if self._is_second_choice(step) else 1.0 + score

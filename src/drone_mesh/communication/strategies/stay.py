@@ -1,0 +1,13 @@
+"""Stay: no drone ever flies. The zero line that the other strategies are measured against."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.repair_interfaces import IRepairStrategy
+
+
+class Stay(IRepairStrategy):
+    """Waits until the routing finds a gateway again."""
+
+    def on_emergency(self) -> None:
+        """Nothing."""
+        self.reason = "never flies"
