@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
@@ -57,6 +58,9 @@ class FactoryConfiguration:
     routing: str = Field(
         "child_table_tree", min_length=1, description="the name of a routing technique"
     )
+    repair: str = Field(DEFAULT_REPAIR, min_length=1, description="the name of a repair strategy")
+    clearance: float = Field(CLEARANCE_M, gt=0, le=100, description="metres")  # between drones
+    avoid_wrecks: bool = Field(False)  # whether drones that are off count for the clearance
     check_period: float = Field(10.0, ge=0.1, le=3600, description="seconds")
     connection_lost_after: float = Field(30.0, ge=0.1, le=3600, description="seconds")
     debug: bool = Field(True)
@@ -81,7 +85,7 @@ class FactoryConfiguration:
         return value
 
 
-_SWITCHES = ("gui", "debug")
+_SWITCHES = ("gui", "debug", "avoid_wrecks")
 _FIELDS: Mapping[str, FieldInfo] = vars(FactoryConfiguration)["__pydantic_fields__"]
 
 

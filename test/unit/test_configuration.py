@@ -36,6 +36,9 @@ def test_the_shipped_file_holds_the_documented_numbers():
         real_time_factor=1.0,
         max_distance=9.0,
         routing="child_table_tree",
+        repair="thesis",
+        clearance=0.5,
+        avoid_wrecks=False,
         check_period=10.0,
         connection_lost_after=30.0,
         debug=True,
@@ -122,7 +125,7 @@ def test_as_fast_as_possible_is_a_factor_of_zero(write):
         ("seed: -1", "invalid seed -1: expected a whole number, 0..4294967295, or random"),
         ("seed: 1.5", "invalid seed 1.5: expected a whole number"),
         ("routters: 3", "unknown key routters; did you mean routers?"),
-        ("colour: red", "unknown key colour; known are check_period, "),
+        ("colour: red", "unknown key colour; known are avoid_wrecks, "),
         ("7: 3", "unknown key 7; known are"),
     ],
 )

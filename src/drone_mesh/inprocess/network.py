@@ -19,6 +19,7 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
+from drone_mesh.communication.repair_strategies import create_repair_strategy
 from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
@@ -139,6 +140,8 @@ class Network:
         """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique.
 
+        `repair` names a repair strategy, as in a launch file, or is "oracle"; or it makes one.
+
         `radio`: "disc", on which packets never meet, or "shared", the channel of nRF24L01+ radios
         at `rate` (250k, 1M or 2M) with the space between them as `links` says (default: an ideal
         disc). `loss`, `delay_s` and `jitter_s` are for the disc. Raises ConfigurationError.
@@ -148,6 +151,8 @@ class Network:
         self._timing = timing or MeshTiming()
         self._routing = routing
         self._repair = repair
+        if isinstance(repair, str) and repair != ORACLE:
+            create_repair_strategy(repair)  # an unknown name is an error now, not per node
         self._repair_options = repair_options
         self.clock = VirtualClock()
         self.air: InProcessAir | SharedAir

@@ -39,10 +39,8 @@ def check_technique(kind: str, name: str, model: str) -> None:
             raise ConfigurationError(f"no rule {name!r} for model ideal: use one of {known}")
     elif kind == "routing":
         create_routing_technique(name)
-    elif "repair" in inspect.signature(Network).parameters:
-        Network(repair=name)  # type: ignore[call-arg]
-    elif name != "thesis":
-        raise ConfigurationError(f"repair technique {name!r} is not known: use thesis")
+    else:
+        Network(repair=name)
 
 
 def check_metric(name: str) -> None:

@@ -10,9 +10,11 @@ from typing import Callable, Mapping
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.repair_options import DEFAULT_REPAIR
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.random_layouts import cut_vertices, random_layout
 
+SMALLEST, LARGEST = 8, 60  # nodes of a mesh
 CLEARANCE_M = 0.5  # two drones at rest that are nearer than this are stacked
 NOTICED_S = 12.0  # each node has checked its connection once
 HEALED_WITHIN_S = 120.0
@@ -95,9 +97,12 @@ class Mesh:
                 self.healed += now_s - since_s <= HEALED_WITHIN_S
 
 
-def run_sequence(seed: int, repair: str = "thesis") -> Outcome:
-    """The sequence with this number, and this repair. The same numbers give the same outcome."""
-    mesh = _random_mesh(seed, repair)
+def run_sequence(seed: int, repair: str = DEFAULT_REPAIR, largest: int = LARGEST) -> Outcome:
+    """The sequence with this number, with this repair, in a mesh of 8..`largest` nodes.
+
+    The same arguments give the same outcome.
+    """
+    mesh = _random_mesh(seed, repair, largest)
     network, rng = mesh.network, mesh.rng
     network.run_until(network.all_connected, within_s=60.0)
     names = rng.choices(list(INCIDENTS), k=rng.randint(1, 3))
@@ -110,9 +115,9 @@ def run_sequence(seed: int, repair: str = "thesis") -> Outcome:
     return _outcome(mesh, seed, " + ".join(names))
 
 
-def _random_mesh(seed: int, repair: str) -> Mesh:
+def _random_mesh(seed: int, repair: str, largest: int) -> Mesh:
     rng = random.Random(f"sequence {seed}")
-    nodes = rng.randint(8, 60)
+    nodes = rng.randint(SMALLEST, largest)
     points = random_layout(rng, nodes, rng.uniform(7.0, 9.0), MAX_DISTANCE_M)
     share_grounded = rng.choice((0.0, 0.0, 0.1, 0.3))
     grounded = frozenset(n for n in range(1, nodes) if rng.random() < share_grounded)

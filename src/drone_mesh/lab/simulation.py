@@ -154,6 +154,7 @@ def _network(scenario: Scenario, streams: Streams) -> Network:
         seed=streams.number("mesh"),
         timing=timing,
         routing=scenario.routing,
+        repair=scenario.repair,
         max_distance_m=scenario.range_m,
         **_options(scenario),
     )
@@ -171,8 +172,6 @@ def _places(scenario: Scenario, streams: Streams) -> list[StartPlace]:
 def _options(scenario: Scenario) -> dict[str, Any]:
     """What is not left as the network has it by default."""
     options: dict[str, Any] = {}
-    if scenario.repair != "thesis":
-        options["repair"] = scenario.repair
     if scenario.radio.kind == "disc":
         options["delay_s"] = scenario.radio.delay_s
         options["jitter_s"] = scenario.radio.jitter_s

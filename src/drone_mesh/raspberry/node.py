@@ -11,6 +11,7 @@ from typing import Any, Callable, Dict
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IInternetConnection
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
@@ -58,6 +59,8 @@ class RadioNode:
             random.Random(),
             internet=self._internet,
             routing=options.routing,
+            repair=options.repair,
+            repair_options=RepairOptions(clearance_m=options.clearance_m),
             timing=options.timing,
             observer=_log_event,
         )

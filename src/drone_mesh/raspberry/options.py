@@ -9,6 +9,11 @@ from pathlib import Path
 from typing import Mapping, Sequence
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
+from drone_mesh.communication.repair_strategies import (
+    REPAIR_STRATEGIES,
+    create_repair_strategy,
+)
 from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.engines import FlightOptions
@@ -30,6 +35,8 @@ TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
 LOG_LEVELS = ("debug", "info", "warning", "error")
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
+
+CLEARANCE_M = 5.0  # our choice: a position by satellite is good to some metres
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,8 @@ class Options:
     radio: RadioSettings
     timing: MeshTiming
     routing: str
+    repair: str
+    clearance_m: float
     location: Location | None  # None: not known
     flight: FlightOptions
     fleet: FleetOptions  # the drones of emulated nodes
@@ -194,6 +203,20 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         help=f"routing technique: {', '.join(sorted(ROUTING_TECHNIQUES))}, or package.module:Class "
         "(default: %(default)s)",
     )
+    mesh.add_argument(
+        "--repair",
+        default=DEFAULT_REPAIR,
+        help=f"repair strategy: {', '.join(sorted(REPAIR_STRATEGIES))}, or package.module:Class "
+        "(default: %(default)s)",
+    )
+    mesh.add_argument(
+        "--clearance",
+        type=float,
+        default=CLEARANCE_M,
+        metavar="M",
+        help="metres that drones keep between each other where a repair brings them "
+        "(default: %(default)g)",
+    )
     place = parser.add_argument_group(
         "place",
         "Position of a node on the ground, in metres, in the common frame of the drones. Without "
@@ -244,6 +267,8 @@ def _options(
         if location is not None:
             check_goal(*location)
         create_routing_technique(parsed.routing)
+        create_repair_strategy(parsed.repair)
+        RepairOptions(clearance_m=parsed.clearance)
         return Options(
             node_id=parsed.id or 0,
             hardware=Hardware(parsed.spi, parsed.ce, parsed.irq, parsed.spi_hz),
@@ -256,6 +281,8 @@ def _options(
             ),
             timing=MeshTiming(parsed.check_period, parsed.connection_lost_after),
             routing=parsed.routing,
+            repair=parsed.repair,
+            clearance_m=parsed.clearance,
             location=location,
             flight=flight_options(parsed),
             fleet=fleet_options(parsed),

@@ -31,6 +31,8 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         radio=RadioSettings(),
         timing=MeshTiming(),
         routing="child_table_tree",
+        repair="thesis",
+        clearance_m=5.0,
         location=None,
         flight=FlightOptions(),
         fleet=FleetOptions(),
@@ -46,7 +48,8 @@ def test_each_option_reaches_what_it_is_for():
         "--id 253 --spi 1.2 --spi-hz 1000000 --ce 22 --irq 24 --channel 76 --rate 2M --crc 8 "
         "--power -12 --broadcast shockburst "
         "--check-period 5 --connection-lost-after 60 --latitude 10 --longitude -20.5 "
-        "--height 3 --log-level debug --routing drone_mesh.communication.child_table_tree:"
+        "--height 3 --log-level debug --repair home --clearance 3 "
+        "--routing drone_mesh.communication.child_table_tree:"
         "ChildTableTree "
         "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
         "--max-distance 200 --speed 3 --min-battery 25 --cruise-height 8 --layers 1.5 --hover 12 "
@@ -64,6 +67,8 @@ def test_each_option_reaches_what_it_is_for():
         ),
         timing=MeshTiming(check_period_s=5.0, connection_lost_after_s=60.0),
         routing="drone_mesh.communication.child_table_tree:ChildTableTree",
+        repair="home",
+        clearance_m=3.0,
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),
         flight=FlightOptions(
             "mavlink:/dev/serial0,921600",
@@ -120,6 +125,8 @@ def test_emulated_nodes_need_no_id():
             "--id 3 --routing gossip",
             "technique 'gossip': use one of babel, batman, child_table_tree",
         ),
+        ("--id 3 --repair hope", "unknown repair strategy 'hope': use one of field, follow, home"),
+        ("--id 3 --clearance 0", "clearance 0.0: must be above 0 metres"),
         ("--id 3 --latitude 5", "--latitude and --longitude: give both, or neither"),
         ("--id 3 --latitude 5001 --longitude 0", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --latitude 0 --longitude inf", "longitude inf is not a finite number"),

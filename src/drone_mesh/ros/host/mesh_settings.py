@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from drone_mesh.communication.observer import MeshObserver, ignore_events
+from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.repair_strategies import create_repair_strategy
 from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.configuration import FactoryConfiguration
@@ -16,6 +18,8 @@ class MeshSettings:
 
     gateways: int  # ids below are gateways, the others routers
     routing: str  # name of the routing technique
+    repair: str  # name of the repair strategy
+    repair_options: RepairOptions
     timing: MeshTiming
     seed: int
     debug: bool
@@ -26,9 +30,16 @@ class MeshSettings:
     def of(cls, configuration: FactoryConfiguration) -> MeshSettings:
         """The part of the configuration that concerns the nodes. Raises ConfigurationError."""
         create_routing_technique(configuration.routing)  # one error now instead of one per node
+        create_repair_strategy(configuration.repair)
         return cls(
             gateways=configuration.gateways,
             routing=configuration.routing,
+            repair=configuration.repair,
+            repair_options=RepairOptions(
+                clearance_m=configuration.clearance,
+                range_m=configuration.max_distance,
+                avoid_wrecks=configuration.avoid_wrecks,
+            ),
             timing=MeshTiming(configuration.check_period, configuration.connection_lost_after),
             seed=configuration.seed,
             debug=configuration.debug,

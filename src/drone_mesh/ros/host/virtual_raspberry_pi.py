@@ -38,6 +38,8 @@ class VirtualRaspberryPi(abc.ABC):
             random.Random(f"{settings.seed}/{node_id}"),
             internet=self._make_internet(),
             routing=settings.routing,
+            repair=settings.repair,
+            repair_options=settings.repair_options,
             timing=settings.timing,
             observer=settings.observer,
             debug=settings.debug,
