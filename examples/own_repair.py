@@ -1,9 +1,11 @@
 """A repair of your own: the lowest id of a group flies, wherever it stands.
 
-PYTHONPATH=src python3 examples/own_repair.py
+PYTHONPATH=src python3 examples/own_repair.py --runs 20
 """
 
 from __future__ import annotations
+
+import argparse
 
 from drone_mesh.communication.repair_interfaces import Step
 from drone_mesh.communication.strategies.thesis import Thesis
@@ -20,8 +22,11 @@ class LowestId(Thesis):
 
 def main() -> None:
     """Both repairs over the same misfortunes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=5, help="sequences (default: %(default)s)")
+    runs = parser.parse_args().runs
     for repair in ("thesis", f"{__name__}:LowestId"):
-        outcomes = [run_sequence(seed, repair) for seed in range(5)]
+        outcomes = [run_sequence(seed, repair) for seed in range(runs)]
         healed = sum(outcome.healed for outcome in outcomes)
         flown_m = sum(outcome.flown_m for outcome in outcomes)
         print(f"{repair}: {healed} nodes connected again within 120 s, {flown_m:.0f} m flown")

@@ -76,3 +76,8 @@ def test_an_engine_of_ones_own_is_chosen_by_name_and_flies(monkeypatch):
 def test_an_engine_of_ones_own_takes_forty_lines():
     lines = (ROOT / "examples" / "own_engine.py").read_text(encoding="utf-8").splitlines()
     assert len(lines) <= 40
+
+
+def test_a_repair_of_ones_own_runs_beside_the_default():
+    lines = run_example("own_repair.py", "--runs", "1").splitlines()
+    assert [line.partition(": ")[0] for line in lines] == ["thesis", "__main__:LowestId"]
