@@ -78,6 +78,6 @@ def test_an_engine_of_ones_own_takes_forty_lines():
     assert len(lines) <= 40
 
 
-def test_a_repair_of_ones_own_runs_beside_the_default():
+def test_a_repair_of_ones_own_runs_beside_the_default(run_example):
     lines = run_example("own_repair.py", "--runs", "1").splitlines()
     assert [line.partition(": ")[0] for line in lines] == ["thesis", "__main__:LowestId"]
