@@ -44,6 +44,9 @@ class FactoryConfiguration:
     spacing: float = Field(1.0, gt=0, le=1000, description="metres")  # between routers
     gui: bool = Field(False)
     drones: Literal["builtin", "external"] = Field("builtin")  # external: other nodes fly them
+    flight: Literal["kinematic", "dynamic"] = Field("kinematic")  # dynamic: physics moves drones
+    wind_x: float = Field(0.0, ge=-20, le=20, description="metres per second")
+    wind_y: float = Field(0.0, ge=-20, le=20, description="metres per second")
     real_time_factor: float = Field(
         1.0,
         description=(

@@ -44,6 +44,40 @@ class BulletWorld(World):
     def move_box(self, box: int, centre: Vector) -> None:
         pybullet.resetBasePositionAndOrientation(box, centre, UPRIGHT, physicsClientId=self.client)
 
+    def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
+        """A box that physics moves; it stays upright, as a drone's controller keeps it."""
+        body = int(
+            pybullet.createMultiBody(
+                mass_kg,
+                self._shape(size),
+                basePosition=centre,
+                baseOrientation=UPRIGHT,
+                physicsClientId=self.client,
+            )
+        )
+        pybullet.changeDynamics(
+            body,
+            -1,
+            localInertiaDiagonal=(0.0, 0.0, 0.0),  # nothing turns it
+            linearDamping=0.0,  # the drag of the air is ours
+            angularDamping=0.0,
+            restitution=0.1,
+            physicsClientId=self.client,
+        )
+        return body
+
+    def body_state(self, body: int) -> tuple[Vector, Vector]:
+        """Centre (m) and velocity (m/s) of a body, in the world frame."""
+        position, _ = pybullet.getBasePositionAndOrientation(body, physicsClientId=self.client)
+        velocity, _ = pybullet.getBaseVelocity(body, physicsClientId=self.client)
+        return position, velocity
+
+    def push(self, body: int, force: Vector, centre: Vector) -> None:
+        """Newtons, world frame, at the centre, during the next step."""
+        pybullet.applyExternalForce(
+            body, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self.client
+        )
+
     def close(self) -> None:
         if self.client >= 0:
             pybullet.disconnect(physicsClientId=self.client)

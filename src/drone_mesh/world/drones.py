@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.roles import Role
+from drone_mesh.world.body import BodyLimits
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.dynamic_engine import DynamicEngine
 from drone_mesh.world.engine import DroneEngine
 from drone_mesh.world.interfaces import World
 
@@ -14,13 +18,28 @@ class VirtualDrone:
 
     ROLE: ClassVar[Role]
 
-    def __init__(self, world: World, node_id: int, longitude: float, latitude: float) -> None:
-        """Stands on the ground at this place (metres, world frame). Call in the world's thread."""
+    def __init__(
+        self,
+        world: World,
+        node_id: int,
+        longitude: float,
+        latitude: float,
+        wind: Vector | None = None,
+    ) -> None:
+        """Stands on the ground at this place (metres, world frame). Call in the world's thread.
+
+        With a `wind` (m/s) physics moves it, in a BulletWorld; without one it follows its path.
+        """
         half_height_m = self.ROLE.size_m[2] / 2
         centre = (longitude, latitude, half_height_m)
         self.node_id = node_id
-        self.box = world.add_box(self.ROLE.size_m, centre)
-        self.engine = DroneEngine(world, self.box, centre, half_height_m)
+        self.engine: DroneEngine
+        if wind is not None and isinstance(world, BulletWorld):
+            self.box = world.add_body(self.ROLE.size_m, centre, BodyLimits().mass_kg)
+            self.engine = DynamicEngine(world, self.box, centre, half_height_m, wind)
+        else:
+            self.box = world.add_box(self.ROLE.size_m, centre)
+            self.engine = DroneEngine(world, self.box, centre, half_height_m)
 
 
 class GatewayDrone(VirtualDrone):

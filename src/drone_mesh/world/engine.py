@@ -102,6 +102,9 @@ class DroneEngine(IDroneEngine):
 
     def _move(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
         self._world.move_box(self._box, position)
+        self._tell(position, path, now_s)
+
+    def _tell(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
         self._state = DroneState(position, path, now_s)
         for listener in self._listeners:
             listener(self._state)

@@ -21,8 +21,8 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.mavlink.autopilots import Autopilot
 from drone_mesh.drone.mavlink.commander import Commander, ParameterCheck
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.drone.mavlink.route import Route
 from drone_mesh.drone.mavlink.telemetry import Message, Telemetry
+from drone_mesh.drone.route import Route
 from drone_mesh.errors import GoalRefused
 
 TARGET_PERIOD_S = 0.2  # 5 Hz: PX4 wants 2 Hz at least

@@ -39,6 +39,9 @@ class Simulation:
             configuration.gridsize,
             configuration.spacing,
             configuration.debug,
+            (configuration.wind_x, configuration.wind_y, 0.0)
+            if configuration.flight == "dynamic"
+            else None,
         ).drones
         _log.info(
             "fleet: gateways %d, routers %d, spacing %g m",

@@ -1,0 +1,152 @@
+"""DynamicEngine: a drone that physics moves: mass, drag, wind, battery, collisions."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+from drone_mesh.drone.flight_path import FlightPath, Vector
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.route import Route
+from drone_mesh.errors import GoalRefused
+from drone_mesh.world.body import GRAVITY_M_S2, BodyLimits, controller_force, drag, learnt_trim
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.engine import DroneEngine
+
+SPEED_M_S = 2.0  # of the target that leads it
+ARRIVED_M = 0.15
+STANDS_M_S = 0.1
+ON_GROUND_M = 0.02  # of its underside
+LAND_AT_PERCENT = 20.0  # our choice: it comes down while it still can
+MOVED_M = 1e-4  # below this nobody is told
+
+_log = logging.getLogger(__name__)
+
+
+class DynamicEngine(DroneEngine):
+    """As DroneEngine; but the body has a mass, and the flight ends where physics lets it.
+
+    A hard hit ends its flights for good; an empty battery as well, after it has come down.
+    """
+
+    def __init__(
+        self,
+        world: BulletWorld,
+        box: int,
+        centre: Vector,
+        half_height_m: float,
+        wind: Vector = (0.0, 0.0, 0.0),
+        limits: BodyLimits = BodyLimits(),  # noqa: B008 (frozen)
+    ) -> None:
+        """`box` is a body with a mass; `wind` blows everywhere, m/s."""
+        super().__init__(world, box, centre, half_height_m)
+        self._physics = world
+        self._wind = wind
+        self._limits = limits
+        self._route: Route | None = None  # it flies
+        self._hover: Location | None = None  # it holds this place
+        self._velocity: Vector = (0.0, 0.0, 0.0)
+        self._pushed: Vector | None = None  # speed that the last forces alone would have given
+        self._trim: Vector = (0.0, 0.0, 0.0)
+        self._stepped_s = world.now_s
+        self.battery_percent = 100.0
+        self.crashed = False
+        world.wake(self)
+
+    def why_not_fly(self) -> str:
+        """Crashed, or out of battery; empty while it can fly."""
+        if self.crashed:
+            return "crashed"
+        if self.battery_percent <= LAND_AT_PERCENT:
+            return f"battery at {self.battery_percent:.0f} %"
+        return ""
+
+    def is_flying(self) -> bool:
+        """Whether a flight is under way."""
+        return self._route is not None or bool(self._goals)
+
+    def set_goal(self, latitude: float, longitude: float, height: float) -> None:
+        """As DroneEngine. Raises GoalRefused too if it cannot fly."""
+        why_not = self.why_not_fly()
+        if why_not:
+            raise GoalRefused(f"the drone cannot fly: {why_not}")
+        super().set_goal(latitude, longitude, height)
+
+    def step(self, now_s: float) -> bool:
+        """One step of physics has passed: look where it is, and push. Wants every turn."""
+        passed_s, self._stepped_s = now_s - self._stepped_s, now_s
+        position, velocity = self._physics.body_state(self._box)
+        if self._pushed is not None:
+            self._look_for_hits(velocity)
+        self._velocity = velocity
+        while self._goals:
+            self._begin(Location.from_vector(self._goals.popleft()), position, now_s)
+        in_air = self._route is not None or self._hover is not None
+        if in_air and not self.crashed:
+            self._fly(position, passed_s)
+        else:
+            self._pushed = None
+        path = self._state.path if self._route is not None else None
+        if path is not self._state.path or math.dist(position, self._state.position) > MOVED_M:
+            self._tell(position, path, now_s)
+        return True
+
+    def _begin(self, goal: Location, position: Vector, now_s: float) -> None:
+        here = Location.from_vector(position)
+        if self.why_not_fly() or goal.distance_m(self._hover or here) <= ARRIVED_M:
+            return
+        climb_m = here.distance_m(goal) / 2  # as docs/protocol.md, "World and flights"
+        self._route = Route(here, goal, here.height + climb_m, lands=False, speed_m_s=SPEED_M_S)
+        self._hover = None
+        self._tell(position, FlightPath(position, goal.to_vector(), now_s), now_s)
+
+    def _fly(self, position: Vector, passed_s: float) -> None:
+        self._use_battery(position, passed_s)
+        here, target = Location.from_vector(position), self._hover
+        route = self._route
+        if route is not None:
+            route.advance(here, passed_s)
+            target = route.target
+            slow = math.dist(self._velocity, (0.0, 0.0, 0.0)) < STANDS_M_S
+            if target == route.end and here.distance_m(route.end) <= ARRIVED_M and slow:
+                self._arrive(route.end)
+        if target is None or (self._route is None and self._hover is None):
+            self._pushed = None
+            return
+        goal = target.to_vector()
+        self._trim = learnt_trim(self._trim, position, goal, passed_s)
+        motors = controller_force(self._limits, position, self._velocity, goal, self._trim)
+        air = drag(self._limits, self._velocity, self._wind)
+        force = (motors[0] + air[0], motors[1] + air[1], motors[2] + air[2])
+        self._physics.push(self._box, force, position)
+        mass_kg, tick_s = self._limits.mass_kg, self._physics.tick_s
+        weight = (0.0, 0.0, -mass_kg * GRAVITY_M_S2)
+        x, y, z = (
+            speed + tick_s * (push + pull) / mass_kg
+            for speed, push, pull in zip(self._velocity, force, weight)
+        )
+        self._pushed = (x, y, z)
+
+    def _arrive(self, end: Location) -> None:
+        self._route = None
+        stands = end.height - self._half_height_m <= ON_GROUND_M
+        self._hover = None if stands else end
+
+    def _use_battery(self, position: Vector, passed_s: float) -> None:
+        before = self.battery_percent
+        self.battery_percent = max(0.0, before - 100.0 * passed_s / self._limits.hover_s)
+        if before > LAND_AT_PERCENT >= self.battery_percent:
+            _log.warning("box %d: battery low, it lands", self._box)
+            ground = Location.from_vector((position[0], position[1], self._half_height_m))
+            here = Location.from_vector(position)
+            self._route = Route(here, ground, here.height, lands=False, speed_m_s=SPEED_M_S)
+            self._hover = None
+        elif self.battery_percent == 0.0:
+            self._route = self._hover = None  # the motors stop
+
+    def _look_for_hits(self, velocity: Vector) -> None:
+        assert self._pushed is not None
+        if math.dist(velocity, self._pushed) > self._limits.crash_m_s:
+            self.crashed = True
+            self._route = self._hover = None
+            _log.warning("box %d: crashed", self._box)

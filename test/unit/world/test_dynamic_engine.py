@@ -1,0 +1,137 @@
+"""Drones that physics moves."""
+
+from __future__ import annotations
+
+import math
+from typing import Iterator
+
+import pytest
+
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import GoalRefused
+from drone_mesh.world.body import BodyLimits, controller_force
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.dynamic_engine import LAND_AT_PERCENT, DynamicEngine
+
+SIZE, HALF_M = (0.2, 0.2, 0.1), 0.05
+
+
+@pytest.fixture
+def world() -> Iterator[BulletWorld]:
+    with BulletWorld() as world:
+        yield world
+
+
+def drone(world: BulletWorld, x: float = 0.0, y: float = 0.0, z: float = HALF_M, **settings):
+    limits = settings.get("limits", BodyLimits())
+    box = world.add_body(SIZE, (x, y, z), limits.mass_kg)
+    return DynamicEngine(world, box, (x, y, z), HALF_M, **settings)
+
+
+def run(world: BulletWorld, seconds: float) -> None:
+    for _ in range(round(seconds / world.tick_s)):
+        world.step()
+
+
+def run_until_arrived(world: BulletWorld, engine: DynamicEngine, within_s: float = 120.0) -> float:
+    started_s = world.now_s
+    world.step()
+    while engine.is_flying():
+        assert world.now_s - started_s < within_s, engine.get_location()
+        world.step()
+    return world.now_s - started_s
+
+
+def test_it_flies_up_across_and_down_and_stands(world):
+    engine = drone(world)
+    heights = []
+    engine.add_listener(lambda state: heights.append(state.position[2]))
+    engine.set_goal(6.0, 0.0, 0)
+    assert run_until_arrived(world, engine) > 6.0 / 2.0
+    run(world, 2.0)
+    assert engine.get_location().distance_m(Location(6.0, 0.0, 0.0)) < 0.2
+    assert max(heights) == pytest.approx(3.0 + HALF_M, abs=0.3)
+    assert not engine.crashed
+    assert engine.state.path is None
+
+
+def test_it_hovers_at_a_goal_in_the_air_and_uses_its_battery(world):
+    engine = drone(world)
+    engine.set_goal(3.0, 0.0, 4)
+    run_until_arrived(world, engine)
+    before = engine.battery_percent
+    run(world, 12.0)
+    assert engine.get_location().distance_m(Location(3.0, 0.0, 4.0)) < 0.2
+    assert before - engine.battery_percent == pytest.approx(1.0, rel=0.01)  # 12 s of 1200
+
+
+def test_speed_and_acceleration_have_limits(world):
+    engine = drone(world)
+    limits = BodyLimits()
+    engine.set_goal(30.0, 0.0, 10)
+    world.step()
+    before = (0.0, 0.0, 0.0)
+    while engine.is_flying():
+        world.step()
+        _, velocity = world.body_state(engine._box)
+        assert math.hypot(*velocity[:2]) <= limits.max_speed_m_s + 0.1
+        assert velocity[2] <= limits.max_climb_m_s + 0.1
+        assert math.dist(velocity, before) / world.tick_s <= limits.max_acceleration_m_s2 + 2.0
+        before = velocity
+
+
+def test_wind_does_not_keep_it_from_its_goal(world):
+    engine = drone(world, wind=(3.0, -2.0, 0.0))
+    engine.set_goal(5.0, 5.0, 3)
+    run_until_arrived(world, engine)
+    run(world, 10.0)
+    assert engine.get_location().distance_m(Location(5.0, 5.0, 3.0)) < 0.5
+
+
+def test_wind_drifts_a_drone_whose_motors_do_not_correct(world):
+    body = world.add_body(SIZE, (0.0, 0.0, 50.0), 1.0)
+    for _ in range(100):
+        position, velocity = world.body_state(body)
+        world.push(body, (0.25 * (4.0 - velocity[0]), 0.0, 9.81), position)
+        world.step()
+    (x, _, z), _ = world.body_state(body)
+    assert x == pytest.approx(0.46, abs=0.05)  # 4 * (t - (1 - exp(-0.25 t)) / 0.25) after 1 s
+    assert z == pytest.approx(50.0, abs=0.1)
+
+
+def test_two_drones_that_meet_do_not_pass_through_each_other_and_a_hard_hit_ends_the_flight(world):
+    fast = BodyLimits(max_speed_m_s=5.0)
+    still = drone(world, 3.0, 0.0, 2.0)
+    still._hover = Location.from_vector((3.0, 0.0, 2.0))
+    other = drone(world, 0.0, 0.0, 2.0, limits=fast)
+    other._hover = Location.from_vector((12.0, 0.0, 2.0))  # straight through the first one
+    nearest = math.inf
+    for _ in range(600):
+        world.step()
+        nearest = min(nearest, math.dist(still.state.position, other.state.position))
+    assert nearest > 0.19
+    assert other.crashed
+    assert other.why_not_fly() == "crashed"
+    with pytest.raises(GoalRefused, match="crashed"):
+        other.set_goal(1.0, 1.0, 1)
+    run(world, 5.0)
+    assert other.get_location().height < 0.05  # it fell
+
+
+def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world):
+    engine = drone(world, limits=BodyLimits(hover_s=60.0))
+    engine.set_goal(0.0, 0.0, 5)
+    run_until_arrived(world, engine)
+    run(world, 80.0)
+    assert engine.battery_percent <= LAND_AT_PERCENT
+    place = engine.get_location()
+    assert place.height < 0.05
+    assert math.hypot(place.latitude, place.longitude) < 0.3
+    assert not engine.crashed
+    with pytest.raises(GoalRefused, match="battery"):
+        engine.set_goal(1.0, 1.0, 1)
+
+
+def test_the_motors_hold_the_weight_and_no_more_at_the_goal():
+    force = controller_force(BodyLimits(), (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
+    assert force == pytest.approx((0.0, 0.0, 9.81))
