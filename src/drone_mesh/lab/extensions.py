@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from typing import Callable, cast
 
-from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.metrics import METRICS
@@ -37,10 +36,10 @@ def check_technique(kind: str, name: str, model: str) -> None:
         if name not in IDEAL_RULES:
             known = ", ".join(sorted(IDEAL_RULES))
             raise ConfigurationError(f"no rule {name!r} for model ideal: use one of {known}")
-    elif kind == "routing":
-        create_routing_technique(name)
-    else:
-        Network(repair=name)
+        return
+    network = Network(**{kind: name})  # type: ignore[arg-type]
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 1.0, 0.0)
 
 
 def check_metric(name: str) -> None:

@@ -13,6 +13,8 @@ from pydantic import (
 )
 from typing_extensions import Annotated, Literal
 
+from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
+from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.lab.conditions import parse_condition
@@ -110,6 +112,13 @@ class Timing(Part):
     check_period_s: Above0 = 10.0
     connection_lost_after_s: Above0 = 30.0
     send_attempts: Annotated[int, Field(ge=1, le=20)] = 3
+
+
+class Repair(Part):
+    """The adjustable numbers of a repair, as RepairOptions has them; the range is range_m."""
+
+    clearance_m: Above0 = CLEARANCE_M
+    avoid_wrecks: bool = False
 
 
 class Box(Part):
@@ -289,8 +298,9 @@ class Scenario(Part):
     layout: Layout = Layout()
     range_m: Above0 = 9.0
     radio: Radio = Radio()
-    routing: str = "child_table_tree"
-    repair: str = "thesis"
+    routing: str = DEFAULT_ROUTING
+    repair: str = DEFAULT_REPAIR
+    repair_options: Repair = Repair()
     timing: Timing = Timing()
     obstacles: Obstacles = Obstacles()
     faults: List[Fault] = []

@@ -8,6 +8,7 @@ from typing import Any, Callable
 
 import numpy as np
 
+from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.flights import Flights
@@ -171,7 +172,14 @@ def _places(scenario: Scenario, streams: Streams) -> list[StartPlace]:
 
 def _options(scenario: Scenario) -> dict[str, Any]:
     """What is not left as the network has it by default."""
-    options: dict[str, Any] = {}
+    options: dict[str, Any] = {
+        "repair": scenario.repair,
+        "repair_options": RepairOptions(
+            clearance_m=scenario.repair_options.clearance_m,
+            range_m=scenario.range_m,
+            avoid_wrecks=scenario.repair_options.avoid_wrecks,
+        ),
+    }
     if scenario.radio.kind == "disc":
         options["delay_s"] = scenario.radio.delay_s
         options["jitter_s"] = scenario.radio.jitter_s
