@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any, Callable, Iterator
 
 import pytest
 
@@ -48,6 +49,10 @@ def endless(record):
 def slow(record):
     time.sleep(0.1)
     return 1.0
+
+def namespace(record):
+    time.sleep(0.05)
+    return float(os.stat("/proc/self/ns/net").st_ino % 10**9)
 
 def deadly(record):
     os.kill(os.getpid(), signal.SIGKILL)
@@ -281,6 +286,18 @@ def wait_for_rows(out: Path, number: int, process: subprocess.Popen[str]) -> Non
     raise AssertionError(f"fewer than {number} rows within 60 s")
 
 
+def address_of(scheduler_file: Path) -> str:
+    deadline_s = time.monotonic() + 60
+    while time.monotonic() < deadline_s:
+        if scheduler_file.exists():
+            text = scheduler_file.read_text()
+            address = text.partition('"address": "')[2].partition('"')[0]
+            if address:
+                return address
+        time.sleep(0.1)
+    raise AssertionError("the scheduler wrote no address within 60 s")
+
+
 @pytest.fixture
 def slow(bench: Callable[..., Path]) -> Path:
     """48 runs of a tenth of a second."""
@@ -364,14 +381,7 @@ def test_a_killed_scheduler_loses_nothing(slow: Path, slow_rows: bytes, tmp_path
          str(address_file), "--nthreads", "1", "--no-dashboard", "--no-nanny"], **quiet,
     )  # fmt: skip
     try:
-        deadline_s = time.monotonic() + 60
-        address = ""
-        while not address:
-            assert time.monotonic() < deadline_s, "the scheduler wrote no address within 60 s"
-            time.sleep(0.1)
-            if address_file.exists():
-                address = address_file.read_text().partition('"address": "')[2].partition('"')[0]
-        process = start(slow, out, "--cluster", address)
+        process = start(slow, out, "--cluster", address_of(address_file))
         wait_for_rows(out, 5, process)
         scheduler.kill()
         output = finish(process)
@@ -383,6 +393,72 @@ def test_a_killed_scheduler_loses_nothing(slow: Path, slow_rows: bytes, tmp_path
             one.wait()
     assert run(slow, out) == 0
     assert measured(out) == slow_rows
+
+
+def ip(*words: str) -> bool:
+    done = subprocess.run(["ip", *words], capture_output=True, check=False)
+    return done.returncode == 0
+
+
+@pytest.fixture
+def namespaces() -> Iterator[list[tuple[str, str]]]:
+    """(name, address of this side) of two network namespaces, each on a cable of its own."""
+    made = []
+    for number in (1, 2):
+        name, here, there = f"lab{os.getpid()}-{number}", f"lh{number}", f"lt{number}"
+        ready = shutil.which("ip") is not None and ip("netns", "add", name)
+        made.append((name, f"10.213.{number}.1"))
+        steps = [
+            ("link", "add", here, "type", "veth", "peer", "name", there, "netns", name),
+            ("addr", "add", f"10.213.{number}.1/24", "dev", here),
+            ("link", "set", here, "up"),
+            ("-n", name, "addr", "add", f"10.213.{number}.2/24", "dev", there),
+            ("-n", name, "link", "set", there, "up"),
+            ("-n", name, "link", "set", "lo", "up"),
+        ]
+        if not ready or not all(ip(*step) for step in steps):
+            for one, _ in made:
+                ip("netns", "del", one)
+            pytest.skip("making network namespaces needs root and iproute2")
+    yield made
+    for name, _ in made:
+        ip("netns", "del", name)  # its cable goes with it
+
+
+@pytest.mark.slow
+def test_workers_in_two_network_namespaces_share_a_batch(
+    bench: Callable[..., Path], tmp_path: Path, namespaces: list[tuple[str, str]]
+) -> None:
+    text = SMALL.replace("seeds: 4", "seeds: 30") + "metrics: ['own_lab_parts:namespace']\n"
+    address_file = tmp_path / "scheduler.json"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "0.0.0.0", "--port",
+             "0", "--no-dashboard", "--scheduler-file", str(address_file)], **quiet,
+        )
+    ]  # fmt: skip
+    try:
+        port = address_of(address_file).rpartition(":")[2]
+        for name, address in namespaces:
+            processes.append(
+                subprocess.Popen(
+                    ["ip", "netns", "exec", name, sys.executable, "-m",
+                     "distributed.cli.dask_worker", f"tcp://{address}:{port}", "--nthreads", "1",
+                     "--no-dashboard", "--no-nanny"], **quiet,
+                )
+            )  # fmt: skip
+        process = start(bench(text=text), tmp_path / "out", "--cluster", f"tcp://127.0.0.1:{port}")
+        output = finish(process)
+        assert process.returncode == 0, output
+    finally:
+        for one in processes:
+            one.kill()
+            one.wait()
+    rows = read_rows(tmp_path / "out/runs.csv")
+    assert len(rows) == 60
+    assert len({row["namespace"] for row in rows}) == 2
 
 
 @pytest.mark.slow
