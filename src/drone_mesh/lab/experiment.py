@@ -1,5 +1,6 @@
 """An experiment file: read, overridden from the command line, checked, and expanded into cells."""
 
+import copy
 import difflib
 import hashlib
 import itertools
@@ -295,7 +296,7 @@ def _scenario(
     placed: Dict[Place, str] = {}
     for axis, value in values.items():
         try:
-            placed[_put(content, axis, value)] = axis
+            placed[_put(content, axis, copy.deepcopy(value))] = axis
         except _NoSuchPlace as error:
             raise source.error(named[axis], f"axis {axis}: {error}") from None
     _read_files(content, source)
