@@ -155,7 +155,6 @@ def _network(scenario: Scenario, streams: Streams) -> Network:
         seed=streams.number("mesh"),
         timing=timing,
         routing=scenario.routing,
-        repair=scenario.repair,
         max_distance_m=scenario.range_m,
         **_options(scenario),
     )

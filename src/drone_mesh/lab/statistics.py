@@ -15,6 +15,7 @@ from scipy import stats
 
 RESAMPLES = 2000
 CONFIDENCE = 0.95
+FEWEST = 5  # our choice: resampling fewer values says next to nothing
 SEED = 1  # of the resampling: the same rows give the same report
 
 
@@ -55,8 +56,8 @@ def _bootstrap(values: Sequence[float], statistic: Callable[..., float]) -> Inte
     if n == 0:
         return Interval(math.nan, math.nan, math.nan, 0)
     value = float(statistic(values))
-    if n == 1:
-        return Interval(value, math.nan, math.nan, 1, "one run")
+    if n < FEWEST:
+        return Interval(value, math.nan, math.nan, n, "too few runs for an interval")
     if min(values) == max(values):
         return Interval(value, value, value, n, "all runs are equal")
     for method in ("BCa", "percentile"):

@@ -28,7 +28,7 @@ def test_the_interval_of_a_mean_holds_the_true_mean_in_about_95_of_100_samples()
 
 
 def test_equal_values_have_an_interval_of_no_width_that_says_so() -> None:
-    found = mean_interval([3.0, 3.0, 3.0])
+    found = mean_interval([3.0] * 6)
     assert (found.value, found.low, found.high) == (3.0, 3.0, 3.0)
     assert found.note == "all runs are equal"
 
@@ -38,8 +38,9 @@ def test_where_bca_is_undefined_the_percentile_interval_stands_in() -> None:
     assert found.low <= found.value <= found.high
 
 
-def test_one_value_has_no_interval() -> None:
-    found = mean_interval([4.0])
+@pytest.mark.parametrize("values", [[4.0], [3.0, 5.0], [4.0, 4.0]])
+def test_a_few_values_have_a_mean_and_no_interval(values: list[float]) -> None:
+    found = mean_interval(values)
     assert found.value == 4.0
     assert math.isnan(found.low)
     assert str(found) == "4"

@@ -12,6 +12,7 @@ import pytest
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.ideal import IDEAL_RULES, Swarm, run_ideal
+from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
@@ -43,6 +44,12 @@ def test_the_template_of_lab_new_is_a_valid_experiment(
         write_template("first_try")
     with pytest.raises(ConfigurationError, match="use letters, digits"):
         write_template("../x")
+
+
+def test_every_metric_is_defined_in_the_page_of_the_lab() -> None:
+    page = (EXPERIMENTS.parent / "docs" / "lab.md").read_text(encoding="utf-8")
+    for name, metric in METRICS.items():
+        assert f"| `{name}` | {metric.unit} | {metric.definition} |" in page
 
 
 # Rules without packets
