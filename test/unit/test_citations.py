@@ -15,7 +15,7 @@ LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
 # Words by which the documents were cited that a reader of the repository does not have.
 ELSEWHERE = re.compile(
     r"\b[Rr]eference,? (?:sections? )?\d|\bSDD\b|\bformula \d|\bsections? \d"
-    r"|\bChecklist row|\b(?:nrf24|lab|style|reference|sdd\.nl)\.md\b"
+    r"|\bChecklist row|(?<!docs/)\b(?:nrf24|lab|style|reference|sdd\.nl)\.md\b"
 )
 
 

@@ -47,7 +47,7 @@ def test_the_template_of_lab_new_is_a_valid_experiment(
 
 
 def test_every_metric_is_defined_in_the_page_of_the_lab() -> None:
-    page = (EXPERIMENTS.parent / "docs" / "lab.md").read_text(encoding="utf-8")
+    page = (EXPERIMENTS.parent / "docs/lab.md").read_text(encoding="utf-8")
     for name, metric in METRICS.items():
         assert f"| `{name}` | {metric.unit} | {metric.definition} |" in page
 
