@@ -21,6 +21,7 @@ class BodyLimits:
     max_climb_m_s: float = 3.0
     max_sink_m_s: float = 1.5
     hover_s: float = 1200.0  # how long a full battery holds it in the air
+    standby_s: float = 36_000.0  # how long it feeds the node on the ground
     crash_m_s: float = 2.0  # a change of speed within one step, which no motor makes
 
 

@@ -50,6 +50,7 @@ class DynamicEngine(DroneEngine):
         self._trim: Vector = (0.0, 0.0, 0.0)
         self._stepped_s = world.now_s
         self.battery_percent = 100.0
+        self._was_flat = False
         self.crashed = False
         world.wake(self)
 
@@ -60,6 +61,11 @@ class DynamicEngine(DroneEngine):
         if self.battery_percent <= LAND_AT_PERCENT:
             return f"battery at {self.battery_percent:.0f} %"
         return ""
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the battery is empty."""
+        return self.battery_percent == 0.0
 
     def is_flying(self) -> bool:
         """Whether a flight is under way."""
@@ -86,8 +92,11 @@ class DynamicEngine(DroneEngine):
             self._fly(position, passed_s)
         else:
             self._pushed = None
+            self._drain(passed_s / self._limits.standby_s)
         path = self._state.path if self._route is not None else None
-        if path is not self._state.path or math.dist(position, self._state.position) > MOVED_M:
+        is_news = path is not self._state.path or self.is_flat is not self._was_flat
+        self._was_flat = self.is_flat
+        if is_news or math.dist(position, self._state.position) > MOVED_M:
             self._tell(position, path, now_s)
         return True
 
@@ -134,7 +143,7 @@ class DynamicEngine(DroneEngine):
 
     def _use_battery(self, position: Vector, passed_s: float) -> None:
         before = self.battery_percent
-        self.battery_percent = max(0.0, before - 100.0 * passed_s / self._limits.hover_s)
+        self._drain(passed_s / self._limits.hover_s)
         if before > LAND_AT_PERCENT >= self.battery_percent:
             _log.warning("box %d: battery low, it lands", self._box)
             ground = Location.from_vector((position[0], position[1], self._half_height_m))
@@ -143,6 +152,9 @@ class DynamicEngine(DroneEngine):
             self._hover = None
         elif self.battery_percent == 0.0:
             self._route = self._hover = None  # the motors stop
+
+    def _drain(self, share: float) -> None:
+        self.battery_percent = max(0.0, self.battery_percent - 100.0 * share)
 
     def _look_for_hits(self, velocity: Vector) -> None:
         assert self._pushed is not None

@@ -55,6 +55,11 @@ class DroneEngine(IDroneEngine):
         """The drone after the last step in which it moved."""
         return self._state
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether its battery feeds nothing any more, so that its node is off too."""
+        return False
+
     def add_listener(self, listener: StateListener) -> None:
         """Call `listener` with the new state in each step that moves the drone.
 

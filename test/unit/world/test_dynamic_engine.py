@@ -132,6 +132,17 @@ def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world)
         engine.set_goal(1.0, 1.0, 1)
 
 
+def test_a_drone_is_flat_when_standing_has_used_the_rest_and_that_is_told_once(world):
+    engine = drone(world, limits=BodyLimits(standby_s=5.0))
+    told = []
+    engine.add_listener(lambda _state: told.append(engine.is_flat))
+    run(world, 4.0)
+    assert not engine.is_flat
+    run(world, 3.0)
+    assert engine.is_flat
+    assert told.count(True) == 1
+
+
 def test_the_motors_hold_the_weight_and_no_more_at_the_goal():
     force = controller_force(BodyLimits(), (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
     assert force == pytest.approx((0.0, 0.0, 9.81))

@@ -64,9 +64,9 @@ def flight_order(node_id: int, goal: Location) -> RequestGatewayDroneFlight:
 # DroneInfo (docs/protocol.md, "Who speaks in DroneInfo") ----------------------------------------
 
 
-def engine_info(node_id: int, position: Vector) -> DroneInfo:
-    """The DroneInfo of an engine: always a position, never a topic."""
-    return DroneInfo(nodeID=node_id, position=position, sub="", on=True)
+def engine_info(node_id: int, position: Vector, flat: bool = False) -> DroneInfo:
+    """The DroneInfo of an engine: always a position, never a topic; off if its battery is flat."""
+    return DroneInfo(nodeID=node_id, position=position, sub="", on=not flat)
 
 
 def antenna_info(node_id: int, topic: str, on: bool) -> DroneInfo:

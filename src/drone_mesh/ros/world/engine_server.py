@@ -53,7 +53,9 @@ class PositionReporter(rospy.SubscribeListener):
 
     def _report_all(self) -> None:
         for drone in self._drones:
-            self.report(engine_info(drone.node_id, drone.engine.state.position))
+            self.report(
+                engine_info(drone.node_id, drone.engine.state.position, drone.engine.is_flat)
+            )
 
 
 class EngineServer:
@@ -86,4 +88,4 @@ class EngineServer:
         landed = not state.is_flying
         if landed or state.now_s - self._reported_s >= INFO_PERIOD_S - _ROUNDING_S:
             self._reported_s = state.now_s
-            self._reporter.report(engine_info(self._node_id, state.position))
+            self._reporter.report(engine_info(self._node_id, state.position, self._engine.is_flat))
