@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import logging
 import multiprocessing
 import sys
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Iterable, Iterator
 
 from drone_mesh.communication.repair_options import DEFAULT_REPAIR
+from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.sequence import FIELDS, Outcome, run_sequence
 
 PROGRESS_S = 5.0  # of the wall
@@ -21,15 +21,15 @@ PROGRESS_S = 5.0  # of the wall
 def main(argv: list[str] | None = None) -> int:
     """Run what is not in the table yet, then sum up the table. 1 if a drone did harm."""
     arguments = _arguments(argv)
-    logging.disable(logging.CRITICAL)  # thousands of meshes complain at once
     seeds = range(arguments.first, arguments.first + arguments.runs)
     rows = _read(arguments.csv, seeds) if arguments.csv is not None else []
     done = {row.seed for row in rows}
     try:
-        for outcome in _run([seed for seed in seeds if seed not in done], arguments):
-            rows.append(outcome)
-            if arguments.csv is not None:
-                _append(arguments.csv, outcome)
+        with quiet_nodes():
+            for outcome in _run([seed for seed in seeds if seed not in done], arguments):
+                rows.append(outcome)
+                if arguments.csv is not None:
+                    _append(arguments.csv, outcome)
     except KeyboardInterrupt:
         print("stopped" + (": the same command goes on" if arguments.csv is not None else ""))
     print(summary(rows, arguments.repair))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import functools
 import json
-import logging
 import math
 import threading
 import time
@@ -17,6 +16,7 @@ from drone_mesh.lab import extensions
 from drone_mesh.lab.metrics import METRICS, measure_all
 from drone_mesh.lab.plan import RunSpec
 from drone_mesh.lab.provenance import code_version
+from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.simulation import Simulation
 from drone_mesh.lab.streams import Streams
@@ -56,10 +56,8 @@ def execute_batch(specs: list[RunSpec]) -> list[Outcome]:
 def execute(spec: RunSpec) -> Outcome:
     """Never raises for what the run does: that is its outcome."""
     started = time.perf_counter()
-    # A thousand runs would repeat each warning of the nodes a thousand times.
-    logging.getLogger("drone_mesh").setLevel(logging.CRITICAL)
     try:
-        with _Alarm(spec.timeout_s):
+        with quiet_nodes(), _Alarm(spec.timeout_s):
             values, event_hash, outages = _measure(spec)
     except KeyboardInterrupt:
         raise

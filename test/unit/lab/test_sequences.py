@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-
 import pytest
 
 from drone_mesh.lab.sequence import run_sequence
@@ -27,7 +25,6 @@ def test_the_command_goes_on_where_it_was_stopped(tmp_path, capsys):
     table = tmp_path / "outcomes.csv"
     assert main(["--runs", "2", "--csv", str(table)]) == 0
     assert main(["--runs", "3", "--csv", str(table)]) == 0
-    logging.disable(logging.NOTSET)
     lines = table.read_text(encoding="utf-8").splitlines()
     assert [line.split(",")[0] for line in lines] == ["seed", "0", "1", "2"]
     assert "3 sequences, seeds 0..2" in capsys.readouterr().out
