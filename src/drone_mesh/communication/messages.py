@@ -256,9 +256,9 @@ _TypedMessage = Union[
 ]
 AnyMessage = Union[Message, _TypedMessage]
 
-_GATEWAY_PLACE = struct.Struct("<BBffh")  # age + 1 in seconds, id, latitude, longitude, height
+_GATEWAY_PLACE = struct.Struct("<HBffh")  # age + 1 in seconds, id, latitude, longitude, height
 _GATEWAY_PLACE_AT = HEADER_BYTES + LocationMessage.BODY.size
-_OLDEST_AGE_S = 254
+_OLDEST_AGE_S = 2**16 - 2
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _HEARTBEAT = int(MessageType.HEARTBEAT)

@@ -901,19 +901,19 @@ def test_on_the_ground_it_asks_again_and_moves_aside_for_a_drone_that_it_did_not
 def test_a_next_hop_passes_on_where_the_gateway_is():
     rig = Rig()
     rig.connect_through(2)
-    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 80 40")
+    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 00 80 40")
     assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
     assert rig.mesh.places.gateway_seen_s == -10.0  # ten seconds ago
     rig.hear("09 09 02 01 01")
     (answer,) = rig.sent(LOCATION)
-    assert answer[19:] == bytes.fromhex("0b 00 00 00 80 40").ljust(13, b"\0")
+    assert answer[19:] == bytes.fromhex("0b 00 00 00 00 80 40").ljust(13, b"\0")
 
 
 def test_news_of_the_gateway_that_are_older_change_nothing():
     rig = Rig()
     rig.connect_through(2)
     rig.hear("00 02 01 01 01 00 00 80 3f")
-    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 80 40")
+    rig.hear("02 02 01 01 01 00 00 00 41 00 00 00 00 00 00 00 00 00 00 0b 00 00 00 00 80 40")
     assert rig.mesh.places.gateway == Location(1.0, 0.0, 0.0)
 
 
