@@ -12,6 +12,7 @@ from typing import Callable, Iterator, Sequence
 
 from drone_mesh.lab.air_trial import (
     CHIPS,
+    DISC,
     MODEL,
     AirTrial,
     give_orders,
@@ -96,12 +97,13 @@ def _orders(relays: bool) -> Row:
     return Row(f"101 nodes, 1M: orders to {whom}", "99 % within 2 s, losses reported", run)
 
 
-# The last moment at which a node was unconnected on the ideal disc, worst of 20 seeds.
+# When the last node was connected again on the ideal disc, worst of 20 seeds:
+# `air_table --radio disc --seeds 20 --row layout`.
 _ON_THE_DISC_S = {
-    (101, (3,)): 19.0,
-    (102, (2, 5, 8)): 20.0,
-    (201, (2,)): 63.0,
-    (202, (1,)): 113.0,
+    (101, (3,)): 15.2,
+    (102, (2, 5, 8)): 22.6,
+    (201, (2,)): 53.2,
+    (202, (1,)): 83.5,
 }
 
 
@@ -122,7 +124,7 @@ def _layout(case: int, dead: tuple[int, ...]) -> Row:
     return Row(f"layout {case} without {names}", f"back within {most_s:g} s", run)
 
 
-ROWS = (
+AIR_ROWS = (
     _connects(AirTrial(17), 8.0, 0.999),
     _connects(AirTrial(26), 12.0, 0.998),
     _connects(AirTrial(50), 20.0, 0.995),
@@ -133,6 +135,9 @@ ROWS = (
     _connects(AirTrial(50, spacing_m=1.0), 30.0, 0.99),
     _connects(AirTrial(50, links="distance"), 30.0, 0.99),
     _connects(AirTrial(50, loss=0.1), 60.0, 0.98),
+)
+ROWS = (
+    *AIR_ROWS,
     _survives(10, 40.0),
     _survives(30, 40.0),
     _orders(relays=False),
@@ -150,9 +155,10 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--radio",
-        choices=(CHIPS, MODEL),
+        choices=(CHIPS, MODEL, DISC),
         default=CHIPS,
-        help="emulated chips (exact, slow) or the fast model (default %(default)s)",
+        help="emulated chips (exact, slow), the fast model, or the ideal disc to compare with, "
+        "which has no rows about its air (default %(default)s)",
     )
     parser.add_argument(
         "--quick", action="store_true", help="26 and 50 nodes, one seed, one minute: for CI"
@@ -178,6 +184,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Print the table; 1 if an aim was missed."""
     arguments = _arguments(argv)
     rows = QUICK_ROWS if arguments.quick else ROWS
+    if arguments.radio == DISC:
+        rows = ROWS[len(AIR_ROWS) :]
     rows = tuple(
         row for row in rows if not arguments.row or any(part in row.name for part in arguments.row)
     )

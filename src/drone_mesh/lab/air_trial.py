@@ -19,7 +19,7 @@ from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, S
 from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 
-CHIPS, MODEL = "chips", "model"
+CHIPS, MODEL, DISC = "chips", "model", "disc"
 SAMPLE_S = 0.1  # how closely the connection of the nodes is looked at
 SETTLE_S = 20.0  # from "all connected" to what the trial is about
 GATEWAY = 0
@@ -116,10 +116,14 @@ class ChipMesh:
 class ModelMesh:
     """The mesh on the fast model."""
 
-    def __init__(self, trial: AirTrial) -> None:
-        self.network = Network(
-            seed=trial.seed, radio="shared", rate=trial.rate, links=_links(trial)
-        )
+    def __init__(self, trial: AirTrial, shared: bool = True) -> None:
+        """Not `shared`: the ideal disc, which has no figures of its air."""
+        if shared:
+            self.network = Network(
+                seed=trial.seed, radio="shared", rate=trial.rate, links=_links(trial)
+            )
+        else:
+            self.network = Network(seed=trial.seed, loss=trial.loss)
         self.network.add_gateway(GATEWAY, -1.0, 0.0)
         for index, (x, y) in enumerate(trial.router_places()):
             self.network.add_router(index + 1, x, y)
@@ -155,8 +159,8 @@ class ModelMesh:
 
 
 def make_mesh(trial: AirTrial, kind: str) -> ChipMesh | ModelMesh:
-    """The mesh of a trial on CHIPS or on the MODEL; all its nodes start at once."""
-    return ChipMesh(trial) if kind == CHIPS else ModelMesh(trial)
+    """The mesh of a trial on CHIPS, the MODEL or the DISC; all its nodes start at once."""
+    return ChipMesh(trial) if kind == CHIPS else ModelMesh(trial, shared=kind == MODEL)
 
 
 def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> Figures:
