@@ -75,6 +75,8 @@ class MeshState(Message):
     real_time_factor: float
     achieved_real_time_factor: float
     paused: bool
+    routing: str
+    repair_strategy: str
     nodes: list[NodeState]
     def __init__(
         self,
@@ -83,6 +85,8 @@ class MeshState(Message):
         real_time_factor: float = ...,
         achieved_real_time_factor: float = ...,
         paused: bool = ...,
+        routing: str = ...,
+        repair_strategy: str = ...,
         nodes: Sequence[NodeState] = ...,
     ) -> None: ...
 
@@ -135,6 +139,7 @@ class NodeState(Message, NodeStatus):
     tries: float
     queue: int
     given_up: int
+    repair: str
     def __init__(
         self,
         id: int = ...,
@@ -157,6 +162,7 @@ class NodeState(Message, NodeStatus):
         tries: float = ...,
         queue: int = ...,
         given_up: int = ...,
+        repair: str = ...,
     ) -> None: ...
 
 class RequestGatewayDroneFlight(Message):

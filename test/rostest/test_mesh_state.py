@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import unittest
 
 import rosgraph
@@ -61,6 +62,9 @@ class MeshStateTest(unittest.TestCase):
         self.assertLess(far.report_age, 3.0)
         self.assertEqual(self.state.max_distance, 9.0)
         self.assertEqual(self.state.real_time_factor, 4.0)
+        self.assertEqual(self.state.routing, "child_table_tree")
+        self.assertEqual(self.state.repair_strategy, "thesis")
+        self.assertEqual([node.repair for node in self.state.nodes], [""] * 4)
         wait_for("no trouble", WALL_LIMIT_S, lambda: self.levels() == {"drone_mesh: mesh": 0})
 
     def test_2_a_power_off_is_an_event_and_trouble(self) -> None:
@@ -78,6 +82,12 @@ class MeshStateTest(unittest.TestCase):
                 and self.levels().get("drone_mesh: node 3") == 2
             ),
         )
+        wait_for(
+            "3 waits for a gateway",
+            WALL_LIMIT_S,
+            lambda: re.fullmatch(r"waits \d+ s for a gateway", self.state.nodes[3].repair),
+        )
+        self.assertEqual(self.state.nodes[2].repair, "")
         call("/Nodes/2/powerSwitch", PowerSwitch, True)
         wait_for("all connected again", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])
 

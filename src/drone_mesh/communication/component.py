@@ -39,6 +39,7 @@ from drone_mesh.communication.observer import (
 )
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.places import KnownPlaces
+from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
@@ -258,9 +259,9 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             return node
         return self._routing.get_direction_to_node(node)
 
-    def get_repair_status(self) -> str:
-        """What the repair does and why, in a few words; empty while nothing is to be repaired."""
-        return ""
+    def get_repair_status(self) -> RepairStatus:
+        """What the node does about a lost connection, and why."""
+        return NOTHING_TO_REPAIR
 
     def get_channel_use(self) -> ChannelUse:
         """What the antenna does on a shared channel."""

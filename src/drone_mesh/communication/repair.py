@@ -11,6 +11,7 @@ from typing import Callable, Mapping
 
 from drone_mesh.communication.connection import GatewayConnection
 from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.messages import (
     LocationMessage,
@@ -27,6 +28,7 @@ from drone_mesh.communication.repair_interfaces import (
     Step,
 )
 from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.router_states import Repair, RouterEvent, RouterStates
 from drone_mesh.communication.spots import PITCH, beside, own_spot
 from drone_mesh.drone.goal import check_goal
@@ -61,6 +63,7 @@ class ConnectionRepair(IRepairActions):
         self._was_silent = False
         self._in_vain: list[Location] = []  # where this drone flew since it was last connected
         self._flight: RepairFlight | None = None
+        self._flies_to_place_of = NO_ROUTE
         strategy.start(self)
 
     # What the router reports -----------------------------------------------------------------
@@ -75,8 +78,7 @@ class ConnectionRepair(IRepairActions):
             self._notice_loss(due_s)
         elif state is Repair.LOST:
             self._was_silent = self.silent
-            patience_s = self.connection_lost_after_s * (SILENCE_FACTOR if self.silent else 1.0)
-            if due_s - self._lost_since_s >= patience_s - ROUNDING_S:
+            if due_s >= self._emergency_s() - ROUNDING_S:
                 self._parts.report(MeshEventKind.EMERGENCY)
                 self._strategy.on_emergency()
         elif self._checked_s is None:
@@ -95,6 +97,7 @@ class ConnectionRepair(IRepairActions):
         """The antenna has no power."""
         self._connection.end(RouterEvent.ANTENNA_OFF)
         self._clear()
+        self._strategy.reason = ""
         self._strategy.on_stopped()
 
     def on_ordered_flight(self) -> None:
@@ -133,20 +136,30 @@ class ConnectionRepair(IRepairActions):
         self._strategy.on_time()
         return False
 
-    def status(self) -> str:
-        """What the repair does and why, in a few words; empty while nothing is to be repaired."""
-        state = self._states.repair
-        if self._flight is not None:
-            place = self._flight.goal.in_words()
-            return "landed, looks for others" if self._flight.on_ground else f"flies to {place}"
-        if self._states.connected or state is Repair.FLYING:
-            return ""
-        words = [state.value]
-        if self.silent:
-            words.append("hears no node at all, the medium may be down")
-        if self._strategy.reason:
-            words.append(self._strategy.reason)
-        return ", ".join(words)
+    def status(self) -> RepairStatus:
+        """What the repair does now, and why."""
+        state, flight, strategy = self.state, self._flight, self._strategy
+        if flight is not None:
+            return RepairStatus(
+                state,
+                reason="a gateway answers" if self.connected else "",
+                place_of=self._flies_to_place_of,
+                goal=flight.goal,
+                landed=flight.on_ground,
+            )
+        at_rest = state is Repair.AT_REST and not strategy.reason
+        if self.connected or state is Repair.FLYING or at_rest:
+            return NOTHING_TO_REPAIR
+        bids = state in (Repair.NEGOTIATING, Repair.WATCHING)
+        return RepairStatus(
+            state,
+            strategy.reason,
+            bid=strategy.own_bid if bids else NO_BID,
+            place_of=strategy.bids_for if bids else NO_ROUTE,
+            winner=strategy.winner if state is Repair.WATCHING else NO_ROUTE,
+            emergency_s=self._emergency_s(),
+            silent=self.silent,
+        )
 
     # Views of the strategy -------------------------------------------------------------------
 
@@ -239,6 +252,7 @@ class ConnectionRepair(IRepairActions):
             self._parts, self._introduce, step.owner, step.place, self._goal(step), self._options
         )
         flight.stops_when_connected = until_connected or step.home
+        self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
         self._in_vain.append(step.place)
         self._parts.neighbours.forget_all()
         self._parts.routing.node_moved_location()
@@ -344,6 +358,10 @@ class ConnectionRepair(IRepairActions):
             return beside(step.place, origin, PITCH * self.clearance_m)
         return step.place
 
+    def _emergency_s(self) -> float:
+        factor = SILENCE_FACTOR if self.silent else 1.0
+        return self._lost_since_s + self.connection_lost_after_s * factor
+
     def _notice_loss(self, due_s: float) -> None:
         self._lost_since_s = due_s
         self._connection.end(RouterEvent.LOSS_NOTICED)
@@ -353,6 +371,7 @@ class ConnectionRepair(IRepairActions):
     def _took_off(self) -> None:
         self._connection.end(RouterEvent.TOOK_OFF)
         self._clear()
+        self._strategy.reason = ""
         self._strategy.on_stopped()
         self._parts.places.left_own_place(self._connection.gateway)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import abc
 from typing import Mapping, NamedTuple
 
+from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.router_states import Repair, RouterEvent
@@ -175,7 +176,11 @@ class IRepairStrategy(abc.ABC):
     a repair is not asked to do anything.
     """
 
-    reason = ""  # why the drone does not fly, in a few words for people
+    # For people, who read them as RepairStatus:
+    reason = ""  # why the drone does not fly, in a few words
+    own_bid = NO_BID  # in an election
+    bids_for = NO_ROUTE  # the node whose place it would take
+    winner = NO_ROUTE  # of an election; it has to take off
 
     def start(self, mesh: IRepairActions) -> None:
         """Called once, before everything else."""

@@ -21,6 +21,7 @@ from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.router_states import Link, Repair, RouterStates
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.strategies.thesis import Thesis
@@ -58,6 +59,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             repair or Thesis(),
             repair_options or RepairOptions(),
         )
+        self._repair_status = NOTHING_TO_REPAIR  # replaced whole: any thread reads it
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
@@ -67,6 +69,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
         super().tick(now_s)
         if now_s >= self._deadlines.get(Due.REPAIR) and self._repair.on_due():
             self._landed()
+        self._repair_status = self._repair.status()
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        """As MeshnetworkComponent."""
+        super().on_msg(payload, now_s)
+        self._repair_status = self._repair.status()
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered last time, or may still answer."""
@@ -80,9 +88,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
         """Hops to the preferred gateway; 255 while not known."""
         return self._connection.hops
 
-    def get_repair_status(self) -> str:
-        """What the repair does and why, in a few words; empty while nothing is to be repaired."""
-        return self._repair.status()
+    def get_repair_status(self) -> RepairStatus:
+        """What the node does about a lost connection, and why."""
+        return self._repair_status
 
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`; the one to the preferred gateway wants an answer."""

@@ -64,6 +64,8 @@ class FrameStore:
             "range": round(mesh.max_distance, 3),
             "summary": summary.text,
             "severity": int(summary.severity),
+            "routing": mesh.routing,
+            "repair": mesh.repair_strategy,
         }
         for gone in self._nodes.keys() - {node.id for node in mesh.nodes}:
             del self._nodes[gone]
@@ -190,6 +192,7 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "route": list(node.route),
         "position": _centimetres(node.position) if position_is_known(node) else None,
         "path": _centimetres(node.path),
+        "repair": node.repair,
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,
     }

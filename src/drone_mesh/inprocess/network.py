@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import random
+from dataclasses import replace
 from typing import Callable, Iterable
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
@@ -288,7 +289,10 @@ class Network:
 
     def status(self) -> MeshStatus:
         """All nodes now, as /mesh/state would tell: for tables, samples, reports and pictures."""
-        return mesh_status(self.nodes, self.clock.now_s, self.air.max_distance_m)
+        state = mesh_status(self.nodes, self.clock.now_s, self.air.max_distance_m)
+        repair = self._repair
+        repair = repair if isinstance(repair, str) else getattr(repair, "__name__", "")
+        return replace(state, routing=self._routing, repair_strategy=repair)
 
     def event_records(self) -> list[EventRecord]:
         """All events so far, as /mesh/events would tell: for the story of the run."""

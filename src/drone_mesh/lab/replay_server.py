@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Sequence
 
@@ -76,13 +77,11 @@ class Player:
         went_back = told < self._told
         wall_s = time.monotonic()
         self._store.update_mesh(
-            MeshStatus(
-                state.stamp_s,
-                state.nodes,
-                state.max_distance,
-                self.factor,
-                self.factor,
-                self.paused,
+            replace(
+                state,
+                real_time_factor=self.factor,
+                achieved_real_time_factor=self.factor,
+                paused=self.paused,
             ),
             wall_s,
         )

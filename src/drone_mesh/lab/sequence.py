@@ -258,7 +258,10 @@ def _outcome(mesh: Mesh, seed: int, incidents: str) -> Outcome:
     outcome.cut_off, outcome.healed = mesh.cut_off, mesh.healed
     outcome.unhealed = len(left)
     outcome.unexplained = sum(_is_able(mesh, node) for node in left)
-    outcome.why = " | ".join(f"{n}: {network.nodes[n].component.get_repair_status()}" for n in left)
+    reasons = {n: network.nodes[n].component.get_repair_status() for n in left}
+    outcome.why = " | ".join(
+        f"{n}: {why.in_words(network.clock.now_s)}" for n, why in reasons.items()
+    )
     outcome.flown_m = round(sum(node.drone.flown_m for node in network.nodes.values()), 2)
     outcome.endless = sum(
         count

@@ -41,6 +41,7 @@ class NodeStatus:
     tries: float = 0.0  # per packet on a shared channel; 0 on another medium
     queue: int = 0  # packets that wait to be sent
     given_up: int = 0  # packets that no try could deliver
+    repair: str = ""  # what it does about a lost connection, and why; empty: nothing to repair
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,8 @@ class MeshStatus:
     real_time_factor: float = 1.0
     achieved_real_time_factor: float = 0.0
     paused: bool = False
+    routing: str = ""  # name of the routing technique; empty: not known
+    repair_strategy: str = ""  # name of the repair strategy; empty: not known
 
 
 def position_is_known(node: NodeStatus) -> bool:

@@ -31,6 +31,7 @@ def describe_component(
     use = component.get_channel_use()
     status.airtime, status.tries = use.airtime, use.tries
     status.queue, status.given_up = use.waiting, use.given_up
+    status.repair = component.get_repair_status().in_words(now_s) if on else ""
     heard_s = component.get_neighbours()
     # numpy, because a crowd of 254 has 36,000 neighbours to list twice a second.
     ids = np.fromiter(heard_s, np.uint8, len(heard_s))

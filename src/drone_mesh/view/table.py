@@ -25,7 +25,7 @@ def mesh_table(mesh: MeshStatus, colours: bool) -> str:
     troubles = {trouble.node: trouble for trouble in find_trouble(mesh.nodes)}
     summary = summarise(mesh.nodes, list(troubles.values()))
     speed = "paused" if mesh.paused else f"speed {mesh.achieved_real_time_factor:.2g}x"
-    heading = f"t = {mesh.stamp_s:.1f} s, {speed}: {summary.text}"
+    heading = f"t = {mesh.stamp_s:.1f} s, {speed}: {summary.text}{_names(mesh)}"
     headings: tuple[str, ...] = _HEADINGS
     rows = [_row(node, troubles.get(node.id)) for node in mesh.nodes]
     if any(node.tries for node in mesh.nodes):
@@ -57,8 +57,14 @@ def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
         str(node.total_messages),
         _position(node),
         _route(node.route),
-        trouble.text if trouble else "",
+        "; ".join(filter(None, (trouble.text if trouble else "", node.repair))),
     )
+
+
+def _names(mesh: MeshStatus) -> str:
+    """The algorithms in use; an old recording does not name them."""
+    named = {"routing": mesh.routing, "repair": mesh.repair_strategy}
+    return "".join(f"; {what} {name}" for what, name in named.items() if name)
 
 
 def _channel(node: NodeStatus) -> tuple[str, ...]:

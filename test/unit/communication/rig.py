@@ -181,6 +181,10 @@ class Rig:
         """The names of what was reported."""
         return [event.kind.name for event in self.events]
 
+    def repair_in_words(self):
+        """What people see of the repair."""
+        return self.mesh.get_repair_status().in_words(self.now_s)
+
     # Shorthand for what many tests begin with; the packets are those of gateway 0.
 
     def know_neighbour(self, *nodes):

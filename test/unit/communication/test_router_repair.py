@@ -639,7 +639,24 @@ def test_a_place_on_which_a_neighbour_stands_is_occupied():
     rig.wait_until(EMERGENCY_S)
     rig.hear(place(3, 8.3), place(4, 30.0))  # 2's place is at 8
     assert rig.sent(BID) == [own_bid(3, -1.0), own_bid(4, -1.0)]
-    assert rig.mesh.get_repair_status().endswith("the place of 2 is occupied by 3")
+    assert rig.repair_in_words() == "negotiating, does not bid: the place of 2 is occupied by 3"
+
+
+def test_each_step_of_an_election_is_described():
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S - 3.5)
+    assert rig.repair_in_words() == "waits 4 s for a gateway"
+    rig.wait_until(EMERGENCY_S)
+    assert rig.repair_in_words() == "asks where its neighbours are"
+    rig.hear(place(3, 30.0), place(4, 30.0))
+    assert rig.repair_in_words() == "negotiating, bids 8.0 m for the place of 2"
+    rig.hear(bid(3, 9.0), bid(4, 1.0))
+    rig.wait_until(BIDS_S + TO_DECISION_S)
+    assert rig.repair_in_words() == "waits for 3 to take off"
+    rig.hear(bid(3, TOOK_OFF))
+    assert rig.repair_in_words() == "does not fly: 3 flies instead"
+    rig.connect_to_gateway()
+    assert rig.repair_in_words() == ""
 
 
 def test_a_place_from_which_all_neighbours_keep_clear_is_free():
@@ -683,7 +700,7 @@ def test_a_drone_that_cannot_fly_does_not_bid_and_says_why():
     rig.engine.grounded = "the battery is empty"
     rig.wait_until(BIDS_S)
     assert rig.sent(BID) == [own_bid(3, -1.0)]
-    assert "cannot fly: the battery is empty" in rig.mesh.get_repair_status()
+    assert "cannot fly: the battery is empty" in rig.repair_in_words()
 
 
 def test_a_lone_drone_that_cannot_fly_stays():
@@ -758,7 +775,7 @@ def test_what_another_drone_found_in_vain_is_no_second_choice():
         rig.hear(bid(3, IN_VAIN), bid(2, -1.0))
         rig.wait(TO_DECISION_S)
     assert rig.engine.goals == []
-    assert "another drone flew to the gateway in vain" in rig.mesh.get_repair_status()
+    assert "another drone flew to the gateway in vain" in rig.repair_in_words()
 
 
 def test_after_a_flight_of_another_drone_to_the_gateway_there_is_none_for_a_minute():

@@ -58,6 +58,18 @@ def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():
     assert frame(store, known)["nodes"] == {"1": {"hops": 3, "total_messages": 7}}
 
 
+def test_a_page_gets_the_names_of_the_algorithms_and_what_each_repair_does():
+    store = FrameStore()
+    named = replace(mesh(repair=""), routing="etx_tree", repair_strategy="thesis")
+    store.update_mesh(named, wall_s=0.0)
+    first = frame(store, 0)
+    assert (first["clock"]["routing"], first["clock"]["repair"]) == ("etx_tree", "thesis")
+    assert first["nodes"]["1"]["repair"] == ""
+    known = store.version
+    store.update_mesh(mesh(1.2, repair="flies to the place of 2"), wall_s=0.2)
+    assert frame(store, known)["nodes"] == {"1": {"repair": "flies to the place of 2"}}
+
+
 def test_movements_below_a_centimetre_are_not_sent():
     store = FrameStore()
     store.update_mesh(mesh(), wall_s=0.0)

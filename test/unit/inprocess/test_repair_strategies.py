@@ -49,7 +49,9 @@ def test_with_stay_no_drone_flies():
     network.run_for(300.0)
     assert flown(network) == set()
     assert not network.connected(3)
-    assert network.nodes[3].component.get_repair_status().endswith("never flies")
+    assert network.status().repair_strategy == "stay"
+    sentence = network.status().nodes[3].repair
+    assert sentence == "waits for a gateway; does not fly: its strategy never flies"
 
 
 def test_with_home_a_drone_flies_no_farther_than_it_needs_to_be_connected():

@@ -74,3 +74,15 @@ def test_on_a_shared_channel_the_table_shows_what_each_node_does_on_it():
     assert "airtime  tries  queue  given up" in lines[1]
     assert "1.2 %    1.25   3      2" in lines[2]
     assert "0.0 %    1.00   0      0" in lines[3]
+
+
+def test_the_heading_names_the_routing_and_the_repair_in_use():
+    mesh = MeshStatus(1.0, [], routing="etx_tree", repair_strategy="thesis")
+    heading = mesh_table(mesh, colours=False).splitlines()[0]
+    assert heading.endswith("; routing etx_tree; repair thesis")
+
+
+def test_a_remark_ends_with_what_the_repair_does_and_why():
+    node = NodeStatus(3, repair="does not fly: the place of 2 is occupied by 4")
+    row = mesh_table(MeshStatus(1.0, [node]), colours=False).splitlines()[2]
+    assert row.endswith("not connected to a gateway; does not fly: the place of 2 is occupied by 4")

@@ -10,4 +10,4 @@ class Stay(IRepairStrategy):
 
     def on_emergency(self) -> None:
         """Nothing."""
-        self.reason = "never flies"
+        self.reason = "its strategy never flies"

@@ -40,8 +40,6 @@ class Thesis(IRepairStrategy):
         super().start(mesh)
         self._election = Election(mesh.check_period_s)
         self._asked_s = -math.inf
-        self._score_sent = NO_BID
-        self._winner = NO_ROUTE
         self._rounds_without_flier = 0
         self._quiet_until_s = -math.inf
         self._home_again_s = -math.inf  # not before this may another one fly to the gateway
@@ -192,15 +190,16 @@ class Thesis(IRepairStrategy):
 
     def _negotiate(self) -> None:
         step, self.reason = self._next_step(alone=False)
-        self._score_sent = NO_BID if step is None else self._score(step)
-        detail = f"score {self._score_sent:.2f}"
+        self.own_bid = NO_BID if step is None else self._score(step)
+        self.bids_for = NO_ROUTE if step is None else step.owner
+        detail = f"score {self.own_bid:.2f}"
         self.mesh.report(MeshEventKind.NEGOTIATION_STARTED, detail=detail)
         self.mesh.happened(RouterEvent.BID)
         self._begin_election()
 
     def _begin_election(self) -> None:
         mesh = self.mesh
-        score = as_on_the_air(self._score_sent)
+        score = as_on_the_air(self.own_bid)
         settled_s = max(mesh.now_s, self._asked_s + PLACES_WITHIN_S) + SETTLE_S
         self._election.start(mesh.node_id, score, mesh.now_s, settled_s)
         mesh.bid(IN_VAIN if self._was_home() and score < 0 else score)
@@ -220,8 +219,7 @@ class Thesis(IRepairStrategy):
             self._rounds_without_flier += 1
             self._end_round()
         elif winner != mesh.node_id:
-            self._winner = winner
-            self.reason = f"{winner} has won"
+            self.winner = winner
             mesh.happened(RouterEvent.BIDS_COUNTED)
             mesh.wait_until(mesh.now_s + TAKE_OFF_WITHIN_S)
         else:
@@ -240,6 +238,7 @@ class Thesis(IRepairStrategy):
             mesh.connection_lost_after_s - mesh.check_period_s, TAKE_OFF_WITHIN_S
         )
         self._rounds_without_flier = 0
+        self.reason = f"{node} flies instead"
         if code == TOOK_OFF_HOME:
             self._home_again_s = mesh.now_s + HOME_AGAIN_S
         mesh.bid(code, node, but_not_to=from_)
@@ -262,7 +261,7 @@ class Thesis(IRepairStrategy):
 
     def _pass_over_winner(self) -> None:
         """The winner did not take off: the next best flies."""
-        self._election.pass_over(self._winner)
+        self._election.pass_over(self.winner)
         self.mesh.happened(RouterEvent.WINNER_MISSED)
         self._begin_election()
 

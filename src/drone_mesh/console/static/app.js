@@ -62,7 +62,7 @@ function setText(id, text) {
 }
 
 function showHead() {
-  const { t, achieved, factor, paused, summary, severity } = mesh.clock;
+  const { t, achieved, factor, paused, summary, severity, routing, repair } = mesh.clock;
   if (t === undefined) return;
   setText(
     "clock",
@@ -70,6 +70,9 @@ function showHead() {
   );
   setText("summary", summary);
   byId("summary").dataset.severity = severity;
+  const named = { Routing: routing, repair };
+  const names = Object.entries(named).filter(([, name]) => name);
+  setText("algorithms", names.map((pair) => pair.join(" ")).join(", "));
   setText("pause", paused ? "Resume" : "Pause");
   byId("pause").setAttribute("aria-pressed", paused);
   const speed = byId("speed");

@@ -41,6 +41,7 @@ export class NodePanel {
 
   #facts(node) {
     const facts = [
+      ...(node.repair ? [["Repair", node.repair, { wide: true }]] : []),
       [node.condition === "connected" ? "Gateway" : "Last gateway", orDash(node.gateway)],
       ["Hops", orDash(node.hops)],
       [

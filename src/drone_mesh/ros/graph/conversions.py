@@ -102,6 +102,8 @@ def state_msg(mesh: MeshStatus) -> MeshState:
         real_time_factor=mesh.real_time_factor,
         achieved_real_time_factor=mesh.achieved_real_time_factor,
         paused=mesh.paused,
+        routing=mesh.routing,
+        repair_strategy=mesh.repair_strategy,
         nodes=[node if isinstance(node, NodeState) else _node_msg(node) for node in mesh.nodes],
     )
     message.header.stamp = ros_time(mesh.stamp_s)
@@ -110,15 +112,26 @@ def state_msg(mesh: MeshStatus) -> MeshState:
 
 
 def mesh_status(message: MeshState) -> MeshStatus:
-    """The state in a message, whose nodes it shares."""
+    """The state in a message, whose nodes it shares.
+
+    A message of an older definition, from a bag, has defaults for the fields that it lacks.
+    """
+    is_present = message._md5sum == MeshState._md5sum
     return MeshStatus(
         message.header.stamp.to_sec(),
-        message.nodes,
+        message.nodes if is_present else [_node_status(node) for node in message.nodes],
         message.max_distance,
         message.real_time_factor,
         message.achieved_real_time_factor,
         message.paused,
+        getattr(message, "routing", ""),
+        getattr(message, "repair_strategy", ""),
     )
+
+
+def _node_status(message: NodeState) -> NodeStatus:
+    known = {name: getattr(message, name) for name in NodeState.__slots__ if hasattr(message, name)}
+    return NodeStatus(**known)
 
 
 def _node_msg(node: NodeStatus) -> NodeState:

@@ -46,10 +46,20 @@ class MeshStatePublisher:
     Handlers of rospy only put reports into a queue; everything else belongs to the one thread.
     """
 
-    def __init__(self, look: Callable[[], WorldView], max_distance_m: float) -> None:
-        """`look` is called in the thread of this object, and must not wait for the world."""
+    def __init__(
+        self,
+        look: Callable[[], WorldView],
+        max_distance_m: float,
+        routing: str,
+        repair_strategy: str,
+    ) -> None:
+        """`look` is called in the thread of this object, and must not wait for the world.
+
+        `routing` and `repair_strategy` are the names of what the nodes use.
+        """
         self._look = look
         self._max_distance_m = max_distance_m
+        self._routing, self._repair_strategy = routing, repair_strategy
         self._roster = MeshRoster()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
         self._last_look: tuple[float, float] | None = None  # wall, simulated
@@ -113,6 +123,8 @@ class MeshStatePublisher:
             view.real_time_factor,
             self._achieved(now_s, view),
             view.paused,
+            self._routing,
+            self._repair_strategy,
         )
         self._latest = mesh
         self._state.publish(state_msg(mesh))

@@ -100,7 +100,9 @@ class Simulation:
             views = drone_views(drones, now_s)
             return WorldView(now_s, views, runner.wanted_factor, runner.paused)
 
-        state = MeshStatePublisher(look, configuration.max_distance)
+        state = MeshStatePublisher(
+            look, configuration.max_distance, configuration.routing, configuration.repair
+        )
         state.start()
         window = window_of(world, drones, state) if configuration.gui else None
         if window is not None:
