@@ -173,6 +173,20 @@ def test_pause_stops_the_time_and_speed_changes_it(page):
     page.wait_for("ten times as fast", lambda: "10.0×" in page.page.inner_text("#clock"))
 
 
+def test_a_lost_node_says_what_its_repair_does_and_the_header_names_the_algorithms(page):
+    assert page.page.inner_text("#algorithms") == "Routing child_table_tree, repair thesis"
+    page.page.click("#nodes tr[data-id='0']")
+    page.page.click("#power")  # the gateway is off: every router gets lost
+    page.page.select_option("#speed", "10")
+    page.page.click("#nodes tr[data-id='17']")
+    repair = page.page.locator("#node-facts div:has(dt:text-is('Repair')) dd")
+    repair.wait_for(timeout=20_000)
+    assert re.match(
+        r"(waits|asks|negotiating|does not fly|flies|lands|has landed)\b", repair.inner_text()
+    )
+    assert page.complaints == []
+
+
 def test_the_keyboard_is_enough_to_switch_a_node_off(page):
     for _ in range(4):
         page.page.keyboard.press("n")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +12,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import genpy.dynamic
+import rosbag
 import rosgraph
 import rospkg
 import rospy
@@ -43,6 +46,16 @@ def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedP
         timeout=TOOL_LIMIT_S,
         check=False,
     )
+
+
+def record_in_an_older_definition(path: Path) -> None:
+    """A bag with one state, of a MeshState without the fields of channel and repair."""
+    newer = r"(float32 (airtime|tries)|uint16 queue|uint32 given_up|string \w+) .*\n"
+    definition = re.sub(newer, "", MeshState._full_text)
+    older = genpy.dynamic.generate_dynamic("drone_mesh/MeshState", definition)
+    node = older["drone_mesh/NodeState"](id=4, connected=True, on=True, position=[1.0, 2.0, 0.0])
+    with rosbag.Bag(str(path), "w") as bag:
+        bag.write("/mesh/state", older["drone_mesh/MeshState"](nodes=[node]))
 
 
 def recorder_listens() -> bool:
@@ -103,6 +116,17 @@ class ToolsTest(unittest.TestCase):
             self.assertEqual(finished.returncode, 2)
             self.assertIn("no ROS master at http://127.0.0.1:9", finished.stderr)
             self.assertNotIn("Traceback", finished.stderr)
+
+    def test_2_a_recording_of_an_older_definition_is_read(self) -> None:
+        bag = self.folder / "older.bag"
+        record_in_an_older_definition(bag)
+        finished = run("status", "--bag", str(bag))
+        self.assertEqual(finished.stderr, "")
+        heading, _columns, row = finished.stdout.splitlines()
+        self.assertNotIn("routing", heading)
+        self.assertRegex(row, r"^4 .* 1\.0, 2\.0, 0\.0 ")
+        report = run("report", str(bag), "-o", f"{self.folder}/older.html")
+        self.assertEqual(report.returncode, 0, report.stderr)
 
     def test_3_a_run_is_seen_live_and_recorded_and_told(self) -> None:
         recorder = subprocess.Popen(
