@@ -155,6 +155,7 @@ class ConnectionRepair(IRepairActions):
             state,
             strategy.reason,
             bid=strategy.own_bid if bids else NO_BID,
+            bid_unit=strategy.bid_unit,
             place_of=strategy.bids_for if bids else NO_ROUTE,
             winner=strategy.winner if state is Repair.WATCHING else NO_ROUTE,
             emergency_s=self._emergency_s(),

@@ -179,6 +179,7 @@ class IRepairStrategy(abc.ABC):
     # For people, who read them as RepairStatus:
     reason = ""  # why the drone does not fly, in a few words
     own_bid = NO_BID  # in an election
+    bid_unit = ""  # of bids above 1
     bids_for = NO_ROUTE  # the node whose place it would take
     winner = NO_ROUTE  # of an election; it has to take off
 

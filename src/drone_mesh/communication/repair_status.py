@@ -20,6 +20,7 @@ class RepairStatus(NamedTuple):
     state: Repair = Repair.AT_REST
     reason: str = ""  # why it does not fly, or why it lands early; empty: it flies, or may do so
     bid: float = NO_BID  # as in MOVEMENT_NEGOTIATION; negative: it does not bid
+    bid_unit: str = ""  # of bids above 1
     place_of: int = NO_ROUTE  # the node whose place it bids for or flies to
     goal: Location | None = None  # where it flies to
     winner: int = NO_ROUTE  # the node that it waits for to take off
@@ -50,7 +51,8 @@ class RepairStatus(NamedTuple):
     def _bids(self) -> str:
         if self.bid < 0:
             return f"does not bid: {self.reason}" if self.reason else "does not bid"
-        score = f"{self.bid:.1f} m" if self.bid > 1 else f"{self.bid:.2g}"  # no distance: up to 1
+        is_quantity = self.bid > 1 and self.bid_unit
+        score = f"{self.bid:.1f} {self.bid_unit}" if is_quantity else f"{self.bid:.3g}"
         return f"bids {score} for {self._place()}"
 
     def _flies(self) -> str:

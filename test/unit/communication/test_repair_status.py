@@ -29,12 +29,16 @@ OCCUPIED = "the place of 2 is occupied by 3"
         ),
         (RepairStatus(Repair.ASKING, OCCUPIED), "asks where its neighbours are"),
         (
-            RepairStatus(Repair.NEGOTIATING, bid=15.52, place_of=2),
+            RepairStatus(Repair.NEGOTIATING, bid=15.52, bid_unit="m", place_of=2),
             "negotiating, bids 15.5 m for the place of 2",
         ),
         (
-            RepairStatus(Repair.NEGOTIATING, bid=1 / 9, place_of=0),
-            "negotiating, bids 0.11 for the place of 0",
+            RepairStatus(Repair.NEGOTIATING, bid=1 / 9, bid_unit="m", place_of=0),
+            "negotiating, bids 0.111 for the place of 0",
+        ),
+        (
+            RepairStatus(Repair.NEGOTIATING, bid=1 + 1 / 9, place_of=2),
+            "negotiating, bids 1.11 for the place of 2",
         ),
         (
             RepairStatus(Repair.NEGOTIATING, OCCUPIED),

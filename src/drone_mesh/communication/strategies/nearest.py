@@ -15,6 +15,8 @@ from drone_mesh.communication.strategies.thesis import Thesis
 class Nearest(Thesis):
     """As Thesis, with another score."""
 
+    bid_unit = ""
+
     def _score(self, step: Step) -> float:
         """Above 1 for a first choice, else up to 1; the shorter the flight the higher."""
         own = self.mesh.own_place()

@@ -35,6 +35,8 @@ IN_A_ROUND = (Repair.ASKING, Repair.NEGOTIATING, Repair.WATCHING)
 class Thesis(IRepairStrategy):
     """Asks for places, elects, flies one step back; the gateway's place is the second choice."""
 
+    bid_unit = "m"
+
     def start(self, mesh: IRepairActions) -> None:
         """Called once, before everything else."""
         super().start(mesh)
