@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, Sequence
 
 import rospy
 
@@ -116,10 +116,12 @@ def mesh_status(message: MeshState) -> MeshStatus:
 
     A message of an older definition, from a bag, has defaults for the fields that it lacks.
     """
-    is_present = message._md5sum == MeshState._md5sum
+    nodes: Sequence[NodeStatus] = message.nodes
+    if message._md5sum != MeshState._md5sum:
+        nodes = [_node_status(node) for node in message.nodes]
     return MeshStatus(
         message.header.stamp.to_sec(),
-        message.nodes if is_present else [_node_status(node) for node in message.nodes],
+        nodes,
         message.max_distance,
         message.real_time_factor,
         message.achieved_real_time_factor,
