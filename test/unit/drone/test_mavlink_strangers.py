@@ -221,7 +221,7 @@ def test_mavsdk_as_the_vehicle_is_read_and_not_flown_without_an_estimator(
 
     try:
         if named is None:
-            wait_for("it is refused", lambda: says("no multirotor with ArduPilot or PX4"))
+            wait_for("it is refused", lambda: says("not a multirotor with ArduPilot or PX4"))
         else:
             wait_for("only the rest is missing", lambda: says("no report from the GPS"))
             wait_for("its home is known", lambda: says("") and engine.status().home is not None)
