@@ -9,7 +9,7 @@ import sys
 import time
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Iterable, Iterator
+from typing import Any, Iterable, Iterator
 
 from drone_mesh.communication.repair_options import DEFAULT_REPAIR
 from drone_mesh.lab.quiet import quiet_nodes
@@ -129,7 +129,7 @@ def _with_progress(outcomes: Iterable[Outcome], total: int) -> Iterator[Outcome]
 def _read(path: Path, seeds: range) -> list[Outcome]:
     if not path.exists():
         return []
-    kinds = {field.name: type(field.default) for field in fields(Outcome)}
+    kinds: dict[str, Any] = {field.name: type(field.default) for field in fields(Outcome)}
     kinds.update(seed=int, nodes=int, incidents=str)
     with path.open(newline="", encoding="utf-8") as table:
         rows = [
