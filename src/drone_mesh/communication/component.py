@@ -28,6 +28,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
+from drone_mesh.communication.introduction import Introduction
 from drone_mesh.communication.medium import ChannelUse
 from drone_mesh.communication.messages import HeartbeatMessage, IntroduceMessage, MessageType
 from drone_mesh.communication.neighbours import Neighbours
@@ -37,17 +38,13 @@ from drone_mesh.communication.observer import (
     Reporter,
     ignore_events,
 )
+from drone_mesh.communication.orders import OrderIntake
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
-from drone_mesh.errors import GoalRefused
-
-INTRODUCE_AFTER_POWER_S = 0.2  # our choice: the medium has to hear of the antenna first
-INTRODUCE_SPREAD_S = 1.0  # our choice: after an outage the nodes do not all speak at once
 
 SILENCE_PERIODS = 1.5  # our choice: each neighbour is asked once a check period
 
@@ -81,9 +78,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._rng = rng
         self._timing = timing or MeshTiming()
         self._debug = debug
-        self._search_again_s = antenna.medium.search_s  # 0: the next check is soon enough
         self._deadlines = Deadlines()
-        self._introduces_for_others = False  # Due.INTRODUCE answers a node that needs a gateway
         self._neighbours = Neighbours(SILENCE_PERIODS * self._timing.check_period_s)
         self._report = Reporter(node_id, self._deadlines, observer)
         self.complaints = Complaints(node_id)
@@ -115,6 +110,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._pilot,
             antenna,
         )
+        self._introduction = Introduction(
+            self._parts, self, self._frame, rng, lambda neighbour: self.send_heartbeat(neighbour)
+        )
+        self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
 
     # Driven from outside ---------------------------------------------------------------------
 
@@ -148,9 +147,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         deadlines = self._deadlines
         deadlines.now_s = now_s
         if now_s >= deadlines.get(Due.INTRODUCE):
-            deadlines.set(Due.INTRODUCE, math.inf)
-            self._introduces_for_others = False
-            self.search_other_nodes_in_range()
+            self._introduction.on_due()
         if now_s >= deadlines.get(Due.ROUTING):
             deadlines.set(Due.ROUTING, math.inf)
             self._routing.on_time(now_s)
@@ -215,8 +212,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """Switched on: introduce soon. Switched off: a router is not connected at once."""
         self._deadlines.now_s = now_s
         self._report(MeshEventKind.POWER_ON if on else MeshEventKind.POWER_OFF)
-        introduce_s = now_s + INTRODUCE_AFTER_POWER_S if on else math.inf
-        self._deadlines.set(Due.INTRODUCE, introduce_s)
+        self._introduction.on_power(on)
         if not on:
             self._antenna_is_off()
 
@@ -224,8 +220,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """The medium came back: introduce soon, each node at its own moment."""
         self._deadlines.now_s = now_s
         if self._antenna.on():
-            wait_s = INTRODUCE_AFTER_POWER_S + self._rng.random() * INTRODUCE_SPREAD_S
-            self._deadlines.set(Due.INTRODUCE, now_s + wait_s)
+            self._introduction.on_registered()
 
     # Snapshots -------------------------------------------------------------------------------
 
@@ -275,22 +270,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     def search_other_nodes_in_range(self) -> None:
         """PRESENT, to each node in range."""
-        me = self._node_id
-        hops, connected = self.get_hops_from_gateway_away(), self.get_connected_to_gateway()
-        payload = IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
-        room = messages.extension_room(MessageType.PRESENT)
-        extension = self._routing.extension(MessageType.PRESENT, room)
-        if extension:
-            payload = messages.extended(payload, extension)
-        if self._frame.digest:
-            payload = messages.with_frame_digest(payload, self._frame.digest)
-        self._antenna.broadcast_message(payload)
-        if connected:
-            self._search_again_s = self._antenna.medium.search_s
-        elif self._search_again_s:
-            wait_s = self._search_again_s * (0.5 + self._rng.random())
-            self._search_again_s = min(2.0 * self._search_again_s, self._timing.check_period_s)
-            self._deadlines.set(Due.INTRODUCE, self._deadlines.now_s + wait_s)
+        self._introduction.broadcast()
 
     def send_heartbeat(self, other: int) -> bool:
         """A heartbeat towards `other`."""
@@ -307,23 +287,6 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             heard_s = self._neighbours.last_heard_s
             others = [other for other in others if heard_s(other, otherwise=since_s) <= since_s]
         self._delivery.send_own_to_each(self._heartbeat(), others)
-
-    def _answer_search(self, neighbour: int) -> None:
-        """A neighbour looks for a gateway. On a shared channel one PRESENT answers all who do."""
-        spread_s = self._antenna.medium.answer_spread_s
-        if not spread_s:
-            self.send_heartbeat(neighbour)
-        elif self._deadlines.get(Due.INTRODUCE) == math.inf:
-            self._introduces_for_others = True
-            self._deadlines.set(
-                Due.INTRODUCE, self._deadlines.now_s + self._rng.random() * spread_s
-            )
-
-    def _search_is_answered(self) -> None:
-        """Another node answered first."""
-        if self._introduces_for_others:
-            self._introduces_for_others = False
-            self._deadlines.set(Due.INTRODUCE, math.inf)
 
     def now_s(self) -> float:
         """The time that the component was last told."""
@@ -416,7 +379,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             if missing != self._node_id:
                 self._on_missing(creator, missing, told_by=from_)
         elif kind == MessageType.MOVE_TO_LOCATION:
-            self._on_order(messages.GoToLocationMessage.from_payload(payload))
+            self._orders.on_order(messages.GoToLocationMessage.from_payload(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
             self._on_negotiation(messages.MovementNegotiationMessage.from_payload(payload))
         elif kind in messages.TECHNIQUE_TYPES:
@@ -447,28 +410,6 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._delivery.send_own(answer)
 
     # Flight ----------------------------------------------------------------------------------
-
-    def _on_order(self, order: messages.GoToLocationMessage) -> None:
-        try:
-            check_goal(*order.location)
-            self._check_can_fly()
-        except GoalRefused as error:
-            self.complaints.add("order refused", str(error), self._deadlines.now_s)
-            return
-        self._take_order(order.creator, order.location)
-
-    def _check_can_fly(self) -> None:
-        """Raises GoalRefused if the drone would not fly to a goal now."""
-        why_not = self._pilot.why_not_fly()
-        if why_not:
-            raise GoalRefused(f"drone {self._node_id} cannot fly: {why_not}")
-
-    def _take_order(self, creator: int, goal: Location) -> None:
-        if self._pilot.goal == goal:
-            return  # a second gateway orders the same flight (docs/protocol.md, "Flight")
-        self._report(MeshEventKind.FLIGHT_ORDERED, creator, f"to {goal.in_words()}")
-        self._pilot.fly_to(goal)
-        self._took_off()
 
     def _watch_flight(self) -> None:
         if self._pilot.watch():

@@ -84,8 +84,8 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if height != int(height):
             raise GoalRefused(f"height {height} m: an order gives whole metres")
         if node_id == self._node_id:
-            self._check_can_fly()
-            self._take_order(node_id, Location(latitude, longitude, height))
+            self._orders.check_can_fly()
+            self._orders.take(node_id, Location(latitude, longitude, height))
             return True
         me = self._node_id
         order = GoToLocationMessage(me, me, node_id, node_id, latitude, longitude, int(height))
@@ -131,7 +131,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
 
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
         if not know_gateway:
-            self._answer_search(neighbour)
+            self._introduction.answer_search(neighbour)
 
     def _on_heartbeat(
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int

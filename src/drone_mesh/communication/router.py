@@ -124,12 +124,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if not self._repair.may_connect(neighbour, know_gateway):
             return
         if know_gateway and hops <= self._connection.hops:
-            self._search_is_answered()
+            self._introduction.search_is_answered()
         if self._connection.on_present(neighbour, hops, know_gateway):
             if know_gateway:
                 self.send_heartbeat(neighbour)
             else:
-                self._answer_search(neighbour)
+                self._introduction.answer_search(neighbour)
 
     def _on_heartbeat(
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int

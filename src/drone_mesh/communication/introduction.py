@@ -1,0 +1,100 @@
+"""Introduction: when a node introduces itself with a PRESENT (docs/protocol.md, "Connection")."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Callable
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.frames import CommonFrame
+from drone_mesh.communication.interfaces import BROADCAST, IMeshDebugInfo
+from drone_mesh.communication.messages import IntroduceMessage, MessageType
+from drone_mesh.communication.parts import NodeParts
+
+AFTER_POWER_S = 0.2  # our choice: the medium has to hear of the antenna first
+SPREAD_S = 1.0  # our choice: after an outage the nodes do not all speak at once
+
+
+class Introduction:
+    """Broadcasts the PRESENT of one node, at once or after a while.
+
+    Only the component of its node and that component's parts call it.
+    """
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        node: IMeshDebugInfo,
+        frame: CommonFrame,
+        rng: random.Random,
+        send_heartbeat: Callable[[int], bool],
+    ) -> None:
+        """`node` says whether it is connected and over how many hops."""
+        self._parts = parts
+        self._node = node
+        self._frame = frame
+        self._rng = rng
+        self._send_heartbeat = send_heartbeat
+        self._medium = parts.antenna.medium
+        self._search_again_s = self._medium.search_s  # 0: the next check is soon enough
+        self._is_answer = False  # the one that is planned answers a node that needs a gateway
+
+    def broadcast(self) -> None:
+        """PRESENT, to each node in range. On a shared channel a search is repeated, ever slower."""
+        parts, node = self._parts, self._node
+        hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
+        me = parts.node_id
+        payload = IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
+        room = messages.extension_room(MessageType.PRESENT)
+        extension = parts.routing.extension(MessageType.PRESENT, room)
+        if extension:
+            payload = messages.extended(payload, extension)
+        if self._frame.digest:
+            payload = messages.with_frame_digest(payload, self._frame.digest)
+        parts.antenna.broadcast_message(payload)
+        if connected:
+            self._search_again_s = self._medium.search_s
+        elif self._search_again_s:
+            wait_s = self._search_again_s * (0.5 + self._rng.random())
+            self._search_again_s = min(2.0 * self._search_again_s, parts.timing.check_period_s)
+            self._plan(wait_s)
+
+    def on_due(self) -> None:
+        """The planned moment has come."""
+        self._cancel()
+        self._is_answer = False
+        self.broadcast()
+
+    def on_power(self, on: bool) -> None:
+        """The antenna was switched."""
+        if on:
+            self._plan(AFTER_POWER_S)
+        else:
+            self._cancel()
+
+    def on_registered(self) -> None:
+        """The medium came back: each node speaks at its own moment."""
+        self._plan(AFTER_POWER_S + self._rng.random() * SPREAD_S)
+
+    def answer_search(self, neighbour: int) -> None:
+        """A neighbour needs a gateway. On a shared channel one PRESENT answers all that do."""
+        spread_s = self._medium.answer_spread_s
+        if not spread_s:
+            self._send_heartbeat(neighbour)
+        elif self._parts.deadlines.get(Due.INTRODUCE) == math.inf:
+            self._is_answer = True
+            self._plan(self._rng.random() * spread_s)
+
+    def search_is_answered(self) -> None:
+        """Another node answered first."""
+        if self._is_answer:
+            self._is_answer = False
+            self._cancel()
+
+    def _plan(self, wait_s: float) -> None:
+        self._parts.deadlines.set(Due.INTRODUCE, self._parts.now_s + wait_s)
+
+    def _cancel(self) -> None:
+        self._parts.deadlines.set(Due.INTRODUCE, math.inf)
