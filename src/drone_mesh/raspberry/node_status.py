@@ -36,7 +36,7 @@ def node_status(
         "known_nodes": component.get_router_tech_table_size(),
         "messages_sent": component.get_total_message_sent(),
         "steps_back_to": _known(component.get_last_good_known_location_id()),
-        "repair": component.get_repair_status(),
+        "repair": component.get_repair_status().in_words(now_s),
         "neighbours": neighbours,
         "flight": _flight(engine),
         "radio": {
