@@ -23,7 +23,7 @@ _UNKNOWN: Position = (0.0, 0.0, 0.0)
 class NodeTable:
     """The rules of the simulated air. Not thread-safe.
 
-    docs/protocol.md, "Wireless signal simulator" and "Who speaks in DroneInfo".
+    docs/protocol.md, "Wireless signal simulator" and "Sources of DroneInfo".
     """
 
     def __init__(self, max_distance_m: float = MAX_DISTANCE_M) -> None:

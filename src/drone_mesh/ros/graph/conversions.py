@@ -61,7 +61,7 @@ def flight_order(node_id: int, goal: Location) -> RequestGatewayDroneFlight:
     )
 
 
-# DroneInfo (docs/protocol.md, "Who speaks in DroneInfo") ----------------------------------------
+# DroneInfo (docs/protocol.md, "Sources of DroneInfo") -------------------------------------------
 
 
 def engine_info(node_id: int, position: Vector, flat: bool = False) -> DroneInfo:
