@@ -40,7 +40,7 @@ def replay_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         env={**os.environ, "PYTHONPATH": str(ROOT / "src")}, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stdout is not None
-    assert "the very run" in process.stdout.readline()
+    assert "reproduces the run" in process.stdout.readline()
     said = process.stdout.readline()
     match = re.search(r"http://\S+", said)
     assert match, f"the replay did not start, it said {said!r}"

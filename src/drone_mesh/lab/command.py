@@ -51,12 +51,12 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=PROGRAM,
         description="Experiments with the mesh: one file describes thousands of seeded runs, one "
-        "command runs them on all cores or a cluster, one report shows what came of them.",
+        "command runs them on all cores or a cluster, one report shows the results.",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     new = commands.add_parser("new", help="write a commented experiment to start from")
-    new.add_argument("name", help="of the experiment and its file")
+    new.add_argument("name", help="name of the experiment and of its file")
     new.set_defaults(run=_new)
 
     plan = commands.add_parser("plan", help="show cells, runs and estimated time; store nothing")
@@ -65,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_workers(plan)
     plan.set_defaults(run=_plan)
 
-    run = commands.add_parser("run", help="run what is missing in the results folder")
+    run = commands.add_parser("run", help="execute the runs missing from the results folder")
     _add_experiment(run)
     _add_workers(run)
     run.add_argument(
@@ -76,12 +76,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--retry-failed", action="store_true", help="run failed runs again")
     run.set_defaults(run=_run)
 
-    status = commands.add_parser("status", help="show how far a results folder is")
+    status = commands.add_parser("status", help="show the progress of a results folder")
     status.add_argument("results", type=Path)
     status.set_defaults(run=_status)
 
-    merging = commands.add_parser("merge", help="put shards together")
-    merging.add_argument("into", type=Path, help="results folder to make or to extend")
+    merging = commands.add_parser("merge", help="merge shards into one results folder")
+    merging.add_argument("into", type=Path, help="results folder to create or extend")
     merging.add_argument("shards", type=Path, nargs="+", help="results folders of the shards")
     merging.set_defaults(run=_merge)
 
@@ -102,17 +102,22 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
 
     show = commands.add_parser("show", help="repeat one run, with all its events")
     show.add_argument("results", type=Path)
-    show.add_argument("run_id", metavar="RUN", help="its id, or the beginning of it")
-    show.add_argument("--page", type=Path, metavar="FILE", help="write a report page about it")
-    show.add_argument("--console", action="store_true", help="serve it with a time line")
-    show.add_argument("--port", type=int, default=9081, help="of --console (default 9081)")
+    show.add_argument("run_id", metavar="RUN", help="id of the run, or the beginning of it")
+    show.add_argument("--page", type=Path, metavar="FILE", help="write a report page about the run")
+    show.add_argument("--console", action="store_true", help="show it in the web console")
+    show.add_argument("--port", type=int, default=9081, help="port for --console (default 9081)")
     show.set_defaults(run=_show)
 
     compare = commands.add_parser("compare", help="paired difference of two cells, per seed")
     compare.add_argument("results", type=Path)
     compare.add_argument("a", metavar="A", help="a cell: axis=value[,axis=value...]")
     compare.add_argument("b", metavar="B", help="the other cell")
-    compare.add_argument("--metric", action="append", default=[], help="default: the experiment's")
+    compare.add_argument(
+        "--metric",
+        action="append",
+        default=[],
+        help="metric to compare; repeatable (default: those of the experiment)",
+    )
     compare.set_defaults(run=_compare)
 
     metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
@@ -122,7 +127,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
 def _add_experiment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="the experiment")
     parser.add_argument(
-        "overrides", nargs="*", metavar="a.b=c", help="overrule a value of the file"
+        "overrides", nargs="*", metavar="a.b=c", help="override a value of the file"
     )
 
 

@@ -92,7 +92,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--csv",
         type=Path,
-        help="table of outcomes, one row per seed; rows that it has are not run again",
+        help="table of outcomes, one row per seed; seeds that it already holds are not run again",
     )
     return parser.parse_args(argv)
 

@@ -42,13 +42,13 @@ def replay(results: Results, beginning: str) -> Replay:
 
 
 def explain_hash(results: Results, shown: Replay) -> str:
-    """Whether this was the very run of the folder; if not, why."""
+    """Whether this run reproduced that of the folder; if not, why."""
     run = shown.planned.spec.run
     row = results.rows.get(run)
     if row is None:
         return f"event hash {shown.event_hash}; the folder has no row of this run to compare with"
     if row["event_hash"] == shown.event_hash:
-        return f"event hash {shown.event_hash}: the very run of {results.folder}"
+        return f"event hash {shown.event_hash}: reproduces the run in {results.folder}"
     now = code_version()
     why = (
         f"the row is of code {row['code']}, this is {now}"

@@ -30,12 +30,12 @@ def add_flight_options(parser: argparse.ArgumentParser) -> None:
         "every node",
     )
     for name, default, unit, text in (
-        ("--max-height", limits.max_height_m, "METRES", "greatest height above home"),
-        ("--max-distance", limits.max_distance_m, "METRES", "greatest distance from home"),
+        ("--max-height", limits.max_height_m, "METRES", "maximum height above home"),
+        ("--max-distance", limits.max_distance_m, "METRES", "maximum distance from home"),
         ("--speed", limits.speed_m_s, "M/S", "speed of a flight"),
-        ("--min-battery", limits.min_battery_percent, "PERCENT", "least charge; 0: any"),
+        ("--min-battery", limits.min_battery_percent, "PERCENT", "minimum charge; 0: none"),
         ("--cruise-height", limits.cruise_height_m, "METRES", "height of the lowest layer"),
-        ("--layers", limits.layer_m, "METRES", "between the layers in which drones cross"),
+        ("--layers", limits.layer_m, "METRES", "vertical distance between layers"),
     ):
         help_text = f"{text} (default: %(default)g)"
         group.add_argument(name, type=float, default=default, metavar=unit, help=help_text)

@@ -214,7 +214,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         type=float,
         default=CLEARANCE_M,
         metavar="M",
-        help="metres that drones keep between each other where a repair brings them "
+        help="minimum distance in metres between drones at rest after a repair "
         "(default: %(default)g)",
     )
     place = parser.add_argument_group(

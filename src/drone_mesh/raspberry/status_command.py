@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print it; the exit status is 1 if it cannot be had."""
     parser = argparse.ArgumentParser(
         "raspberry_status",
-        description=f"The status of a gateway. {TOKEN_VARIABLE} holds the token, if it needs one.",
+        description=f"Prints the status of a gateway. {TOKEN_VARIABLE}: its token, if it has one.",
     )
     parser.add_argument(
         "url", nargs="?", default=f"http://127.0.0.1:{DEFAULT_PORT}", help="(default: %(default)s)"

@@ -61,7 +61,7 @@ def test_zip_moves_axes_in_step(tmp_path: Path) -> None:
     assert [(c.scenario.layout.drones, c.scenario.duration_s) for c in cells] == [(4, 5), (9, 10)]
 
 
-def test_an_argument_overrules_the_file(tmp_path: Path) -> None:
+def test_an_argument_overrides_the_file(tmp_path: Path) -> None:
     path = write(tmp_path, GOOD)
     loaded = load_experiment(path, ["seeds=7", "base.range_m=12", "sweep.radio.loss=[0.1]"])
     assert loaded.experiment.seeds == 7

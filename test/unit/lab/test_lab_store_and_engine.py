@@ -498,7 +498,7 @@ def test_show_repeats_the_very_run(
     capsys.readouterr()
     assert lab("show", tmp_path / "out", row["run"][:6]) == 0
     shown = capsys.readouterr().out
-    assert f"event hash {row['event_hash']}: the very run" in shown
+    assert f"event hash {row['event_hash']}: reproduces the run" in shown
     assert "fault: kill" in shown
 
 

@@ -130,7 +130,7 @@ byId("find-form").addEventListener("submit", (event) => {
   event.preventDefault();
   const text = byId("find").value.trim();
   const id = /^\d+$/.test(text) ? Number(text) : null;
-  if (!mesh.nodes.has(id)) return toast(`no node ${text || "without an id"}`, true);
+  if (!mesh.nodes.has(id)) return toast(text ? `no node ${text}` : "type a node id", true);
   mesh.select(id);
   map.show(id);
   byId("find").value = "";

@@ -84,10 +84,10 @@ def ids_to_serve(fleet: FactoryConfiguration) -> range:
 
 
 def main() -> None:
-    """Virtual Raspberry Pis apart from the world, perhaps on another machine.
+    """Virtual Raspberry Pis outside the world's process, perhaps on another machine.
 
-    Parameters (private): ~first and ~last (int): the ids to serve; or ~index and ~hosts (int):
-    share number ~index (from 1) of ~hosts equal shares of all drones.
+    Parameters (private): ~first and ~last (int): the ids to host; or ~index and ~hosts (int):
+    host share number ~index (from 1) of ~hosts equal shares of all drones.
     """
     prepare_node(main.__doc__)
     rospy.init_node("mesh_host", disable_signals=True)

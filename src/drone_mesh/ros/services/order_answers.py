@@ -27,7 +27,7 @@ class _Waiter:
 
 
 class OrderAnswers:
-    """Any thread. `_lock` guards the set of those who wait."""
+    """Any thread. `_lock` guards the set of waiting callers."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -106,8 +106,8 @@ def main() -> None:
     """The web console: shows and controls the mesh in a browser.
 
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
-    (str): clients need it; an address that other machines can reach gets a random one if none is
-    given. /DroneManager/casus (str): the file of the layouts.
+    (str): password of the console; if none is given, an address that other machines can reach
+    gets a random one. /DroneManager/casus (str): the file of the layouts.
     """
     prepare_node(main.__doc__)
     run_tool("console", _run)
