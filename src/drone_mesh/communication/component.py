@@ -289,7 +289,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._delivery.send_own_to_each(self._heartbeat(), others)
 
     def now_s(self) -> float:
-        """The time that the component was last told."""
+        """The time of the component's latest call."""
         return self._deadlines.now_s
 
     def wake_at(self, at_s: float) -> None:

@@ -18,7 +18,7 @@ class Due(enum.IntEnum):
 
 
 class Deadlines:
-    """The time as the component was last told, and one time per thing to do.
+    """The time of the component's latest call, and one time per thing to do.
 
     Read for each packet and rarely changed, so the earliest of all is kept.
     """

@@ -42,5 +42,5 @@ class NodeParts:
 
     @property
     def now_s(self) -> float:
-        """The time that the component was last told."""
+        """The time of the component's latest call."""
         return self.deadlines.now_s

@@ -1,4 +1,4 @@
-"""The seam between a router and its repair strategy: what is told, what is seen, what may be done.
+"""The seam between a router and its repair strategy: its notifications, its views, its actions.
 
 A strategy is driven like the rest of the mesh software: it has no clock, no thread and no random
 numbers of its own. docs/strategies.md shows how to write one.
@@ -127,7 +127,7 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def fly(self, step: Step, until_connected: bool = False) -> None:
-        """Fly there, and land clear of other drones; the strategy is told when it has landed.
+        """Fly there, and land clear of other drones; `on_landed` reports the landing.
 
         `until_connected`: land as soon as a gateway answers. The routes are forgotten.
         """
@@ -146,7 +146,7 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def tell_place(self, place: Location) -> None:
-        """Tell all nodes in range where this drone stands, or will stand."""
+        """Send all nodes in range the place where this drone stands, or will stand."""
 
     @abc.abstractmethod
     def present(self) -> None:
@@ -176,7 +176,7 @@ class IRepairStrategy(abc.ABC):
     a repair is not asked to do anything.
     """
 
-    # For people, who read them as RepairStatus:
+    # Shown to users, as RepairStatus:
     reason = ""  # why the drone does not fly, in a few words
     own_bid = NO_BID  # in an election
     bid_unit = ""  # of bids above 1

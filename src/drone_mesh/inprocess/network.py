@@ -288,14 +288,14 @@ class Network:
     # Looking ---------------------------------------------------------------------------------
 
     def status(self) -> MeshStatus:
-        """All nodes now, as /mesh/state would tell: for tables, samples, reports and pictures."""
+        """All nodes now, as /mesh/state shows them: for tables, samples, reports and pictures."""
         state = mesh_status(self.nodes, self.clock.now_s, self.air.max_distance_m)
         repair = self._repair
         repair = repair if isinstance(repair, str) else getattr(repair, "__name__", "")
         return replace(state, routing=self._routing, repair_strategy=repair)
 
     def event_records(self) -> list[EventRecord]:
-        """All events so far, as /mesh/events would tell: for the story of the run."""
+        """All events so far, as /mesh/events publishes them: for the story of the run."""
         return event_records(self.events)
 
     def connected(self, node_id: int) -> bool:

@@ -95,7 +95,7 @@ class SharedAir:
         self._reached: dict[int, list[SharedRadio]] = {}  # by a standing sender
         self._flying: set[int] = set()
 
-    # Who is there ----------------------------------------------------------------------------
+    # The radios on the air -------------------------------------------------------------------
 
     def add(self, radio: SharedRadio) -> None:
         """A radio appears."""

@@ -125,7 +125,7 @@ def as_text(value: Any) -> str:
 
 
 class _Source:
-    """Makes errors that point into the file, or at the argument that overruled it."""
+    """Makes errors that point into the file, or at the argument that overrode it."""
 
     def __init__(self, path: Path, lines: Lines, folder: Path) -> None:
         self.path = path

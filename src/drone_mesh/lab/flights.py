@@ -1,4 +1,4 @@
-"""Who flew when, and how far; wind and batteries act here."""
+"""Which drones flew when, and how far; wind and batteries act here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs without packets: everybody knows everything at once, and flies straight on a plane.
+"""Runs without packets: each drone knows everything at once, and flies straight on a plane.
 
 Published repair methods are evaluated in this way. It shows what a rule can do at best, and lets
 our runs stand beside published tables; detection, decisions and routes take no time in it.
@@ -30,7 +30,7 @@ class Swarm(NamedTuple):
     parts: np.ndarray  # (n,), number of the connected part
     home: int  # row of the gateway
     near_lost: np.ndarray  # (n, 2), m, mean place of lost neighbours; NaN: none lost
-    near: np.ndarray  # (n, n), who is in range of whom
+    near: np.ndarray  # (n, n), which drones are in range of each other
     middle: np.ndarray  # (2,), m, of the area
     step_m: float  # flown in one step
 
@@ -40,12 +40,12 @@ Rule = Callable[[Swarm], np.ndarray]
 
 
 def centering(swarm: Swarm) -> np.ndarray:
-    """Everybody flies to the mean of all survivors, up to one metre of a range of 120."""
+    """All fly to the mean of all survivors, up to one metre of a range of 120."""
     return _towards(swarm, swarm.places.mean(axis=0), stop_m=swarm.step_m)
 
 
 def home(swarm: Swarm) -> np.ndarray:
-    """Who has no path to the gateway flies to it; a part stops when it has one."""
+    """A drone without a path to the gateway flies to it; a part stops when it has one."""
     moves = _towards(swarm, swarm.places[swarm.home])
     moves[swarm.parts == swarm.parts[swarm.home]] = 0.0
     return moves
@@ -69,7 +69,7 @@ def oracle(swarm: Swarm) -> np.ndarray:
 
 
 def hero(swarm: Swarm) -> np.ndarray:
-    """Towards the lost neighbours; who lost none follows the change of its neighbours' mean.
+    """Towards the lost neighbours; one that lost none follows the change of its neighbours' mean.
 
     Mi, Yang, Liu, ICRA 2011, as it is described; only neighbours are known.
     """
@@ -214,7 +214,7 @@ def _repair(
 
 
 def _parts(places: np.ndarray, range_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """(who is near whom, number of each one's connected part)."""
+    """(which drones are near each other, number of each one's connected part)."""
     from scipy.sparse.csgraph import connected_components
 
     gaps = places[:, None] - places[None]

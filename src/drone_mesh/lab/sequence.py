@@ -68,7 +68,7 @@ class Mesh:
         return [node for node in self.network.nodes if node and node not in self.dead]
 
     def run_for(self, seconds: float) -> None:
-        """Let time pass, and note who is connected again."""
+        """Let time pass, and note which nodes are connected again."""
         end_s = self.network.clock.now_s + seconds
         while self.network.clock.now_s < end_s:
             self.network.run_for(min(STEP_S, end_s - self.network.clock.now_s))

@@ -18,7 +18,7 @@ ARRIVED_M = 0.15
 STANDS_M_S = 0.1
 ON_GROUND_M = 0.02  # of its underside
 LAND_AT_PERCENT = 20.0  # our choice: it comes down while it still can
-MOVED_M = 1e-4  # below this nobody is told
+MOVED_M = 1e-4  # a smaller movement is not reported
 
 _log = logging.getLogger(__name__)
 

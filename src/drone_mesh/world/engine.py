@@ -79,7 +79,7 @@ class DroneEngine(IDroneEngine):
         self._world.wake(self)
 
     def follow(self, centre: Vector) -> None:
-        """Stand at this place from the next step on: somebody else flies the drone. Any thread."""
+        """Stand at this place from the next step on: another node flies the drone. Any thread."""
         self._followed = centre
         self._world.wake(self)
 

@@ -17,7 +17,7 @@ KEPT = 0.9  # of the range: how far behind its next hop a drone may stay; our ch
 
 
 class Follow(Nearest):
-    """The leader is the nearest; all tell where they will stand before they leave."""
+    """The leader is the nearest; each drone announces where it will stand before it leaves."""
 
     def on_place(self, node: int, place: Location) -> None:
         """If the next hop moves on, follow it as far as is needed."""

@@ -165,7 +165,7 @@ class MavlinkPilot:
             goal=self._goal,
         )
 
-    # Who is master ---------------------------------------------------------------------------
+    # The pilot has priority ------------------------------------------------------------------
 
     def _trouble(self, now_s: float) -> str:
         """Why no flight is possible now, under any control; empty: it is possible."""
