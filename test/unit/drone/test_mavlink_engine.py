@@ -18,6 +18,8 @@ from drone_mesh.drone.mavlink.lines import UdpLine
 from drone_mesh.drone.mavlink_vehicle.server import VehicleServer
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
+pytestmark = pytest.mark.slow  # autopilots and links live in real time
+
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 LIMITS = FlightLimits(speed_m_s=20.0, cruise_height_m=4.0, layer_m=0.0)
 ALL = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)

@@ -27,6 +27,8 @@ from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 mavsdk = pytest.importorskip("mavsdk", reason="the binary in MAVSDK's wheel does not load here")
 pytest.importorskip("MAVProxy")
 
+pytestmark = pytest.mark.slow  # autopilots and links live in real time
+
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 PATIENCE_S = 40.0
 
