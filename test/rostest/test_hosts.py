@@ -28,7 +28,7 @@ class HostsTest(unittest.TestCase):
             text=True,
         )
         self.assertNotEqual(refused.returncode, 0)
-        self.assertIn("node 3 is already served by another process", refused.stderr)
+        self.assertIn("node 3 is already hosted by another process", refused.stderr)
         self.assertNotIn("Traceback", refused.stderr)
 
         # A restarted node counts from 0: it must have sent enough to be recognised.

@@ -29,7 +29,7 @@ class NodeTable:
     def __init__(self, max_distance_m: float = MAX_DISTANCE_M) -> None:
         """Raises AirError unless the distance is a positive number."""
         if not max_distance_m > 0:
-            raise AirError(f"max_distance {max_distance_m}: must be above 0 metres")
+            raise AirError(f"invalid max_distance {max_distance_m}: must be above 0 metres")
         self._reach_m2 = max_distance_m * max_distance_m
         self._nodes: dict[int, Node] = {}
         self._positions: dict[int, Position] = {}  # also of nodes that are not registered yet

@@ -71,7 +71,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         Raises ValueError for a node id outside 0..253.
         """
         if not 0 <= node_id <= MAX_NODE_ID:
-            raise ValueError(f"node id {node_id}: must be 0..{MAX_NODE_ID}")
+            raise ValueError(f"invalid node id {node_id}: must be 0..{MAX_NODE_ID}")
         self._node_id = node_id
         self._antenna = antenna
         self._routing = routing
@@ -166,7 +166,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """Learn from a packet, then process or forward it. Bad packets are dropped."""
         self._deadlines.now_s = now_s
         if len(payload) != PAYLOAD_BYTES:
-            self._drop(f"want {PAYLOAD_BYTES} bytes, got {len(payload)}", payload)
+            self._drop(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}", payload)
             return
         creator, from_, kind, to, forward = messages.header(payload)
         me = self._node_id

@@ -79,7 +79,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         """
         self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
-            raise GoalRefused(f"drone {node_id}: ids are 0..{MAX_NODE_ID}")
+            raise GoalRefused(f"invalid drone id {node_id}: must be 0..{MAX_NODE_ID}")
         check_goal(latitude, longitude, height)
         if height != int(height):
             raise GoalRefused(f"height {height} m: an order gives whole metres")

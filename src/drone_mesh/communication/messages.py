@@ -434,4 +434,4 @@ def _unpacked(kind: MessageType, body: struct.Struct, payload: bytes) -> tuple:
 
 def _check_length(payload: bytes) -> None:
     if len(payload) != PAYLOAD_BYTES:
-        raise PacketError(f"want {PAYLOAD_BYTES} bytes, got {len(payload)}")
+        raise PacketError(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}")

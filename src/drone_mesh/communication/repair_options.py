@@ -23,6 +23,8 @@ class RepairOptions:
     def __post_init__(self) -> None:
         """Raises ConfigurationError for a number outside its range."""
         if not (math.isfinite(self.clearance_m) and self.clearance_m > 0):
-            raise ConfigurationError(f"clearance {self.clearance_m}: must be above 0 metres")
+            raise ConfigurationError(
+                f"invalid clearance {self.clearance_m}: must be above 0 metres"
+            )
         if not (math.isfinite(self.range_m) and self.range_m > 0):
-            raise ConfigurationError(f"range {self.range_m}: must be above 0 metres")
+            raise ConfigurationError(f"invalid range {self.range_m}: must be above 0 metres")

@@ -23,10 +23,15 @@ class MeshTiming:
     def __post_init__(self) -> None:
         """Raises ConfigurationError for a number outside its range."""
         if not self.check_period_s > 0:
-            raise ConfigurationError(f"check_period {self.check_period_s}: must be above 0 seconds")
+            raise ConfigurationError(
+                f"invalid check_period {self.check_period_s}: must be above 0 seconds"
+            )
         if not self.connection_lost_after_s > 0:
             raise ConfigurationError(
-                f"connection_lost_after {self.connection_lost_after_s}: must be above 0 seconds"
+                f"invalid connection_lost_after {self.connection_lost_after_s}: "
+                "must be above 0 seconds"
             )
         if self.send_attempts < 1:
-            raise ConfigurationError(f"send_attempts {self.send_attempts}: must be at least 1")
+            raise ConfigurationError(
+                f"invalid send_attempts {self.send_attempts}: must be at least 1"
+            )

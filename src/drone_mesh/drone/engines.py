@@ -66,7 +66,7 @@ def _own_engine(node_id: int, name: str) -> IDroneEngine:
         make = getattr(importlib.import_module(module_name), class_name)
         engine = make(node_id)
     except (ImportError, AttributeError, TypeError, ValueError) as error:
-        raise ConfigurationError(f"--drone {name} cannot be made: {error}") from error
+        raise ConfigurationError(f"--drone {name} cannot be created: {error}") from error
     if not isinstance(engine, IDroneEngine):
         raise ConfigurationError(f"--drone {name} is not an IDroneEngine")
     return engine

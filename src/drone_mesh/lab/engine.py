@@ -53,7 +53,7 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
         from distributed import Client, LocalCluster
     except ImportError as error:
         raise EngineError(
-            f"{error}: pip install 'drone_mesh[lab]' has it; --workers 0 works without"
+            f"{error}: pip install 'drone_mesh[lab]' installs it; --workers 0 does not need it"
         ) from error
     dask.config.set(
         {

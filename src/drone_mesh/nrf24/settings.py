@@ -101,10 +101,10 @@ class RadioSettings:
         ):
             value = getattr(self, name)
             if not low <= value <= high:
-                raise ConfigurationError(f"radio: {name} is {value}, must be {low} to {high}")
+                raise ConfigurationError(f"radio: invalid {name} {value}: must be {low}..{high}")
         if self.base_address & 0xFF:
             raise ConfigurationError(
-                f"radio: base_address is 0x{self.base_address:X}, must end in 00: the id goes there"
+                f"radio: invalid base_address 0x{self.base_address:X}: must end in 00"
             )
         if self.data_rate is DataRate.KBPS_250 and self.retransmit_delay < 1:
             raise ConfigurationError(

@@ -47,7 +47,7 @@ def test_a_router_introduces_itself_without_a_gateway_and_a_gateway_with_itself(
 
 @pytest.mark.parametrize("node_id", [-1, 254, 255])
 def test_an_id_that_no_node_has_is_refused(node_id):
-    with pytest.raises(ValueError, match=f"node id {node_id}: must be 0..253"):
+    with pytest.raises(ValueError, match=f"invalid node id {node_id}: must be 0..253"):
         Rig(node_id=node_id)
 
 
@@ -90,10 +90,10 @@ def test_a_late_tick_makes_up_for_one_check_and_not_for_many():
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"check_period_s": 0.0}, "check_period 0.0: must be above 0"),
-        ({"check_period_s": float("nan")}, "check_period nan: must be above 0"),
-        ({"connection_lost_after_s": -1.0}, "connection_lost_after -1.0: must be above 0"),
-        ({"send_attempts": 0}, "send_attempts 0: must be at least 1"),
+        ({"check_period_s": 0.0}, "invalid check_period 0.0: must be above 0"),
+        ({"check_period_s": float("nan")}, "invalid check_period nan: must be above 0"),
+        ({"connection_lost_after_s": -1.0}, "invalid connection_lost_after -1.0: must be above 0"),
+        ({"send_attempts": 0}, "invalid send_attempts 0: must be at least 1"),
     ],
 )
 def test_timing_that_no_node_could_live_by_is_refused(changes, why):

@@ -154,9 +154,9 @@ def test_an_order_for_its_own_drone_is_flown_and_the_landing_reported():
 @pytest.mark.parametrize(
     ("order", "why"),
     [
-        ((254, 0.0, 0.0, 0), "drone 254: ids are 0..253"),
-        ((255, 0.0, 0.0, 0), "drone 255: ids are 0..253"),
-        ((-1, 0.0, 0.0, 0), "drone -1: ids are 0..253"),
+        ((254, 0.0, 0.0, 0), "invalid drone id 254: must be 0..253"),
+        ((255, 0.0, 0.0, 0), "invalid drone id 255: must be 0..253"),
+        ((-1, 0.0, 0.0, 0), "invalid drone id -1: must be 0..253"),
         ((5, float("nan"), 0.0, 0), "latitude nan is not a finite number"),
         ((5, 0.0, float("-inf"), 0), "longitude -inf is not a finite number"),
         ((5, 5000.5, 0.0, 0), r"latitude 5000\.5 m is outside -5000\.\.5000 m"),

@@ -120,7 +120,7 @@ def test_a_type_without_a_body_becomes_a_plain_message(kind):
 @pytest.mark.parametrize("length", [0, 4, 31, 33])
 @pytest.mark.parametrize("decode", [type(message).from_payload for message, _ in LITERAL])
 def test_another_length_is_refused(decode, length):
-    with pytest.raises(PacketError, match=f"want 32 bytes, got {length}"):
+    with pytest.raises(PacketError, match=f"expected 32 bytes, got {length}"):
         decode(bytes(length))
 
 

@@ -232,11 +232,11 @@ def test_a_payload_of_another_length_is_refused(lab):
 @pytest.mark.parametrize(
     ("wrong", "why"),
     [
-        ({"channel": 126}, "channel is 126, must be 0 to 125"),
-        ({"crc_bytes": 0}, "crc_bytes is 0"),
+        ({"channel": 126}, "invalid channel 126: must be 0..125"),
+        ({"crc_bytes": 0}, "invalid crc_bytes 0: must be 1..2"),
         ({"retransmit_delay": 0}, "at least 1 .500 us. at 250 kbit/s"),
         ({"base_address": 0x544D526801}, "must end in 00"),
-        ({"broadcast_id": 253}, "broadcast_id is 253, must be 254 to 255"),
+        ({"broadcast_id": 253}, "invalid broadcast_id 253: must be 254..255"),
     ],
 )
 def test_settings_that_no_chip_has_are_refused_with_a_reason(wrong, why):

@@ -1,4 +1,4 @@
-"""Stay: no drone ever flies. The zero line that the other strategies are measured against."""
+"""Stay: no drone ever flies. The baseline for the other strategies."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ def result_name(result: int) -> str:
 
 
 class ParameterCheck:
-    """Reads the parameters that make a flight safe, and says which are not as they have to be."""
+    """Reads the parameters that make a flight safe, and reports which are not set as they must be."""
 
     def __init__(self, commander: Commander, telemetry: Telemetry) -> None:
         self._commander = commander

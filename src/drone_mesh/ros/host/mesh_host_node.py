@@ -79,7 +79,7 @@ def ids_to_serve(fleet: FactoryConfiguration) -> range:
             )
     served = [node_id for node_id in ids if _is_served(node_id)]
     if served:
-        raise ConfigurationError(f"node {served[0]} is already served by another process")
+        raise ConfigurationError(f"node {served[0]} is already hosted by another process")
     return ids
 
 
