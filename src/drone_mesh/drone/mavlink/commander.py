@@ -146,7 +146,7 @@ def result_name(result: int) -> str:
 
 
 class ParameterCheck:
-    """Reads the parameters that make a flight safe, and reports which are not set as they must be."""
+    """Reads the parameters that make a flight safe, and reports those that are set wrongly."""
 
     def __init__(self, commander: Commander, telemetry: Telemetry) -> None:
         self._commander = commander
