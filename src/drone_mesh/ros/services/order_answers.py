@@ -41,7 +41,7 @@ class OrderAnswers:
     ) -> tuple[list[int], list[int]]:
         """Call `order`, and wait for the answers; returns (sent, no route).
 
-        A drone is sent for as soon as one gateway has sent the order. It has no route when all
+        A drone counts as sent as soon as one gateway has sent the order. It has no route when all
         `gateways` say so. A drone without a full set of answers after `timeout_s` (wall) counts as
         sent: a gateway need not answer.
         """
