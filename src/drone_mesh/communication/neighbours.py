@@ -31,6 +31,7 @@ class Neighbours:
         self._hops: dict[int, int] = {}
         self._places: dict[int, HeardPlace] = {}
         self.silent = False  # all neighbours, two or more, were lost together; none was heard since
+        self._leaves_them = False  # this node flies away from its neighbours by order
 
     def heard(self, node: int, now_s: float) -> bool:
         """A packet arrived from `node`. True if it was not a neighbour before."""
@@ -46,13 +47,19 @@ class Neighbours:
         if self._heard_s.pop(node, None) is None:
             return False
         self._lost_s[node] = now_s
-        if not self._heard_s:
+        if not self._heard_s and not self._leaves_them:
             together = [at_s for at_s in self._lost_s.values() if now_s - at_s <= self._silence_s]
             self.silent = len(together) >= 2
         return True
 
+    def left_by_order(self) -> None:
+        """This node flies elsewhere by order: its medium is not the reason if it hears no node."""
+        self._leaves_them = True
+        self.silent = False
+
     def forget_all(self) -> None:
         """This node moved, so it may have other neighbours."""
+        self._leaves_them = False
         self._heard_s.clear()
         self._lost_s.clear()
 

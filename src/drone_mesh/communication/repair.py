@@ -103,6 +103,7 @@ class ConnectionRepair(IRepairActions):
     def on_ordered_flight(self) -> None:
         """A flight has started by an order."""
         self._flight = None
+        self._parts.neighbours.left_by_order()
         self._took_off()
 
     def on_neighbour_found(self, node: int) -> None:

@@ -322,3 +322,12 @@ def test_of_100_routers_30_die_and_all_that_have_a_path_are_back_within_30_s(see
     assert network.all_connected(with_path)
     assert_hops_are_paths(network)
     assert flown(network) & with_path == set()
+
+
+def test_a_drone_that_was_ordered_out_of_range_does_not_blame_its_medium():
+    network = fleet(routers=2, gridsize=2)
+    network.run_for(30.0)
+    network.order(1, -13.0, 24.0)
+    network.run_for(30.0)  # it has landed, and both its neighbours fell silent on the way
+    assert network.location(1).latitude == 24.0
+    assert run_until(network, lambda: network.connected(1), within_s=60.0)
