@@ -72,9 +72,9 @@ def open_page() -> Page:
     wait_for("the console to answer", WALL_LIMIT_S, tried)
     page = pages[0]
     wait_for(
-        "two connected routers on the page",
+        "three nodes that report on the page",
         WALL_LIMIT_S,
-        lambda: [n["condition"] for n in list(page.nodes.values())] == ["connected"] * 3,
+        lambda: [n["condition"] != "silent" for n in list(page.nodes.values())] == [True] * 3,
     )
     return page
 
@@ -89,6 +89,11 @@ class MeshConsoleTest(unittest.TestCase):
     def test_1_orders_are_carried_out(self) -> None:
         log = LogWatch()
         page = open_page()
+        wait_for(
+            "two connected routers",
+            WALL_LIMIT_S,
+            lambda: all(n["condition"] == "connected" for n in list(page.nodes.values())),
+        )
         self.assertIn([202, "202: 5 drones"], page.layouts)
         self.assertTrue(page.order(do="power", node=1, on=False)["done"])
         wait_for("1 is off", WALL_LIMIT_S, lambda: not page.nodes["1"]["on"])
