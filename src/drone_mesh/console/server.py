@@ -177,10 +177,16 @@ class ConsoleServer:
                 await asyncio.gather(sender, return_exceptions=True)
 
     async def _receive(self, page: Page) -> None:
-        async for text in page.socket.iter_text():
-            await self._on_request(page, text)
-            if page not in self._pages:
+        while page in self._pages:
+            message = await page.socket.receive()
+            if message["type"] == "websocket.disconnect":
                 return
+            text = message.get("text")
+            if text is None:
+                refusal = "invalid binary message: a request is JSON text"
+                await self._answer(page, None, False, refusal)
+            else:
+                await self._on_request(page, text)
 
     async def _send_frames(self, page: Page) -> None:
         loop = asyncio.get_running_loop()

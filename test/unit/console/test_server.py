@@ -65,6 +65,9 @@ class FakePage:
     def say(self, **request: object) -> None:
         self._to_server.put_nowait({"type": "websocket.receive", "text": json.dumps(request)})
 
+    def say_bytes(self, message: bytes) -> None:
+        self._to_server.put_nowait({"type": "websocket.receive", "bytes": message})
+
     @property
     def heard_everything(self) -> bool:
         return self._to_server.empty()
@@ -168,6 +171,21 @@ def test_orders_are_answered_by_their_numbers():
         assert (answers[4]["done"], answers[4]["text"]) == (True, "3 False")
         assert (answers[5]["done"], answers[5]["text"]) == (False, "no case 9")
         assert not answers[6]["done"]
+
+    run(scenario)
+
+
+def test_a_binary_message_is_answered_and_the_page_stays_connected():
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server).open()
+        page.say_bytes(b"\x00\xff")
+        page.say(do="power", number=4, node=3, on=False)
+        await until("two answers", lambda: len(page.of_type("answer")) == 2)
+        refusal, answer = page.of_type("answer")
+        assert (refusal["done"], refusal["text"]) == (
+            False, "invalid binary message: a request is JSON text",
+        )  # fmt: skip
+        assert answer["done"]
 
     run(scenario)
 
