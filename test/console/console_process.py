@@ -42,8 +42,10 @@ def main() -> None:
     server = ConsoleServer(store, mesh, access_for(options.address, options.token), LAYOUTS)
     runner = ConsoleRunner(server, options.address, options.port)
     stop = threading.Event()
+    # A flag and not the event: the handler may run while this thread holds the event's lock.
+    asked_to_stop = []
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+        signal.signal(number, lambda *_: asked_to_stop.append(True))
     running = threading.Thread(target=mesh.run, args=(stop,))
     running.start()
     runner.start()
@@ -55,10 +57,12 @@ def main() -> None:
         feed(mesh, store)
         is_fed.set()
 
-    while not stop.wait(FRAME_PERIOD_S):
+    while not asked_to_stop:
+        time.sleep(FRAME_PERIOD_S)
         if is_fed.is_set():  # on a machine that is too slow, feed less often
             is_fed.clear()
             runner.in_loop(feed_once)
+    stop.set()
     runner.stop()
     running.join()
 

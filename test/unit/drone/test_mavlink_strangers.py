@@ -227,9 +227,9 @@ def test_mavsdk_as_the_vehicle_is_read_and_not_flown_without_an_estimator(
         else:
             wait_for("only the rest is missing", lambda: says("no report from the GPS"))
             wait_for("its home is known", lambda: says("") and engine.status().home is not None)
+            wait_for("it flies", lambda: says("") and engine.status().on_ground is False)
             home_seen = engine.status().home  # MAVSDK sends another altitude than it was given
             assert home_seen[:2] == pytest.approx((0.0, 0.0), abs=0.01)
-            assert engine.status().on_ground is False
             assert engine.status().autopilot == "PX4"
     finally:
         engine.close()
