@@ -342,8 +342,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """A heartbeat for this node arrived; the body is that of a HeartbeatMessage."""
 
     @abc.abstractmethod
-    def _on_negotiation(self, bid: messages.MovementNegotiationMessage) -> None:
-        """A neighbour bids for the flight."""
+    def _on_negotiation(
+        self, bid: messages.MovementNegotiationMessage, gateway: messages.GatewayPlace | None
+    ) -> None:
+        """A neighbour bids for the flight; `gateway`: the place that its announcement is about."""
 
     @abc.abstractmethod
     def _took_off(self) -> None:
@@ -381,7 +383,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         elif kind == MessageType.MOVE_TO_LOCATION:
             self._orders.on_order(messages.GoToLocationMessage.from_payload(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
-            self._on_negotiation(messages.MovementNegotiationMessage.from_payload(payload))
+            bid = messages.MovementNegotiationMessage.from_payload(payload)
+            self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
         elif kind in messages.TECHNIQUE_TYPES:
             self._routing.on_packet(creator, from_, kind, messages.body(payload))
         else:

@@ -140,7 +140,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if creator != preferred_gateway:  # gateways do not answer each other
             self.send_heartbeat(creator)
 
-    def _on_negotiation(self, bid: MovementNegotiationMessage) -> None:
+    def _on_negotiation(
+        self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
+    ) -> None:
         """A gateway does not fly for the mesh."""
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:

@@ -257,7 +257,10 @@ _TypedMessage = Union[
 AnyMessage = Union[Message, _TypedMessage]
 
 _GATEWAY_PLACE = struct.Struct("<HBffh")  # age + 1 in seconds, id, latitude, longitude, height
-_GATEWAY_PLACE_AT = HEADER_BYTES + LocationMessage.BODY.size
+_GATEWAY_PLACE_AT = {
+    int(MessageType.LOCATION): HEADER_BYTES + LocationMessage.BODY.size,
+    int(MessageType.MOVEMENT_NEGOTIATION): HEADER_BYTES + MovementNegotiationMessage.BODY.size,
+}
 _OLDEST_AGE_S = 2**16 - 2
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
@@ -275,23 +278,25 @@ _NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the star
 
 
 class GatewayPlace(NamedTuple):
-    """Where a gateway was: an extension behind the body of a LOCATION."""
+    """Where a gateway was: an extension of a LOCATION or a MOVEMENT_NEGOTIATION."""
 
     gateway: int  # its id
     place: Location
     age_s: float  # how long ago it was there
 
     def behind(self, payload: bytes) -> bytes:
-        """A LOCATION with this extension."""
+        """The same packet with this extension behind its body."""
         age = 1 + max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
         latitude, longitude, height = self.place
         body = _GATEWAY_PLACE.pack(age, self.gateway, latitude, longitude, round(height))
-        return payload[:_GATEWAY_PLACE_AT] + body + payload[_GATEWAY_PLACE_AT + len(body) :]
+        at = _GATEWAY_PLACE_AT[payload[_TYPE]]
+        return payload[:at] + body + payload[at + len(body) :]
 
     @classmethod
     def from_payload(cls, payload: bytes) -> GatewayPlace | None:
-        """The extension of a LOCATION; None if there is none, or no valid one."""
-        age, gateway, *place = _GATEWAY_PLACE.unpack_from(payload, _GATEWAY_PLACE_AT)
+        """The extension of such a packet; None if there is none, or no valid one."""
+        at = _GATEWAY_PLACE_AT[payload[_TYPE]]
+        age, gateway, *place = _GATEWAY_PLACE.unpack_from(payload, at)
         if age == 0 or not all(map(math.isfinite, place)):
             return None
         return cls(gateway, Location(*place), age - 1.0)

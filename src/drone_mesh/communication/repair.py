@@ -14,6 +14,7 @@ from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.messages import (
+    GatewayPlace,
     LocationMessage,
     MovementNegotiationMessage,
     addressed,
@@ -125,9 +126,9 @@ class ConnectionRepair(IRepairActions):
         else:
             self._strategy.on_place(node, place)
 
-    def on_bid(self, node: int, score: float, from_: int) -> None:
-        """A node of the group bids; `from_` sent or passed on that bid."""
-        self._strategy.on_bid(node, score, from_)
+    def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
+        """A node of the group bids; `from_` sent or passed on that bid (see IRepairStrategy)."""
+        self._strategy.on_bid(node, score, from_, about)
 
     def on_due(self) -> bool:
         """The moment has come that the repair waits for. True if a flight is over."""
@@ -263,11 +264,17 @@ class ConnectionRepair(IRepairActions):
         self._flight = flight
 
     def bid(  # noqa: D102
-        self, score: float, node: int | None = None, but_not_to: int = NO_ROUTE
+        self,
+        score: float,
+        node: int | None = None,
+        but_not_to: int = NO_ROUTE,
+        about: Location | None = None,
     ) -> None:
         me = self.node_id
         creator = me if node is None else node
         packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
+        if about is not None:
+            packet = GatewayPlace(self._connection.gateway, about, 0.0).behind(packet)
         for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
             self._parts.delivery.send_own(addressed(packet, neighbour))
 

@@ -133,8 +133,17 @@ class IRepairActions(abc.ABC):
         """
 
     @abc.abstractmethod
-    def bid(self, score: float, node: int | None = None, but_not_to: int = NO_ROUTE) -> None:
-        """Send a bid to all neighbours; `node` made it, if it is passed on."""
+    def bid(
+        self,
+        score: float,
+        node: int | None = None,
+        but_not_to: int = NO_ROUTE,
+        about: Location | None = None,
+    ) -> None:
+        """Send a bid to all neighbours; `node` made it, if it is passed on.
+
+        `about`: the gateway's place, if the bid announces that a drone flies or flew there.
+        """
 
     @abc.abstractmethod
     def ask_places(self) -> None:
@@ -209,8 +218,11 @@ class IRepairStrategy(abc.ABC):
     def on_place(self, node: int, place: Location) -> None:
         """A node said where it stands, or where it flies to."""
 
-    def on_bid(self, node: int, score: float, from_: int) -> None:
-        """`node` bids; the neighbour `from_` sent or passed on that bid."""
+    def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
+        """`node` bids; the neighbour `from_` sent or passed on that bid.
+
+        `about`: the gateway's place to which that node flies or flew.
+        """
 
     def on_time(self) -> None:
         """The time has come for which the strategy waited."""

@@ -158,9 +158,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
             self._repair.on_connected()
 
-    def _on_negotiation(self, bid: MovementNegotiationMessage) -> None:
+    def _on_negotiation(
+        self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
+    ) -> None:
         if bid.creator != self._node_id:
-            self._repair.on_bid(bid.creator, bid.cost, bid.from_)
+            about = None if gateway is None else gateway.place
+            self._repair.on_bid(bid.creator, bid.cost, bid.from_, about)
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
         now_s = self._deadlines.now_s

@@ -778,6 +778,27 @@ def test_what_another_drone_found_in_vain_is_no_second_choice():
     assert "another drone flew to the gateway in vain" in rig.repair_in_words()
 
 
+def test_what_another_drone_found_in_vain_elsewhere_does_not_keep_this_one_from_the_gateway():
+    """The other one believed the gateway at (0, 40); this one knows that it is at (0, 4)."""
+    rig = group_rig(2, 3)
+    rig.antenna.dead = set()
+    in_vain_at_0_40 = bid(3, IN_VAIN) + "01 00 00 00 00 20 42 00 00 00 00 00 00"
+    for round_s in (0.0, 40.0, 80.0):
+        rig.wait_until(BIDS_S + round_s)
+        rig.hear(in_vain_at_0_40, bid(2, -1.0))
+        rig.wait(TO_DECISION_S)
+    assert rig.engine.goals == [A_LEG_FROM_12]
+
+
+def test_an_announcement_is_passed_on_with_the_place_that_it_is_about():
+    rig = group_rig(3, 4)
+    rig.wait_until(EMERGENCY_S - 1.0)
+    rig.forget()
+    rig.hear(bid(3, TOOK_OFF_HOME) + "01 00 00 00 00 20 42 00 00 00 00 00 00")
+    passed_on = "03 01 07 04 04 5e d0 32 4f 01 00 00 00 00 20 42"
+    assert rig.sent(BID) == [bytes.fromhex(passed_on).ljust(32, b"\0")]
+
+
 def test_after_a_flight_of_another_drone_to_the_gateway_there_is_none_for_a_minute():
     rig = group_rig(3)
     rig.hear("02 02 01 01 01 00 60 9c 45")  # the place of 2 is nowhere to fly

@@ -17,6 +17,11 @@ def test_no_sequence_ends_with_stacked_drones_or_a_needless_flight_or_a_node_giv
     assert [outcome for outcome in outcomes if harm(outcome)] == []
 
 
+def test_a_drone_that_knows_where_the_gateway_moved_flies_though_another_sought_it_elsewhere():
+    moved = run_sequence(7027)
+    assert (moved.incidents, moved.unhealed, moved.stacked) == ("gateway moved", 0, 0)
+
+
 def test_the_same_seed_gives_the_same_outcome():
     assert run_sequence(3) == run_sequence(3)
 

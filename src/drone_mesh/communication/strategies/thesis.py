@@ -44,8 +44,8 @@ class Thesis(IRepairStrategy):
         self._asked_s = -math.inf
         self._rounds_without_flier = 0
         self._quiet_until_s = -math.inf
-        self._home_again_s = -math.inf  # not before this may another one fly to the gateway
-        self._told_in_vain_s = -math.inf
+        self._tries: dict[Location, float] = {}  # gateway's place -> when another one may fly there
+        self._told_in_vain_s: dict[int, float] = {}  # node -> when it said so
 
     def on_emergency(self) -> None:
         """With neighbours: begin an election. Alone: fly."""
@@ -61,7 +61,8 @@ class Thesis(IRepairStrategy):
         """The election is over, and what was in vain may be tried again one day."""
         self._election.clear()
         self._rounds_without_flier = 0
-        self._home_again_s = self._quiet_until_s = -math.inf
+        self._quiet_until_s = -math.inf
+        self._tries.clear()
 
     def on_stopped(self) -> None:
         """The election goes on without this node."""
@@ -109,7 +110,7 @@ class Thesis(IRepairStrategy):
             occupant = NO_ROUTE if alone else self._occupant(step)
             if occupant != NO_ROUTE:
                 reason = f"the place of {step.owner} is occupied by {occupant}"
-            elif step.home and not alone and mesh.now_s < self._home_again_s:
+            elif step.home and not alone and self._tried(step.place):
                 reason = "another drone flew to the gateway in vain"
             elif is_first_choice or self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER:
                 return step, ""
@@ -171,14 +172,14 @@ class Thesis(IRepairStrategy):
                 return False
         return all(view.age_s <= waited_s for view in asked.values())
 
-    def on_bid(self, node: int, score: float, from_: int) -> None:
+    def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
         """A node of the group bids for the flight, or took off; `from_` relays that."""
         if score in (TOOK_OFF, TOOK_OFF_HOME):
-            self._on_take_off_of(node, score, from_)
+            self._on_take_off_of(node, score, from_, about)
             return
         mesh = self.mesh
         if score == IN_VAIN:
-            self._on_in_vain(node, from_)
+            self._on_in_vain(node, from_, about)
             score = NO_BID
         is_best = self._election.heard(node, score, mesh.now_s)
         if mesh.connected or mesh.state is Repair.FLYING or mesh.now_s < self._quiet_until_s:
@@ -204,7 +205,11 @@ class Thesis(IRepairStrategy):
         score = as_on_the_air(self.own_bid)
         settled_s = max(mesh.now_s, self._asked_s + PLACES_WITHIN_S) + SETTLE_S
         self._election.start(mesh.node_id, score, mesh.now_s, settled_s)
-        mesh.bid(IN_VAIN if self._was_home() and score < 0 else score)
+        tried = self._was_home() if score < 0 else None
+        if tried is None:
+            mesh.bid(score)
+        else:
+            mesh.bid(IN_VAIN, about=tried)
         self._decide()
 
     def _decide(self) -> None:
@@ -228,10 +233,13 @@ class Thesis(IRepairStrategy):
             step, self.reason = self._next_step(alone=False)
             self._end_round()
             if step is not None:
-                mesh.bid(TOOK_OFF_HOME if step.home else TOOK_OFF)
+                if step.home:
+                    mesh.bid(TOOK_OFF_HOME, about=step.place)
+                else:
+                    mesh.bid(TOOK_OFF)
                 self._fly(step)
 
-    def _on_take_off_of(self, node: int, code: float, from_: int) -> None:
+    def _on_take_off_of(self, node: int, code: float, from_: int, about: Location | None) -> None:
         """A drone of the group flies: the others wait for what comes of it."""
         mesh = self.mesh
         if mesh.connected or mesh.now_s < self._quiet_until_s:
@@ -242,24 +250,40 @@ class Thesis(IRepairStrategy):
         self._rounds_without_flier = 0
         self.reason = f"{node} flies instead"
         if code == TOOK_OFF_HOME:
-            self._home_again_s = mesh.now_s + HOME_AGAIN_S
-        mesh.bid(code, node, but_not_to=from_)
+            self._note_try(about, mesh.now_s + HOME_AGAIN_S)
+        mesh.bid(code, node, but_not_to=from_, about=about)
         if mesh.state in IN_A_ROUND:
             self._end_round()
 
-    def _on_in_vain(self, node: int, from_: int) -> None:
+    def _on_in_vain(self, node: int, from_: int, about: Location | None) -> None:
         """A drone of the group was at the gateway's place in vain: no other one flies there."""
         mesh = self.mesh
-        if mesh.connected or mesh.now_s < self._told_in_vain_s + TAKE_OFF_WITHIN_S:
+        told_s = self._told_in_vain_s.get(node, -math.inf)
+        if mesh.connected or mesh.now_s < told_s + TAKE_OFF_WITHIN_S:
             return
-        self._told_in_vain_s = mesh.now_s
+        self._told_in_vain_s[node] = mesh.now_s
         rounds_s = 2 * (mesh.connection_lost_after_s + mesh.check_period_s)
-        self._home_again_s = max(self._home_again_s, mesh.now_s + rounds_s)
-        mesh.bid(IN_VAIN, node, but_not_to=from_)
+        self._note_try(about, mesh.now_s + rounds_s)
+        mesh.bid(IN_VAIN, node, but_not_to=from_, about=about)
 
-    def _was_home(self) -> bool:
-        """Whether this drone was at the gateway's place since it was last connected."""
-        return any(step.home and self.mesh.was_at(step) for step in self.mesh.steps)
+    def _note_try(self, place: Location | None, until_s: float) -> None:
+        place, now_s = place or self.mesh.gateway_place, self.mesh.now_s
+        self._tries = {tried: at_s for tried, at_s in self._tries.items() if now_s < at_s}
+        if place is not None:
+            self._tries[place] = max(until_s, self._tries.get(place, until_s))
+
+    def _tried(self, place: Location) -> bool:
+        """Whether a drone of the group is or was near there: a gateway would have answered it."""
+        near_m = self.mesh.range_m / 2
+        return any(
+            self.mesh.now_s < until_s and place.distance_m(tried) < near_m
+            for tried, until_s in self._tries.items()
+        )
+
+    def _was_home(self) -> Location | None:
+        """The gateway's place, if this drone was there since it was last connected."""
+        mesh = self.mesh
+        return next((s.place for s in mesh.steps if s.home and mesh.was_at(s)), None)
 
     def _pass_over_winner(self) -> None:
         """The winner did not take off: the next best flies."""
