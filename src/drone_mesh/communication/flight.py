@@ -46,6 +46,7 @@ class Pilot:
         self._deadlines = deadlines
         self._complaints = complaints
         self._flight: Flight | None = None
+        self._origin: Location | None = None  # of the flight; of several in a row: of the first
 
     @property
     def goal(self) -> Location | None:
@@ -70,6 +71,8 @@ class Pilot:
 
     def fly_to(self, goal: Location, step_back: bool = False) -> None:
         """Start a flight, or change the goal of the present one; `step_back`: for a repair."""
+        if self._flight is None:
+            self._origin = self.location()
         self._flight = Flight(goal)
         self._ask_position_later()
         fly = self._engine.step_back_to if step_back else self._engine.set_goal
@@ -77,6 +80,12 @@ class Pilot:
             fly(*goal)
         except GoalRefused as error:  # the flight is then over at the first look
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
+
+    def distance_m(self) -> float:
+        """Straight distance from where the drone last stood to its goal; infinity if unknown."""
+        if self._flight is None or self._origin is None:
+            return math.inf
+        return self._origin.distance_m(self._flight.goal)
 
     def watch(self) -> bool:
         """Look where the drone is; whether the flight is over now."""

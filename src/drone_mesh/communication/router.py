@@ -17,7 +17,7 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.messages import GatewayPlace, MovementNegotiationMessage
-from drone_mesh.communication.observer import MeshObserver, ignore_events
+from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import RepairOptions
@@ -27,6 +27,8 @@ from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine, Location
+
+SHORT_FLIGHT = 0.25  # of the range, our choice: the discs before and after share 84 % of their area
 
 
 class MeshnetworkRouter(MeshnetworkComponent):
@@ -185,7 +187,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair.on_neighbour_lost(node)
 
     def _took_off(self) -> None:
-        self._repair.on_ordered_flight()
+        if not self._is_short_flight():
+            self._repair.on_ordered_flight()
+
+    def _is_short_flight(self) -> bool:
+        """Whether most neighbours will still be in reach, so that the router stays a relay."""
+        if not self._states.connected or self._states.repair is Repair.FLYING:
+            return False
+        return self._pilot.distance_m() <= SHORT_FLIGHT * self._repair.range_m
 
     def _watch_flight(self) -> None:
         if not self._pilot.watch():
@@ -194,5 +203,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._landed()
 
     def _landed(self) -> None:
-        self._repair.on_landed()
-        super()._landed()
+        if self._states.repair is Repair.FLYING:
+            self._repair.on_landed()
+            super()._landed()
+            return
+        self._report(MeshEventKind.LANDED)
+        if self._antenna.on():
+            self._check(self._deadlines.now_s)
