@@ -18,7 +18,7 @@ from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
 from drone_mesh.communication.forwarding import Forwarding
-from drone_mesh.communication.frames import CommonFrame
+from drone_mesh.communication.frames import TYPES_WITH_PLACES, CommonFrame
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -30,7 +30,12 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.introduction import Introduction
 from drone_mesh.communication.medium import ChannelUse
-from drone_mesh.communication.messages import HeartbeatMessage, IntroduceMessage, MessageType
+from drone_mesh.communication.messages import (
+    TYPES_WITH_NUMBERS,
+    HeartbeatMessage,
+    IntroduceMessage,
+    MessageType,
+)
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import (
     MeshEventKind,
@@ -50,6 +55,7 @@ SILENCE_PERIODS = 1.5  # our choice: each neighbour is asked once a check period
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
+_LOCATION = int(MessageType.LOCATION)
 
 
 class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
@@ -74,6 +80,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             raise ValueError(f"invalid node id {node_id}: must be 0..{MAX_NODE_ID}")
         self._node_id = node_id
         self._antenna = antenna
+        self._shared = antenna.medium.shared
         self._routing = routing
         self._rng = rng
         self._timing = timing or MeshTiming()
@@ -176,7 +183,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if to != me:
             self._drop("not for this node", payload)
             return
-        if not messages.is_finite(payload):
+        if kind in TYPES_WITH_NUMBERS and not messages.is_finite(payload):
             self._drop("not a finite number", payload)
             return
         if self._neighbours.heard(from_, now_s):
@@ -188,12 +195,15 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             return
         if kind == _PRESENT and creator == from_ and not self._frame.heard(creator, payload):
             self.complaints.add("another origin", f"that of node {creator}", now_s)
-        if self._frame.refuses(from_, kind):
+        if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node whose origin is another, or not known yet", payload)
             return
         if forward not in (me, BROADCAST):
             if kind == _HEARTBEAT:
-                self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
+                if self._shared:
+                    self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
+            elif kind == _LOCATION:
+                self._on_passing_location(creator, payload)
             self._forwarding.forward(payload, now_s)
         elif kind == _HEARTBEAT:
             self._on_heartbeat(creator, from_, *HeartbeatMessage.body(payload))
@@ -354,7 +364,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     def _on_passing_heartbeat(
         self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
-        """A heartbeat for another node is about to be forwarded."""
+        """On a shared medium: a heartbeat for another node is about to be forwarded."""
+
+    def _on_passing_location(self, creator: int, payload: bytes) -> None:
+        """A LOCATION for another node is about to be forwarded."""
 
     @abc.abstractmethod
     def _on_location(

@@ -40,6 +40,7 @@ class Delivery:
         """`attempts`: failed transmissions after which the receiver counts as lost."""
         self._node_id = node_id
         self._antenna = antenna
+        self._shared = antenna.medium.shared
         self._routing = routing
         self._neighbours = neighbours
         self._deadlines = deadlines
@@ -60,12 +61,12 @@ class Delivery:
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
         """
-        if self._antenna.medium.shared:
+        if self._shared:
             return self._hand_over(payload, to)
-        transmissions = failures
+        antenna, transmissions = self._antenna, failures
         for _attempt in range(failures, self._attempts):
-            taken = self._antenna.send_message_to(payload)
-            transmissions += self._antenna.transmissions_of_last_send()
+            taken = antenna.send_message_to(payload)
+            transmissions += antenna.transmissions_of_last_send()
             if taken:
                 self._sent(to, transmissions)
                 return True
@@ -104,25 +105,27 @@ class Delivery:
     def send_own(self, payload: bytes) -> bool:
         """Send a packet of our own towards its addressee, over one route after the other."""
         other = messages.addressee(payload)
+        untried = self._routing.directions(other, NO_ROUTE, self._node_id)
         tried: set[int] = set()
-        while True:
-            directions = self._routing.directions(other, NO_ROUTE, self._node_id)
-            untried = [to for to in directions if to not in tried]
-            if not untried:
-                return False
+        while untried:
             if self.send_to_each(payload, untried):
                 return True
             tried.update(untried)
+            directions = self._routing.directions(other, NO_ROUTE, self._node_id)
+            untried = [to for to in directions if to not in tried]
+        return False
 
     def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:
         """The same packet to each of these neighbours. True: at least one of them has it."""
-        taken = [self.send(messages.readdressed(payload, to), to) for to in next_hops]
-        return any(taken)
+        taken = False
+        for to in next_hops:
+            taken |= self.send(messages.readdressed(payload, to), to)
+        return taken
 
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
         """As `send_own`, to each of these; the packets for direct neighbours leave together."""
         routing = self._routing
-        if self._antenna.medium.shared:
+        if self._shared:
             for other in others:
                 self.send_own(messages.addressed(payload, other))
             return

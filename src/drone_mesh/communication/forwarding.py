@@ -46,9 +46,9 @@ class Forwarding:
             return
         identity = messages.identity(payload)
         hops = messages.hops(payload) if kind == MessageType.HEARTBEAT else 0
-        first = self._circulation.came_round(identity, from_, now_s, hops)
-        if first is not None:
-            self._drop_circulating(payload, first.went_to, now_s)
+        went_to = self._circulation.came_round(identity, from_, now_s, hops)
+        if went_to is not None:
+            self._drop_circulating(payload, went_to, now_s)
             return
         lost = NO_ROUTE
         for _attempt in range(2):

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import enum
 import math
+import operator
 import struct
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Union
+from typing import Callable, ClassVar, Mapping, NamedTuple, Union
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.drone.interfaces import Location
@@ -266,11 +267,11 @@ _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
-_EXTENSION_AT = {  # places of the first byte behind a body that can be extended
-    int(MessageType.PRESENT): HEADER_BYTES + IntroduceMessage.BODY.size,
-    int(MessageType.HEARTBEAT): HEADER_BYTES + HeartbeatMessage.BODY.size,
+_EXTENSIONS = {  # the bytes behind a body that a routing technique may use
+    int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
+    int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
 }
-_NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
+TYPES_WITH_NUMBERS: Mapping[int, struct.Struct] = {  # the floats at the start of a body
     MessageType.LOCATION: struct.Struct("<ff"),
     MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
     MessageType.MOVEMENT_NEGOTIATION: struct.Struct("<f"),
@@ -302,30 +303,23 @@ class GatewayPlace(NamedTuple):
         return cls(gateway, Location(*place), age - 1.0)
 
 
-def header(payload: bytes) -> tuple[int, int, int, int, int]:
-    """Creator, from, type, to and forward of a packet."""
-    creator, from_, kind, to, forward = payload[:HEADER_BYTES]
-    return creator, from_, kind, to, forward
+# Read for each packet: these four and `header` cost no call of a Python function.
+
+header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct("<5B").unpack_from
+"""Creator, from, type, to and forward of a packet."""
 
 
-def sender(payload: bytes) -> int:
-    """The node that sends this hop."""
-    return payload[_FROM]
+sender: Callable[[bytes], int] = operator.itemgetter(_FROM)
+"""The node that sends this hop."""
 
+receiver: Callable[[bytes], int] = operator.itemgetter(_TO)
+"""The node that this hop is for."""
 
-def receiver(payload: bytes) -> int:
-    """The node that this hop is for."""
-    return payload[_TO]
+type_of: Callable[[bytes], int] = operator.itemgetter(_TYPE)
+"""The type of a packet; see MessageType."""
 
-
-def type_of(payload: bytes) -> int:
-    """The type of a packet; see MessageType."""
-    return payload[_TYPE]
-
-
-def addressee(payload: bytes) -> int:
-    """The node that a packet is for in the end, or BROADCAST."""
-    return payload[_FORWARD]
+addressee: Callable[[bytes], int] = operator.itemgetter(_FORWARD)
+"""The node that a packet is for in the end, or BROADCAST."""
 
 
 def readdressed(payload: bytes, to: int) -> bytes:
@@ -365,15 +359,14 @@ def hops(payload: bytes) -> int:
     return payload[HEADER_BYTES]
 
 
-def extension_room(kind: int) -> int:
-    """The number of bytes behind the body that a routing technique may use; 0 for most types."""
-    return _extension_end(kind) - _EXTENSION_AT[kind] if kind in _EXTENSION_AT else 0
+EXTENSION_ROOM: Mapping[int, int] = {kind: len(part) for kind, part in _EXTENSIONS.items()}
+"""The number of bytes behind the body that a routing technique may use, for types that have any."""
 
 
 def extension(payload: bytes) -> bytes:
     """The bytes behind the body of a PRESENT or a HEARTBEAT; zero where no technique uses them."""
-    kind = payload[_TYPE]
-    return payload[_EXTENSION_AT[kind] : _extension_end(kind)]
+    part = _EXTENSIONS[payload[_TYPE]]
+    return payload[part.start : part.stop]
 
 
 def extended(payload: bytes, extension: bytes) -> bytes:
@@ -381,14 +374,11 @@ def extended(payload: bytes, extension: bytes) -> bytes:
 
     Raises PacketError if they do not fit.
     """
-    at, room = _EXTENSION_AT[payload[_TYPE]], extension_room(payload[_TYPE])
-    if len(extension) > room:
-        raise PacketError(f"{len(extension)} extension bytes do not fit into {room}")
+    part = _EXTENSIONS[payload[_TYPE]]
+    at = part.start
+    if len(extension) > len(part):
+        raise PacketError(f"{len(extension)} extension bytes do not fit into {len(part)}")
     return payload[:at] + extension + payload[at + len(extension) :]
-
-
-def _extension_end(kind: int) -> int:
-    return _FRAME_DIGEST_AT if kind == MessageType.PRESENT else PAYLOAD_BYTES
 
 
 def frame_digest(present: bytes) -> int:
@@ -414,9 +404,9 @@ def identity(payload: bytes) -> bytes:
 
 
 def is_finite(payload: bytes) -> bool:
-    """Whether all floats of a packet are finite; True for types without floats."""
-    numbers = _NUMBERS.get(payload[_TYPE])
-    return numbers is None or all(map(math.isfinite, numbers.unpack_from(payload, HEADER_BYTES)))
+    """Whether all floats of a packet are finite; its type is one of TYPES_WITH_NUMBERS."""
+    numbers = TYPES_WITH_NUMBERS[payload[_TYPE]].unpack_from(payload, HEADER_BYTES)
+    return all(map(math.isfinite, numbers))
 
 
 def _packed(message: _TypedMessage, *values: float) -> bytes:

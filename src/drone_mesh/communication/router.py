@@ -16,7 +16,11 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import GatewayPlace, MovementNegotiationMessage
+from drone_mesh.communication.messages import (
+    GatewayPlace,
+    LocationMessage,
+    MovementNegotiationMessage,
+)
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
@@ -76,7 +80,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """As MeshnetworkComponent."""
         super().on_msg(payload, now_s)
-        self._repair_status = self._repair.status()
+        if self._states.nothing_to_repair:  # most packets
+            self._repair_status = NOTHING_TO_REPAIR
+        else:
+            self._repair_status = self._repair.status()
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered last time, or may still answer."""
@@ -154,11 +161,16 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _on_passing_heartbeat(
         self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
-        """On a shared channel the answer of a gateway proves the connection of each relay, too."""
-        proves = creator == preferred_gateway and self._antenna.medium.shared
-        proves = proves and self._repair.may_connect(NO_ROUTE, know_gateway)
+        """The answer of a gateway proves the connection of each relay, too."""
+        proves = creator == preferred_gateway and self._repair.may_connect(NO_ROUTE, know_gateway)
         if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
             self._repair.on_connected()
+
+    def _on_passing_location(self, creator: int, payload: bytes) -> None:
+        """Where the gateway is concerns each relay, too."""
+        if creator == self._connection.gateway:
+            location = LocationMessage.from_payload(payload).location
+            self.places.gateway_is_at(location, self._deadlines.now_s)
 
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None

@@ -991,6 +991,15 @@ def test_a_next_hop_passes_on_where_the_gateway_is():
     assert answer[19:] == bytes.fromhex("0b 00 00 00 00 80 40").ljust(13, b"\0")
 
 
+def test_a_router_learns_where_the_gateway_is_from_an_answer_that_it_forwards():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.know_neighbour(5)
+    rig.hear("00 02 01 01 05 00 00 80 40", "07 02 01 01 05 00 00 00 41")
+    assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
+    assert [payload[4] for payload in rig.sent(LOCATION)] == [5, 5]
+
+
 def test_news_of_the_gateway_that_are_older_change_nothing():
     rig = Rig()
     rig.connect_through(2)
