@@ -80,4 +80,4 @@ def test_a_place_is_taken_only_from_a_neighbour_with_the_same_origin(own, heard,
 
 
 def test_two_types_of_packets_carry_places():
-    assert TYPES_WITH_PLACES == {LOCATION, MOVE_TO_LOCATION}
+    assert {LOCATION, MOVE_TO_LOCATION} == TYPES_WITH_PLACES
