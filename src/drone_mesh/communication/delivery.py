@@ -191,6 +191,18 @@ class Delivery:
         finally:
             self._telling = False
 
+    def came_back(self, missing: int, neighbour: int) -> None:
+        """`neighbour` sent a packet for `missing` that could only go straight back to it.
+
+        On a shared medium only that neighbour hears of it: for all others the route still works.
+        """
+        if not self._antenna.medium.shared:
+            self.tell_missing(missing, first=neighbour)
+            return
+        me = self._node_id
+        packet = messages.MissingMessage(me, me, neighbour, neighbour, missing)
+        self.send(packet.to_payload(), neighbour)
+
     def _announce_missing(self, missing: int) -> None:
         """One MISSING to all neighbours, unless the same was said a moment ago."""
         now_s, me = self._deadlines.now_s, self._node_id

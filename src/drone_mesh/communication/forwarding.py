@@ -56,7 +56,9 @@ class Forwarding:
             to = directions[0] if directions else NO_ROUTE
             if to in (NO_ROUTE, from_):
                 self.stranded(payload, now_s)
-                if to == from_ or lost != forward:  # else all were informed when it was lost
+                if to == from_:
+                    self._delivery.came_back(forward, from_)
+                elif lost != forward:  # else all were informed when it was lost
                     self._delivery.tell_missing(forward, first=from_)
                 return
             forwarded = messages.next_hop(payload, self._node_id, to)

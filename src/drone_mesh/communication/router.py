@@ -191,11 +191,15 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self.places.next_hop_is_at(node, location)
         self._repair.on_place(node, location)
 
+    def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
+        super()._on_missing(creator, missing, told_by)
+        self._connection.on_route_lost()
+
     def _on_neighbour_found(self, node: int) -> None:
         self._repair.on_neighbour_found(node)
 
     def _on_neighbour_lost(self, node: int) -> None:
-        self._connection.on_neighbour_lost()
+        self._connection.on_route_lost()
         self._repair.on_neighbour_lost(node)
 
     def _took_off(self) -> None:
