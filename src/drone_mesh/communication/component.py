@@ -43,6 +43,7 @@ from drone_mesh.communication.observer import (
     Reporter,
     ignore_events,
 )
+from drone_mesh.communication.order_messages import OrderQuery
 from drone_mesh.communication.orders import OrderIntake
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.places import KnownPlaces
@@ -160,6 +161,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._routing.on_time(now_s)
         if now_s >= deadlines.get(Due.ASK_POSITION):
             self._watch_flight()
+        if now_s >= deadlines.get(Due.ORDER_REPLIES):
+            self._orders.on_due()
         due_s = deadlines.get(Due.CHECK)
         if now_s >= due_s:
             period_s = self._timing.check_period_s
@@ -394,12 +397,22 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             if missing != self._node_id:
                 self._on_missing(creator, missing, told_by=from_)
         elif kind == MessageType.MOVE_TO_LOCATION:
-            self._orders.on_order(messages.GoToLocationMessage.from_payload(payload))
+            order = messages.GoToLocationMessage.from_payload(payload)
+            self._orders.on_order(order, messages.order_number(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
             bid = messages.MovementNegotiationMessage.from_payload(payload)
             self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
         elif kind in messages.TECHNIQUE_TYPES:
             self._routing.on_packet(creator, from_, kind, messages.body(payload))
+        elif kind in messages.REPORT_TYPES:
+            self._on_report(payload, creator, kind)
+        else:
+            self._drop("a type that is not processed", payload)
+
+    def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
+        """A report, or the request for one, for this node."""
+        if kind == MessageType.ORDER_QUERY:
+            self._orders.on_query(creator, OrderQuery.number_in(payload))
         else:
             self._drop("a type that is not processed", payload)
 
@@ -437,3 +450,4 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._routing.node_moved_location()
         self._report(MeshEventKind.LANDED)
         self.search_other_nodes_in_range()
+        self._orders.on_landed()

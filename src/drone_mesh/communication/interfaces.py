@@ -11,6 +11,7 @@ import abc
 from typing import NamedTuple, Sequence
 
 from drone_mesh.communication.medium import UNDISTURBED, ChannelUse, Medium
+from drone_mesh.communication.order_record import OrderRecord
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
@@ -102,6 +103,10 @@ class IGatewayCommands(abc.ABC):
     @abc.abstractmethod
     def get_known_nodes(self) -> list[KnownNode]:
         """All other nodes that it has a route to or has heard from, by id."""
+
+    def get_orders(self) -> Sequence[OrderRecord]:
+        """The orders that it remembers, oldest first, and what became of them."""
+        return ()
 
 
 class IWirelessCommunication(abc.ABC):

@@ -25,6 +25,7 @@ _CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # places of the header bytes
 HEADER_BYTES = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
 TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
+REPORT_TYPES = range(64, 128)
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
@@ -39,6 +40,8 @@ class MessageType(enum.IntEnum):
     MISSING = 5  # its creator can no longer reach a node
     MOVE_TO_LOCATION = 6  # an order to fly
     MOVEMENT_NEGOTIATION = 7  # the bid of its creator to fly
+    ORDER_REPLY = 64  # what a drone says of a numbered order; see order_messages
+    ORDER_QUERY = 65  # asks for an ORDER_REPLY
 
 
 @dataclass(frozen=True)
@@ -263,6 +266,8 @@ _GATEWAY_PLACE_AT = {
     int(MessageType.MOVEMENT_NEGOTIATION): HEADER_BYTES + MovementNegotiationMessage.BODY.size,
 }
 _OLDEST_AGE_S = 2**16 - 2
+_ORDER_NUMBER = struct.Struct("<H")
+_ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _HEARTBEAT = int(MessageType.HEARTBEAT)
@@ -389,6 +394,17 @@ def frame_digest(present: bytes) -> int:
 def with_frame_digest(present: bytes, digest: int) -> bytes:
     """The same PRESENT with this digest."""
     return present[:_FRAME_DIGEST_AT] + _FRAME_DIGEST.pack(digest)
+
+
+def order_number(order: bytes) -> int:
+    """The number behind the body of a MOVE_TO_LOCATION; 0: its creator wants no reply."""
+    return int(_ORDER_NUMBER.unpack_from(order, _ORDER_NUMBER_AT)[0])
+
+
+def with_order_number(order: bytes, number: int) -> bytes:
+    """The same MOVE_TO_LOCATION with this number."""
+    end = _ORDER_NUMBER_AT + _ORDER_NUMBER.size
+    return order[:_ORDER_NUMBER_AT] + _ORDER_NUMBER.pack(number) + order[end:]
 
 
 def body(payload: bytes) -> bytes:

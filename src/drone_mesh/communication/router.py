@@ -224,5 +224,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
             super()._landed()
             return
         self._report(MeshEventKind.LANDED)
+        self._orders.on_landed()
         if self._antenna.on():
             self._check(self._deadlines.now_s)
