@@ -6,8 +6,8 @@ version v gets what changed after v, however long ago that was: a page that fall
 larger difference, and nothing is queued for it.
 
 The fields of a node are those of NodeState.msg, with what is decided here and only shown there:
-its condition, the name of its colour, its trouble, its slot among nodes at the same position, and
-the links it has with nodes of higher ids.
+its condition, the name of its colour, its trouble, its slot among nodes at the same position, how
+far its latest order has come, and the links it has with nodes of higher ids.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from drone_mesh.state.model import (
     footprint,
     position_is_known,
 )
+from drone_mesh.state.orders import OrderWatch
 from drone_mesh.state.outages import MeshSample, take_sample
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 from drone_mesh.view.fan import fan_out
@@ -53,6 +54,7 @@ class FrameStore:
         self._samples: deque[tuple[int, MeshSample]] = deque(maxlen=SAMPLES_KEPT)
         self._sampled_at_s = float("-inf")
         self._lost_links = LostLinks()
+        self._orders = OrderWatch()
         self._run_began_at = 0
         self._obstacles: list[dict[str, Any]] = []
         self._obstacles_at = 0
@@ -87,7 +89,8 @@ class FrameStore:
         slots = fan_out(mesh.nodes)
         for node in mesh.nodes:
             fields = _fields(node, troubles.get(node.id))
-            self._update_node(node.id, {**fields, "slot": slots.get(node.id)})
+            order = self._orders.words(node.id)
+            self._update_node(node.id, {**fields, "slot": slots.get(node.id), "order": order})
         for node_id, fields in self._links(mesh.nodes, wall_s).items():
             self._update_node(node_id, fields)
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:
@@ -96,7 +99,9 @@ class FrameStore:
 
     def add_events(self, events: Iterable[EventRecord]) -> None:
         """Add new events, oldest first."""
+        events = list(events)
         self._next_version()
+        self._orders.take(events)
         for event in events:
             self._events.append(
                 (
@@ -186,6 +191,7 @@ class FrameStore:
     def _forget_run(self) -> None:
         """Simulated time went back: a new world. Charts and log of every page start again."""
         self._run_began_at = self.version
+        self._orders.forget()
         self._events.clear()
         self._samples.clear()
 

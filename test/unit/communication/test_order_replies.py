@@ -11,13 +11,12 @@ from drone_mesh.errors import GoalRefused
 
 TO_Y_1 = "00 00 80 3f 00 00 00 00 00 00"  # latitude 1, longitude 0, height 0
 TO_Y_2 = "00 00 00 40 00 00 00 00 00 00"
+TO_Y_20 = "00 00 a0 41 00 00 00 00 00 00"  # too far to keep the routes
 
 
 def replies(rig):
     """Number, outcome and the part's text of each reply that was sent."""
-    return [
-        (p[5] | p[6] << 8, p[7], p[9:19].rstrip(b"\0").decode()) for p in rig.sent(kind=64)
-    ]
+    return [(p[5] | p[6] << 8, p[7], p[9:19].rstrip(b"\0").decode()) for p in rig.sent(kind=64)]
 
 
 def drone_rig():
@@ -31,7 +30,7 @@ def fly_to(rig, place):
     """The drone gets there, lands, and hears its gateway again."""
     rig.engine.place = place
     rig.wait(2.1)
-    rig.connect_to_gateway()
+    rig.hear("00 00 04 01 01 01 00 00")
     rig.wait(1.1)
 
 
@@ -52,11 +51,20 @@ def test_an_accepted_order_is_replied_to_in_these_bytes():
     assert rig.sent(kind=64) == [packet("01 01 40 00 00 34 12 01 00")]
 
 
-def test_the_arrival_is_reported_as_soon_as_there_is_a_route_again():
+def test_the_arrival_is_reported_at_the_landing_of_a_short_flight():
     rig = drone_rig()
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00")
     rig.forget()
     rig.engine.place = Location(1.0, 0.0, 0.0)
+    rig.wait(1.1)
+    assert replies(rig) == [(7, 3, "")]
+
+
+def test_the_arrival_after_a_long_flight_is_reported_as_soon_as_there_is_a_route_again():
+    rig = drone_rig()
+    rig.hear(f"00 00 06 01 01 {TO_Y_20} 07 00")
+    rig.forget()
+    rig.engine.place = Location(20.0, 0.0, 0.0)
     rig.wait(3.0)
     assert "LANDED" in rig.kinds()
     assert replies(rig) == []
@@ -155,10 +163,8 @@ def test_two_gateways_that_order_the_same_flight_both_get_its_end():
     rig.know_neighbour(9)
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00", f"09 09 06 01 01 {TO_Y_1} 02 00")
     assert rig.engine.goals == [Location(1.0, 0.0, 0.0)]
+    rig.forget()
     rig.engine.place = Location(1.0, 0.0, 0.0)
-    rig.wait(2.1)
-    rig.connect_to_gateway()
-    rig.know_neighbour(9)
     rig.wait(1.1)
     assert [(p[4], p[5], p[7]) for p in rig.sent(kind=64)] == [(0, 7, 3), (9, 2, 3)]
 

@@ -208,3 +208,11 @@ def test_nodes_at_one_position_come_with_their_slots():
     store.update_mesh(MeshStatus(1.0, [*nodes, NodeStatus(3)]), wall_s=0.0)
     slots = {node: fields["slot"] for node, fields in frame(store, 0)["nodes"].items()}
     assert slots == {"1": [0, 2], "2": [1, 2], "3": None}
+
+
+def test_the_latest_order_of_a_drone_is_shown_with_it():
+    store = FrameStore()
+    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7")])
+    store.update_mesh(mesh(), wall_s=0.0)
+    assert frame(store, 0)["nodes"]["1"]["order"] == "under way"
+    assert frame(store, 0)["nodes"]["0"]["order"] == ""
