@@ -14,6 +14,7 @@ from typing import Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.data.transport import Transport
 from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
@@ -122,6 +123,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._parts, self, self._frame, rng, lambda neighbour: self.send_heartbeat(neighbour)
         )
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
+        self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway)
 
     # Driven from outside ---------------------------------------------------------------------
 
@@ -163,6 +165,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._watch_flight()
         if now_s >= deadlines.get(Due.ORDER_REPLIES):
             self._orders.on_due()
+        if now_s >= deadlines.get(Due.DATA):
+            self.data.on_due()
         due_s = deadlines.get(Due.CHECK)
         if now_s >= due_s:
             period_s = self._timing.check_period_s
@@ -402,6 +406,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
             bid = messages.MovementNegotiationMessage.from_payload(payload)
             self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
+        elif kind in messages.DATA_TYPES:
+            self.data.on_packet(payload)
         elif kind in messages.TECHNIQUE_TYPES:
             self._routing.on_packet(creator, from_, kind, messages.body(payload))
         elif kind in messages.REPORT_TYPES:

@@ -17,6 +17,7 @@ class Due(enum.IntEnum):
     ROUTING = 5  # what the routing technique asked for
     ORDER_REPLIES = 6  # what a drone still has to say of its orders
     ORDERS = 7  # what a gateway does about orders under way
+    DATA = 8  # what users' messages wait for
 
 
 class Deadlines:

@@ -16,6 +16,8 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 
+DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
+
 NodeReport = Callable[[MeshEventKind, int], None]
 """Takes what happened, and which other node it concerns."""
 
@@ -63,8 +65,10 @@ class Delivery:
         """
         if self._shared:
             return self._hand_over(payload, to)
-        antenna, transmissions = self._antenna, failures
-        for _attempt in range(failures, self._attempts):
+        antenna, transmissions, attempts = self._antenna, failures, self._attempts
+        if messages.is_data(payload):
+            attempts *= DATA_PERSISTENCE
+        for _attempt in range(failures, attempts):
             taken = antenna.send_message_to(payload)
             transmissions += antenna.transmissions_of_last_send()
             if taken:
@@ -92,7 +96,9 @@ class Delivery:
         self._routing.sent(to, False, self._antenna.transmissions_of_last_send())
         silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
         heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
-        if heard and to not in self._gave_up:
+        if heard and messages.is_data(payload):
+            pass  # users' packets crowd the channel, and judge no neighbour that is heard
+        elif heard and to not in self._gave_up:
             self._gave_up.add(to)
         else:
             self._gave_up.discard(to)

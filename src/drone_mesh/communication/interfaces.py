@@ -17,6 +17,7 @@ PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0
 MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
 BROADCAST = 254  # final addressee: every node in range
 NO_ROUTE = 255  # "no such route", "no such node"
+UNLIMITED_ROOM = 2**31
 
 
 class IMeshNetwork(abc.ABC):
@@ -127,6 +128,10 @@ class IWirelessCommunication(abc.ABC):
         0 on a quiet channel: everything is probed in each round. More on a busy one.
         """
         return 0.0
+
+    def data_room(self) -> int:
+        """How many packets of users it would take now without delaying those of the mesh."""
+        return UNLIMITED_ROOM
 
     @abc.abstractmethod
     def start_antenna(self, mesh: IMeshNetwork) -> None:

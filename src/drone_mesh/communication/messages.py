@@ -26,6 +26,10 @@ HEADER_BYTES = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
 TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
 REPORT_TYPES = range(64, 128)
+DATA_TYPES = range(128, 256)  # of users; their bodies are described in data/packets.py
+ROUTE_RECORD = 194  # the one packet of users to which each node that forwards it adds its id
+ROUTE_RECORD_AT = HEADER_BYTES + 2  # place of the number of ids, which follow
+MOST_RECORDED = 16
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
@@ -327,6 +331,11 @@ addressee: Callable[[bytes], int] = operator.itemgetter(_FORWARD)
 """The node that a packet is for in the end, or BROADCAST."""
 
 
+def is_data(payload: bytes) -> bool:
+    """Whether it is a packet of a user, of whatever type."""
+    return payload[_TYPE] >= DATA_TYPES.start
+
+
 def readdressed(payload: bytes, to: int) -> bytes:
     """The same packet with `to` as the receiver of this hop."""
     return payload[:_TO] + bytes((to,)) + payload[_TO + 1 :]
@@ -354,6 +363,9 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
         if payload[_HEARTBEAT_HOPS] >= MAX_HOPS:
             return None
         forwarded[_HEARTBEAT_HOPS] += 1
+    elif payload[_TYPE] == ROUTE_RECORD and payload[ROUTE_RECORD_AT] < MOST_RECORDED:
+        forwarded[ROUTE_RECORD_AT] += 1
+        forwarded[ROUTE_RECORD_AT + forwarded[ROUTE_RECORD_AT]] = from_
     return bytes(forwarded)
 
 
