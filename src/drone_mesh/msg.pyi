@@ -178,6 +178,23 @@ class Obstacle(Message, ObstacleStatus):
         yaw: float = ...,
     ) -> None: ...
 
+class ReceivedData(Message):
+    header: std_msgs.msg.Header
+    sender: int
+    port: int
+    to_all: bool
+    reliable: bool
+    payload: bytes
+    def __init__(
+        self,
+        header: std_msgs.msg.Header = ...,
+        sender: int = ...,
+        port: int = ...,
+        to_all: bool = ...,
+        reliable: bool = ...,
+        payload: bytes | Sequence[int] = ...,
+    ) -> None: ...
+
 class RequestGatewayDroneFlight(Message):
     ID: int
     latitude: float
