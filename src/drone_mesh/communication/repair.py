@@ -37,7 +37,6 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 
 ROUNDING_S = 1e-6  # sums of periods are not exact
-SILENCE_FACTOR = 5.0  # our choice: how many times longer a node waits if its medium may be down
 
 
 class ConnectionRepair(IRepairActions):
@@ -256,7 +255,8 @@ class ConnectionRepair(IRepairActions):
         )
         flight.stops_when_connected = until_connected or step.home
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
-        self._in_vain.append(step.place)
+        if step.owner != self.node_id:
+            self._in_vain.append(step.place)
         self._parts.neighbours.forget_all()
         self._parts.routing.node_moved_location()
         flight.start()
@@ -356,6 +356,8 @@ class ConnectionRepair(IRepairActions):
 
     def _goal(self, step: Step) -> Location:
         """A living gateway stands at its place, and in a silent medium any node may."""
+        if step.owner == self.node_id:
+            return step.place
         if self.silent:
             known = [heard.place for heard in self._parts.neighbours.places().values()]
             known += [step.place, *filter(None, [self.gateway_place])]
@@ -368,8 +370,8 @@ class ConnectionRepair(IRepairActions):
         return step.place
 
     def _emergency_s(self) -> float:
-        factor = SILENCE_FACTOR if self.silent else 1.0
-        return self._lost_since_s + self.connection_lost_after_s * factor
+        patience = self._strategy.patience(self.silent)
+        return self._lost_since_s + self.connection_lost_after_s * patience
 
     def _notice_loss(self, due_s: float) -> None:
         self._lost_since_s = due_s

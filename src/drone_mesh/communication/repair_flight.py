@@ -65,8 +65,8 @@ class RepairFlight:
             self._introduce()
 
     def stop_when_connected(self) -> None:
-        """Going on is pointless: be connected, and stop there."""
-        self.stops_when_connected = True
+        """Going on is pointless, unless it goes back: be connected, and stop there."""
+        self.stops_when_connected = self._owner != self._parts.node_id
 
     def stop_here(self) -> None:
         """Land at the nearest free spot."""
@@ -119,7 +119,7 @@ class RepairFlight:
         goal = self.goal
         if self.stops_when_connected and here is not None:
             goal = towards(here, goal, self._leg_m)
-        self._parts.pilot.step_back_to(goal)
+        self._parts.pilot.fly_to(goal, step_back=True)
 
     def _leg_is_short(self, here: Location | None) -> bool:
         """Whether this was not the last leg, and the drone moves at all."""

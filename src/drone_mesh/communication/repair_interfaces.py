@@ -17,12 +17,14 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.router_states import Repair, RouterEvent
 from drone_mesh.drone.interfaces import Location
 
+SILENCE_PATIENCE = 5.0  # our choice: how many times longer a node waits if its medium may be down
+
 
 class Step(NamedTuple):
     """A flight that a drone could make."""
 
     place: Location
-    owner: int = NO_ROUTE  # the node whose place it is; NO_ROUTE: of none
+    owner: int = NO_ROUTE  # the node whose place it is; NO_ROUTE: of none; the own id: back there
     home: bool = False  # whether it is the gateway's place
 
 
@@ -195,6 +197,10 @@ class IRepairStrategy(abc.ABC):
     def start(self, mesh: IRepairActions) -> None:
         """Called once, before everything else."""
         self.mesh = mesh
+
+    def patience(self, silent: bool) -> float:
+        """How often `connection_lost_after` passes until an emergency; `silent`: see the router."""
+        return SILENCE_PATIENCE if silent else 1.0
 
     def on_gateway_lost(self) -> None:
         """A check noticed that no gateway answers."""

@@ -12,6 +12,7 @@ from drone_mesh.communication.strategies.follow import Follow
 from drone_mesh.communication.strategies.home import Home
 from drone_mesh.communication.strategies.inward import Inward
 from drone_mesh.communication.strategies.nearest import Nearest
+from drone_mesh.communication.strategies.scout import Scout
 from drone_mesh.communication.strategies.stay import Stay
 from drone_mesh.communication.strategies.thesis import Thesis
 
@@ -22,6 +23,7 @@ REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
     "home": Home,
     "inward": Inward,
     "nearest": Nearest,
+    "scout": Scout,
     "stay": Stay,
 }
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from scenarios import LAYOUTS, events, flown, layout, line, run_until
+from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, run_until
 
+from drone_mesh.communication.messages import GoToLocationMessage
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_strategies import REPAIR_STRATEGIES, create_repair_strategy
 from drone_mesh.errors import ConfigurationError
@@ -24,6 +25,10 @@ def broken_line(repair):
     network.power(2, False)
     assert run_until(network, lambda: not network.connected(3), within_s=30.0, step_s=1.0)
     return network
+
+
+def order_from(sender, to, latitude):
+    return GoToLocationMessage(0, sender, to, to, latitude, 0.0, 0).to_payload()
 
 
 def start_of(case, node):
@@ -93,6 +98,56 @@ def test_with_follow_no_link_inside_the_moving_part_is_lost():
     for one, other in ((2, 3), (3, 4), (4, 5)):
         assert network.location(one).distance_m(network.location(other)) < RANGE_M
     assert max(at_s for at_s, _n, _p in events(network, "FLIGHT_DECIDED")) < 90.0  # as one part
+
+
+def alone_among_the_dead(repair):
+    """The neighbours 2 and 3 of router 4 die together; router 1 is in reach of their places."""
+    network = Network(repair=repair)
+    network.add_gateway(0, 0.0, 0.0)
+    for node, x, y in ((1, 8.0, 0.0), (2, 15.0, 2.0), (3, 15.0, -2.0), (4, 23.0, 0.0)):
+        network.add_router(node, x, y)
+    network.run_for(20.0)
+    for node in (2, 3):
+        network.power(node, False)
+    return network
+
+
+def test_with_scout_a_drone_whose_neighbours_all_died_looks_around_early_and_stays_connected():
+    network = alone_among_the_dead("scout")
+    assert run_until(network, network.all_connected, within_s=70.0, step_s=1.0)
+    network.run_for(60.0)
+    assert network.all_connected()
+    assert len(events(network, "FLIGHT_DECIDED")) == 1
+
+
+def test_with_thesis_that_drone_waits_five_times_as_long():
+    network = alone_among_the_dead("thesis")
+    network.run_for(150.0)
+    assert flown(network) == set()
+
+
+@pytest.mark.parametrize("silence_s", [45.0, 52.0, 120.0, 600.0])
+def test_with_scout_all_drones_stand_after_a_silence_where_they_stood(silence_s):
+    """At 45 and 52 s some are on their way, and some listen."""
+    network = fleet(8, 3, repair="scout")
+    network.run_for(30.0)
+    before = {node: network.location(node) for node in network.nodes}
+    outage(network, silence_s)
+    assert flown(network) != set()
+    assert network.run_until(network.all_connected, within_s=15.0)
+    network.run_for(20.0)
+    assert {n for n, at in before.items() if network.location(n).distance_m(at) > 0.1} == set()
+
+
+def test_with_scout_an_order_during_a_look_around_is_flown():
+    network = alone_among_the_dead("scout")
+    assert run_until(network, lambda: flown(network) == {4}, within_s=60.0, step_s=0.5)
+    network.nodes[4].component.on_msg(order_from(1, to=4, latitude=40.0), network.clock.now_s)
+    network.nodes[4].plan()
+    for node in (2, 3):
+        network.power(node, True)
+    network.run_for(60.0)
+    assert network.location(4).latitude == pytest.approx(40.0)
 
 
 def test_with_field_the_drones_move_towards_the_gateway_leg_by_leg():

@@ -244,9 +244,9 @@ class Thesis(IRepairStrategy):
         mesh = self.mesh
         if mesh.connected or mesh.now_s < self._quiet_until_s:
             return
-        self._quiet_until_s = mesh.now_s + max(
-            mesh.connection_lost_after_s - mesh.check_period_s, TAKE_OFF_WITHIN_S
-        )
+        patience_s = self.patience(silent=False) * mesh.connection_lost_after_s
+        quiet_s = max(patience_s - mesh.check_period_s, TAKE_OFF_WITHIN_S)
+        self._quiet_until_s = mesh.now_s + quiet_s
         self._rounds_without_flier = 0
         self.reason = f"{node} flies instead"
         if code == TOOK_OFF_HOME:

@@ -1,0 +1,93 @@
+"""Scout: as Thesis, but quicker: a drone that hears no node looks around, and comes back.
+
+A drone whose neighbours all fell silent together cannot know whether they died or its medium is
+down; Thesis waits five times as long in that case. A scout waits no longer than usual, flies to the
+place of its lost next hop and stays there if it hears a node. Otherwise, or as soon as it hears one
+of its lost neighbours, it flies back. In a group the rounds after the first flight follow each
+other sooner. Both rules are our own.
+"""
+
+from __future__ import annotations
+
+from drone_mesh.communication.election import TOOK_OFF, TOOK_OFF_HOME
+from drone_mesh.communication.repair_interfaces import SILENCE_PATIENCE, IRepairActions, Step
+from drone_mesh.communication.router_states import RouterEvent
+from drone_mesh.communication.strategies.thesis import Thesis
+from drone_mesh.drone.interfaces import Location
+
+LISTENS_S = 1.0  # our choice: an answer takes some milliseconds
+LATER_ROUNDS = 1.0 / 3.0  # of the patience, our choice: a step back takes about 5 s
+
+
+class Scout(Thesis):
+    """Looks around before it waits."""
+
+    _stood_at: Location | None = None  # during a look around: where it began
+    _looked = False  # since the connection was lost
+    _drone_flew = False  # one of the group, since the connection was lost
+
+    def start(self, mesh: IRepairActions) -> None:
+        """Called once, before everything else."""
+        super().start(mesh)
+        self._lost: set[int] = set()  # neighbours that were not heard again
+
+    def patience(self, silent: bool) -> float:
+        """The first look is early; a second one is as late as a flight of others."""
+        if silent:
+            return SILENCE_PATIENCE if self._looked else 1.0
+        return LATER_ROUNDS if self._drone_flew else 1.0
+
+    def on_gateway_found(self) -> None:
+        """The next loss is another one."""
+        super().on_gateway_found()
+        self._stood_at, self._looked, self._drone_flew = None, False, False
+
+    def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
+        """Note that a drone of the group flies."""
+        self._drone_flew = self._drone_flew or score in (TOOK_OFF, TOOK_OFF_HOME)
+        super().on_bid(node, score, from_, about)
+
+    def on_emergency(self) -> None:
+        """Alone in silence: look around."""
+        mesh, here = self.mesh, self.mesh.own_place()
+        if not mesh.silent or here is None:
+            super().on_emergency()
+            return
+        mesh.happened(RouterEvent.NO_NEIGHBOURS)
+        step, self.reason = self._next_step(alone=True)
+        if step is not None:
+            mesh.fly(step)
+            self._stood_at, self._looked = here, True
+
+    def on_stopped(self) -> None:
+        """The drone flies, perhaps by an order."""
+        super().on_stopped()
+        self._stood_at = None
+
+    def on_neighbour_lost(self, node: int) -> None:
+        """It may have died, or the medium is down."""
+        super().on_neighbour_lost(node)
+        self._lost.add(node)
+
+    def on_neighbour_found(self, node: int) -> None:
+        """A lost neighbour lives: the medium was down, and this drone belongs where it stood."""
+        if node in self._lost:
+            self._lost.discard(node)
+            self._back()
+
+    def on_landed(self) -> None:
+        """Listen, if this is where it looks around."""
+        if self._stood_at is not None:
+            self.mesh.wait_until(self.mesh.now_s + LISTENS_S)
+
+    def on_time(self) -> None:
+        """If no node is here, back."""
+        if self._stood_at is None:
+            super().on_time()
+        elif self.mesh.silent:
+            self._back()
+
+    def _back(self) -> None:
+        stood_at, self._stood_at = self._stood_at, None
+        if stood_at is not None and not self.mesh.connected:
+            self.mesh.fly(Step(stood_at, self.mesh.node_id))
