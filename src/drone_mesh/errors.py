@@ -19,5 +19,13 @@ class ConfigurationError(MeshError):
     """A parameter or a file is wrong. The message names it and what is allowed: show it, stop."""
 
 
+class MessageRefused(MeshError):
+    """A user's message cannot be sent as it is. Nothing was sent; report it to the user."""
+
+
+class QueueFull(MessageRefused):
+    """Too many messages of users wait in this node. Try again when some of them have left."""
+
+
 class GoalRefused(MeshError):
     """A goal is not a number or out of bounds. Nothing moves; report it to the sender."""

@@ -6,7 +6,7 @@ import rospy
 import std_msgs.msg
 from genpy import Message
 
-from drone_mesh.state.model import NodeStatus
+from drone_mesh.state.model import NodeStatus, ObstacleStatus
 
 class DroneInfo(Message):
     nodeID: int
@@ -78,6 +78,7 @@ class MeshState(Message):
     routing: str
     repair_strategy: str
     nodes: list[NodeState]
+    obstacles: list[Obstacle]
     def __init__(
         self,
         header: std_msgs.msg.Header = ...,
@@ -88,6 +89,7 @@ class MeshState(Message):
         routing: str = ...,
         repair_strategy: str = ...,
         nodes: Sequence[NodeState] = ...,
+        obstacles: Sequence[Obstacle] = ...,
     ) -> None: ...
 
 class NRF24(Message):
@@ -163,6 +165,34 @@ class NodeState(Message, NodeStatus):
         queue: int = ...,
         given_up: int = ...,
         repair: str = ...,
+    ) -> None: ...
+
+class Obstacle(Message, ObstacleStatus):
+    center: Sequence[float]
+    size: Sequence[float]
+    yaw: float
+    def __init__(
+        self,
+        center: Sequence[float] = ...,
+        size: Sequence[float] = ...,
+        yaw: float = ...,
+    ) -> None: ...
+
+class ReceivedData(Message):
+    header: std_msgs.msg.Header
+    sender: int
+    port: int
+    to_all: bool
+    reliable: bool
+    payload: bytes
+    def __init__(
+        self,
+        header: std_msgs.msg.Header = ...,
+        sender: int = ...,
+        port: int = ...,
+        to_all: bool = ...,
+        reliable: bool = ...,
+        payload: bytes | Sequence[int] = ...,
     ) -> None: ...
 
 class RequestGatewayDroneFlight(Message):

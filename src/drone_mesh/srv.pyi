@@ -110,6 +110,31 @@ class RequestGPS:
     _request_class = RequestGPSRequest
     _response_class = RequestGPSResponse
 
+class SendDataRequest(Message):
+    to: int
+    port: int
+    reliable: bool
+    payload: bytes
+    wait: float
+    def __init__(
+        self,
+        to: int = ...,
+        port: int = ...,
+        reliable: bool = ...,
+        payload: bytes | Sequence[int] = ...,
+        wait: float = ...,
+    ) -> None: ...
+
+class SendDataResponse(Message):
+    success: bool
+    message: str
+    ticket: int
+    def __init__(self, success: bool = ..., message: str = ..., ticket: int = ...) -> None: ...
+
+class SendData:
+    _request_class = SendDataRequest
+    _response_class = SendDataResponse
+
 class SetSpeedRequest(Message):
     paused: bool
     real_time_factor: float

@@ -23,7 +23,7 @@ KeyPath = Tuple[Hashable, ...]
 
 
 class YamlFile:
-    """The mapping that a file consists of, and the line of each of its keys."""
+    """The mapping that a file consists of, and the lines of its keys and list entries."""
 
     def __init__(
         self, path: str | Path, content: dict[Any, Any], lines: dict[KeyPath, int]
@@ -33,7 +33,7 @@ class YamlFile:
         self._lines = lines
 
     def where(self, *keys: Hashable) -> str:
-        """Path and line of a key, given by the keys that lead to it, for an error message.
+        """Path and line of a key, given by the keys and indices that lead to it, for an error.
 
         For keys that are not in the file: the line of the nearest one around them.
         """
@@ -111,7 +111,12 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def note_lines(self, node: yaml.Node, keys: KeyPath, lines: dict[KeyPath, int]) -> None:
-        """Enter the line of each key below `node`; ConstructorError for a duplicate key."""
+        """Enter the line of each key and list entry; ConstructorError for a duplicate key."""
+        if isinstance(node, yaml.SequenceNode):
+            for index, entry in enumerate(node.value):
+                lines[(*keys, index)] = entry.start_mark.line + 1
+                self.note_lines(entry, (*keys, index), lines)
+            return
         if not isinstance(node, yaml.MappingNode):
             return
         for key_node, value_node in node.value:

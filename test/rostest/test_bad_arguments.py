@@ -41,6 +41,9 @@ class BadArgumentsTest(unittest.TestCase):
     def test_a_file_of_layouts_that_is_not_there(self) -> None:
         self.launch_and_expect("casus:=/no/such.yaml", "/no/such.yaml: No such file or directory")
 
+    def test_a_file_of_obstacles_that_is_not_there(self) -> None:
+        self.launch_and_expect("obstacles:=/no/such.yaml", "/no/such.yaml: No such file")
+
 
 if __name__ == "__main__":
     rostest.rosrun("drone_mesh", "bad_arguments", BadArgumentsTest)

@@ -49,8 +49,10 @@ def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedP
 
 
 def record_in_an_older_definition(path: Path) -> None:
-    """A bag with one state, of a MeshState without the fields of channel and repair."""
-    newer = r"(float32 (airtime|tries)|uint16 queue|uint32 given_up|string \w+) .*\n"
+    """A bag with one state, of a MeshState without the fields of channel, repair and obstacles."""
+    newer = (
+        r"(float32 (airtime|tries)|uint16 queue|uint32 given_up|string \w+|Obstacle\[\] \w+) .*\n"
+    )
     definition = re.sub(newer, "", MeshState._full_text)
     older = genpy.dynamic.generate_dynamic("drone_mesh/MeshState", definition)
     node = older["drone_mesh/NodeState"](id=4, connected=True, on=True, position=[1.0, 2.0, 0.0])

@@ -18,6 +18,7 @@ PYTHON = blocks("python")
 LIMIT_S = 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page", sorted({block.page for block in PYTHON}), ids=lambda page: str(page.relative_to(ROOT))
 )

@@ -13,6 +13,8 @@ from drone_mesh.drone.engines import FlightOptions, create_engine
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import LocationUnknown
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

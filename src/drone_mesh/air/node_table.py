@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from typing import Callable, Optional, Sequence
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
 
+Sees = Optional[Callable[[Position, np.ndarray], np.ndarray]]
+"""From a place and (n, 3) others within range to (n,) bool: which of them it has a link to."""
+
 
 class NodeTable:
     """The rules of the simulated air. Not thread-safe.
@@ -26,11 +29,15 @@ class NodeTable:
     docs/protocol.md, "Wireless signal simulator" and "Sources of DroneInfo".
     """
 
-    def __init__(self, max_distance_m: float = MAX_DISTANCE_M) -> None:
-        """Raises AirError unless the distance is a positive number."""
+    def __init__(self, max_distance_m: float = MAX_DISTANCE_M, sees: Sees = None) -> None:
+        """`sees` is asked about obstacles between nodes within range; None: there are none.
+
+        Raises AirError unless the distance is a positive number.
+        """
         if not max_distance_m > 0:
             raise AirError(f"invalid max_distance {max_distance_m}: must be above 0 metres")
         self._reach_m2 = max_distance_m * max_distance_m
+        self._sees = sees
         self._nodes: dict[int, Node] = {}
         self._positions: dict[int, Position] = {}  # also of nodes that are not registered yet
         self._places: np.ndarray = np.zeros((MAX_NODE_ID + 1, 3))  # (id, xyz), metres
@@ -91,14 +98,20 @@ class NodeTable:
     def link(self, sender: int, receiver: int) -> str | None:
         """The topic that reaches `receiver` from `sender`; None if none does.
 
-        Both must be registered, on, and nearer to each other than the maximum distance.
+        Both must be registered, on, nearer to each other than the maximum distance, and not
+        hidden from each other by obstacles.
         """
         source, destination = self._nodes.get(sender), self._nodes.get(receiver)
         if source is None or destination is None or not (source.on and destination.on):
             return None
         here, there = self._positions[sender], self._positions[receiver]
         distance_m2 = sum((a - b) * (a - b) for a, b in zip(here, there))
-        return destination.topic if distance_m2 < self._reach_m2 else None
+        if distance_m2 >= self._reach_m2:
+            return None
+        sees = self._sees
+        if sees is None or sender == receiver or sees(here, self._places[[receiver]])[0]:
+            return destination.topic
+        return None
 
     def in_range(self, node_id: int) -> tuple[int, ...]:
         """Ids of the nodes that a packet could reach, ascending, without `node_id` itself.
@@ -119,4 +132,7 @@ class NodeTable:
         apart = self._places - self._places[node_id]  # (id, xyz), metres
         near = (np.square(apart).sum(axis=1) < self._reach_m2) & self._hears
         near[node_id] = False
-        return tuple(int(other) for other in np.flatnonzero(near))
+        others = np.flatnonzero(near)
+        if self._sees is not None and len(others):
+            others = others[self._sees(self._positions[node_id], self._places[others])]
+        return tuple(int(other) for other in others)

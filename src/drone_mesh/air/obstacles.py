@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Sequence
 
 from drone_mesh.drone.flight_path import FlightPath, Vector
@@ -102,6 +102,10 @@ class Obstacles:
         """How much more the link could bear; above 0 it is there."""
         distance_m = max(math.dist(a, b), 1e-3)  # two drones may share a point
         return 10 * self.exponent * math.log10(range_m / distance_m) - self.loss_db(a, b)
+
+    def for_flights(self, half_width_m: float) -> Obstacles:
+        """The same boxes, so much larger: for the centre of a body of this half width."""
+        return replace(self, boxes=[box.grown(half_width_m) for box in self.boxes])
 
     def is_free(self, place: Vector) -> bool:
         """Whether a drone can be there."""

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import NamedTuple
+from typing import Tuple
 
 from drone_mesh.communication.timing import CIRCULATION_S
 
-
-class Passage(NamedTuple):
-    """How a packet was handed on when it came for the first time."""
-
-    came_from: int
-    went_to: int
-    at_s: float
-    hops: int
+_Passage = Tuple[int, int, float, int]
+"""How a packet was handed on when it came for the first time: the neighbour that it came from, the
+next hop, the time and the hops that it counted. A plain tuple, as there is one for each packet."""
 
 
 class CirculationGuard:
@@ -24,29 +19,30 @@ class CirculationGuard:
     """
 
     def __init__(self) -> None:
-        self._passages: dict[bytes, Passage] = {}
+        self._passages: dict[bytes, _Passage] = {}
         self._ages: deque[tuple[float, bytes]] = deque()
 
     def came_round(
         self, identity: bytes, came_from: int, now_s: float, hops: int = 0
-    ) -> Passage | None:
-        """The first passage of a packet that now comes from another neighbour, else None.
+    ) -> int | None:
+        """The next hop that a packet was handed to before, if it now comes from another neighbour.
 
         A heartbeat counts its hops: only with more `hops` than before has it come round.
         """
         while self._ages and now_s - self._ages[0][0] >= CIRCULATION_S:
             at_s, old = self._ages.popleft()
-            if old in self._passages and self._passages[old].at_s == at_s:
+            if old in self._passages and self._passages[old][2] == at_s:
                 del self._passages[old]
-        first = self._passages.get(identity)
-        if first is None or first.came_from == came_from or (hops and hops <= first.hops):
+        passage = self._passages.get(identity)
+        if passage is None:
             return None
-        return first
+        first_from, went_to, _at_s, first_hops = passage
+        return None if first_from == came_from or (hops and hops <= first_hops) else went_to
 
     def passed(
         self, identity: bytes, came_from: int, went_to: int, now_s: float, hops: int = 0
     ) -> None:
         """The packet was handed on. The first passage is the one that counts."""
         if identity not in self._passages:
-            self._passages[identity] = Passage(came_from, went_to, now_s, hops)
+            self._passages[identity] = (came_from, went_to, now_s, hops)
             self._ages.append((now_s, identity))

@@ -14,11 +14,12 @@ from typing import Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.data.transport import Transport
 from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
 from drone_mesh.communication.forwarding import Forwarding
-from drone_mesh.communication.frames import CommonFrame
+from drone_mesh.communication.frames import TYPES_WITH_PLACES, CommonFrame
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -30,7 +31,12 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.introduction import Introduction
 from drone_mesh.communication.medium import ChannelUse
-from drone_mesh.communication.messages import HeartbeatMessage, IntroduceMessage, MessageType
+from drone_mesh.communication.messages import (
+    TYPES_WITH_NUMBERS,
+    HeartbeatMessage,
+    IntroduceMessage,
+    MessageType,
+)
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import (
     MeshEventKind,
@@ -38,6 +44,7 @@ from drone_mesh.communication.observer import (
     Reporter,
     ignore_events,
 )
+from drone_mesh.communication.order_messages import OrderQuery
 from drone_mesh.communication.orders import OrderIntake
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.places import KnownPlaces
@@ -50,6 +57,7 @@ SILENCE_PERIODS = 1.5  # our choice: each neighbour is asked once a check period
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
+_LOCATION = int(MessageType.LOCATION)
 
 
 class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
@@ -74,6 +82,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             raise ValueError(f"invalid node id {node_id}: must be 0..{MAX_NODE_ID}")
         self._node_id = node_id
         self._antenna = antenna
+        self._shared = antenna.medium.shared
         self._routing = routing
         self._rng = rng
         self._timing = timing or MeshTiming()
@@ -114,6 +123,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._parts, self, self._frame, rng, lambda neighbour: self.send_heartbeat(neighbour)
         )
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
+        self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway)
 
     # Driven from outside ---------------------------------------------------------------------
 
@@ -153,6 +163,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._routing.on_time(now_s)
         if now_s >= deadlines.get(Due.ASK_POSITION):
             self._watch_flight()
+        if now_s >= deadlines.get(Due.ORDER_REPLIES):
+            self._orders.on_due()
+        if now_s >= deadlines.get(Due.DATA):
+            self.data.on_due()
         due_s = deadlines.get(Due.CHECK)
         if now_s >= due_s:
             period_s = self._timing.check_period_s
@@ -176,7 +190,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if to != me:
             self._drop("not for this node", payload)
             return
-        if not messages.is_finite(payload):
+        if kind in TYPES_WITH_NUMBERS and not messages.is_finite(payload):
             self._drop("not a finite number", payload)
             return
         if self._neighbours.heard(from_, now_s):
@@ -188,12 +202,15 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             return
         if kind == _PRESENT and creator == from_ and not self._frame.heard(creator, payload):
             self.complaints.add("another origin", f"that of node {creator}", now_s)
-        if self._frame.refuses(from_, kind):
+        if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node whose origin is another, or not known yet", payload)
             return
         if forward not in (me, BROADCAST):
             if kind == _HEARTBEAT:
-                self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
+                if self._shared:
+                    self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
+            elif kind == _LOCATION:
+                self._on_passing_location(creator, payload)
             self._forwarding.forward(payload, now_s)
         elif kind == _HEARTBEAT:
             self._on_heartbeat(creator, from_, *HeartbeatMessage.body(payload))
@@ -354,7 +371,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     def _on_passing_heartbeat(
         self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
-        """A heartbeat for another node is about to be forwarded."""
+        """On a shared medium: a heartbeat for another node is about to be forwarded."""
+
+    def _on_passing_location(self, creator: int, payload: bytes) -> None:
+        """A LOCATION for another node is about to be forwarded."""
 
     @abc.abstractmethod
     def _on_location(
@@ -381,12 +401,24 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             if missing != self._node_id:
                 self._on_missing(creator, missing, told_by=from_)
         elif kind == MessageType.MOVE_TO_LOCATION:
-            self._orders.on_order(messages.GoToLocationMessage.from_payload(payload))
+            order = messages.GoToLocationMessage.from_payload(payload)
+            self._orders.on_order(order, messages.order_number(payload))
         elif kind == MessageType.MOVEMENT_NEGOTIATION:
             bid = messages.MovementNegotiationMessage.from_payload(payload)
             self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
+        elif kind in messages.DATA_TYPES:
+            self.data.on_packet(payload)
         elif kind in messages.TECHNIQUE_TYPES:
             self._routing.on_packet(creator, from_, kind, messages.body(payload))
+        elif kind in messages.REPORT_TYPES:
+            self._on_report(payload, creator, kind)
+        else:
+            self._drop("a type that is not processed", payload)
+
+    def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
+        """A report, or the request for one, for this node."""
+        if kind == MessageType.ORDER_QUERY:
+            self._orders.on_query(creator, OrderQuery.number_in(payload))
         else:
             self._drop("a type that is not processed", payload)
 
@@ -424,3 +456,4 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._routing.node_moved_location()
         self._report(MeshEventKind.LANDED)
         self.search_other_nodes_in_range()
+        self._orders.on_landed()

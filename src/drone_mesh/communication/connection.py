@@ -94,6 +94,8 @@ class GatewayConnection:
         if shortcut is None or shortcut.hops + 1 >= self.hops:
             return False
         to = shortcut.neighbour
+        if self._parts.neighbours.hops_of(to) > shortcut.hops:
+            return False  # it had to take another way since
         its_gateway = self._parts.neighbours.gateway_of(to)
         if its_gateway == NO_ROUTE:
             its_gateway = self.gateway
@@ -114,8 +116,11 @@ class GatewayConnection:
         if was_connected and self._parts.antenna.medium.shared:
             self._introduce()  # a neighbour may know another route, and answers
 
-    def on_neighbour_lost(self) -> None:
-        """A neighbour is out of reach. If it was the only route, others are asked at once."""
+    def on_route_lost(self) -> None:
+        """A route does not work. If it was the only one to the gateway, others are asked at once.
+
+        On a medium that is not shared the next check is soon enough.
+        """
         medium = self._parts.antenna.medium
         if medium.shared and self._states.connected and self.next_hop() == NO_ROUTE:
             self._heartbeat_sent_s = -math.inf

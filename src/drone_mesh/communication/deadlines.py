@@ -15,6 +15,9 @@ class Due(enum.IntEnum):
     ANSWER = 3  # the latest moment for the gateway's answer to a heartbeat
     REPAIR = 4  # what the repair waits for
     ROUTING = 5  # what the routing technique asked for
+    ORDER_REPLIES = 6  # what a drone still has to say of its orders
+    ORDERS = 7  # what a gateway does about orders under way
+    DATA = 8  # what users' messages wait for
 
 
 class Deadlines:

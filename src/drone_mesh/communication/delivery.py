@@ -16,6 +16,8 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 
+DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
+
 NodeReport = Callable[[MeshEventKind, int], None]
 """Takes what happened, and which other node it concerns."""
 
@@ -40,6 +42,7 @@ class Delivery:
         """`attempts`: failed transmissions after which the receiver counts as lost."""
         self._node_id = node_id
         self._antenna = antenna
+        self._shared = antenna.medium.shared
         self._routing = routing
         self._neighbours = neighbours
         self._deadlines = deadlines
@@ -60,12 +63,14 @@ class Delivery:
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
         """
-        if self._antenna.medium.shared:
+        if self._shared:
             return self._hand_over(payload, to)
-        transmissions = failures
-        for _attempt in range(failures, self._attempts):
-            taken = self._antenna.send_message_to(payload)
-            transmissions += self._antenna.transmissions_of_last_send()
+        antenna, transmissions, attempts = self._antenna, failures, self._attempts
+        if messages.is_data(payload):
+            attempts *= DATA_PERSISTENCE
+        for _attempt in range(failures, attempts):
+            taken = antenna.send_message_to(payload)
+            transmissions += antenna.transmissions_of_last_send()
             if taken:
                 self._sent(to, transmissions)
                 return True
@@ -91,7 +96,9 @@ class Delivery:
         self._routing.sent(to, False, self._antenna.transmissions_of_last_send())
         silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
         heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
-        if heard and to not in self._gave_up:
+        if heard and messages.is_data(payload):
+            pass  # users' packets crowd the channel, and judge no neighbour that is heard
+        elif heard and to not in self._gave_up:
             self._gave_up.add(to)
         else:
             self._gave_up.discard(to)
@@ -104,25 +111,27 @@ class Delivery:
     def send_own(self, payload: bytes) -> bool:
         """Send a packet of our own towards its addressee, over one route after the other."""
         other = messages.addressee(payload)
+        untried = self._routing.directions(other, NO_ROUTE, self._node_id)
         tried: set[int] = set()
-        while True:
-            directions = self._routing.directions(other, NO_ROUTE, self._node_id)
-            untried = [to for to in directions if to not in tried]
-            if not untried:
-                return False
+        while untried:
             if self.send_to_each(payload, untried):
                 return True
             tried.update(untried)
+            directions = self._routing.directions(other, NO_ROUTE, self._node_id)
+            untried = [to for to in directions if to not in tried]
+        return False
 
     def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:
         """The same packet to each of these neighbours. True: at least one of them has it."""
-        taken = [self.send(messages.readdressed(payload, to), to) for to in next_hops]
-        return any(taken)
+        taken = False
+        for to in next_hops:
+            taken |= self.send(messages.readdressed(payload, to), to)
+        return taken
 
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
         """As `send_own`, to each of these; the packets for direct neighbours leave together."""
         routing = self._routing
-        if self._antenna.medium.shared:
+        if self._shared:
             for other in others:
                 self.send_own(messages.addressed(payload, other))
             return
@@ -187,6 +196,18 @@ class Delivery:
                         self.send_own(messages.addressed(packet, neighbour))
         finally:
             self._telling = False
+
+    def came_back(self, missing: int, neighbour: int) -> None:
+        """`neighbour` sent a packet for `missing` that could only go straight back to it.
+
+        On a shared medium only that neighbour hears of it: for all others the route still works.
+        """
+        if not self._antenna.medium.shared:
+            self.tell_missing(missing, first=neighbour)
+            return
+        me = self._node_id
+        packet = messages.MissingMessage(me, me, neighbour, neighbour, missing)
+        self.send(packet.to_payload(), neighbour)
 
     def _announce_missing(self, missing: int) -> None:
         """One MISSING to all neighbours, unless the same was said a moment ago."""

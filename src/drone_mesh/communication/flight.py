@@ -46,6 +46,7 @@ class Pilot:
         self._deadlines = deadlines
         self._complaints = complaints
         self._flight: Flight | None = None
+        self._origin: Location | None = None  # of the flight; of several in a row: of the first
 
     @property
     def goal(self) -> Location | None:
@@ -68,15 +69,33 @@ class Pilot:
         """Why the drone would not fly to a goal now; empty while it would."""
         return self._engine.why_not_fly()
 
-    def fly_to(self, goal: Location, step_back: bool = False) -> None:
-        """Start a flight, or change the goal of the present one; `step_back`: for a repair."""
-        self._flight = Flight(goal)
-        self._ask_position_later()
-        fly = self._engine.step_back_to if step_back else self._engine.set_goal
+    def obey(self, goal: Location) -> None:
+        """Start an ordered flight, or change the goal of the present one.
+
+        Raises GoalRefused, and changes nothing, if the engine refuses the goal.
+        """
+        self._engine.set_goal(*goal)
+        self._begin(goal)
+
+    def step_back_to(self, goal: Location) -> None:
+        """Start a flight for a repair, or change the goal of the present one."""
+        self._begin(goal)
         try:
-            fly(*goal)
+            self._engine.step_back_to(*goal)
         except GoalRefused as error:  # the flight is then over at the first look
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
+
+    def distance_m(self) -> float:
+        """Straight distance from where the drone last stood to its goal; infinity if unknown."""
+        if self._flight is None or self._origin is None:
+            return math.inf
+        return self._origin.distance_m(self._flight.goal)
+
+    def _begin(self, goal: Location) -> None:
+        if self._flight is None:
+            self._origin = self.location()
+        self._flight = Flight(goal)
+        self._ask_position_later()
 
     def watch(self) -> bool:
         """Look where the drone is; whether the flight is over now."""

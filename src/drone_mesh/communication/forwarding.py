@@ -46,9 +46,9 @@ class Forwarding:
             return
         identity = messages.identity(payload)
         hops = messages.hops(payload) if kind == MessageType.HEARTBEAT else 0
-        first = self._circulation.came_round(identity, from_, now_s, hops)
-        if first is not None:
-            self._drop_circulating(payload, first.went_to, now_s)
+        went_to = self._circulation.came_round(identity, from_, now_s, hops)
+        if went_to is not None:
+            self._drop_circulating(payload, went_to, now_s)
             return
         lost = NO_ROUTE
         for _attempt in range(2):
@@ -56,7 +56,9 @@ class Forwarding:
             to = directions[0] if directions else NO_ROUTE
             if to in (NO_ROUTE, from_):
                 self.stranded(payload, now_s)
-                if to == from_ or lost != forward:  # else all were informed when it was lost
+                if to == from_:
+                    self._delivery.came_back(forward, from_)
+                elif lost != forward:  # else all were informed when it was lost
                     self._delivery.tell_missing(forward, first=from_)
                 return
             forwarded = messages.next_hop(payload, self._node_id, to)

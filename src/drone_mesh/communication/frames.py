@@ -10,7 +10,7 @@ from __future__ import annotations
 from drone_mesh.communication.messages import MessageType, frame_digest
 
 NO_FRAME = 0  # the digest of a node without an origin, and of nodes that know nothing of origins
-_WITH_PLACES = frozenset((int(MessageType.LOCATION), int(MessageType.MOVE_TO_LOCATION)))
+TYPES_WITH_PLACES = frozenset((int(MessageType.LOCATION), int(MessageType.MOVE_TO_LOCATION)))
 
 
 class CommonFrame:
@@ -26,10 +26,10 @@ class CommonFrame:
         self._of[neighbour] = frame_digest(present)
         return self._of[neighbour] == self.digest
 
-    def refuses(self, from_: int, kind: int) -> bool:
-        """Whether a packet of this type from this neighbour may hold places of another frame.
+    def refuses(self, from_: int) -> bool:
+        """Whether a packet with places from this neighbour may mean another frame.
 
         A node with an origin waits for a neighbour's PRESENT; one without takes a neighbour that
         has not presented itself for one without an origin too.
         """
-        return kind in _WITH_PLACES and self._of.get(from_, NO_FRAME) != self.digest
+        return self._of.get(from_, NO_FRAME) != self.digest

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import random
 
 from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
     NO_ROUTE,
@@ -17,19 +17,18 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.messages import (
     GatewayPlace,
-    GoToLocationMessage,
+    MessageType,
     MovementNegotiationMessage,
 )
-from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
+from drone_mesh.communication.observer import MeshObserver, ignore_events
+from drone_mesh.communication.order_book import OrderBook
+from drone_mesh.communication.order_messages import OrderReply
+from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused
-
-_ORDER_UNDER_WAY_S = 10.0  # our choice: a relay that cannot forward an order reports by then
-
-_log = logging.getLogger(__name__)
 
 
 class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
@@ -51,12 +50,19 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
-        self._ordered_s: dict[int, float] = {}  # drones with an order under way: when it left
+        self._book = OrderBook(self._parts)
+        self._orders.on_own_reply = self._book.on_outcome
 
     def stop(self) -> None:
         """Internet, antenna and debugging off."""
         self._internet.disconnect()
         super().stop()
+
+    def tick(self, now_s: float) -> None:
+        """Do what is due."""
+        super().tick(now_s)
+        if now_s >= self._deadlines.get(Due.ORDERS):
+            self._book.on_due()
 
     def get_connected_to_gateway(self) -> bool:
         """Always: it is one."""
@@ -83,17 +89,16 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         check_goal(latitude, longitude, height)
         if height != int(height):
             raise GoalRefused(f"height {height} m: an order gives whole metres")
-        if node_id == self._node_id:
-            self._orders.check_can_fly()
-            self._orders.take(node_id, Location(latitude, longitude, height))
-            return True
-        me = self._node_id
-        order = GoToLocationMessage(me, me, node_id, node_id, latitude, longitude, int(height))
-        self._ordered_s[node_id] = now_s
-        if self._delivery.send_own(order.to_payload()):
-            return True
-        self._order_lost(node_id)
-        return False
+        goal = Location(latitude, longitude, height)
+        number = self._book.enter(node_id, goal)
+        if node_id != self._node_id:
+            return self._book.send(number)
+        self._orders.take(node_id, goal, number)
+        return True
+
+    def get_orders(self) -> list[OrderRecord]:
+        """The orders that it remembers, oldest first, and what became of them."""
+        return self._book.records()
 
     def get_known_nodes(self) -> list[KnownNode]:
         """All other nodes that it has a route to or has heard from, by id."""
@@ -111,14 +116,17 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
         """A relay that can take an order no further says so to the gateway."""
         super()._on_missing(creator, missing, told_by)
-        ordered_s = self._ordered_s.get(missing, -math.inf)
-        if self._deadlines.now_s - ordered_s < _ORDER_UNDER_WAY_S:
-            self._order_lost(missing)
+        self._book.on_missing(missing)
 
-    def _order_lost(self, node: int) -> None:
-        del self._ordered_s[node]
-        _log.warning("gateway %d: no route to drone %d, it stays", self._node_id, node)
-        self._report(MeshEventKind.NO_ROUTE, node)
+    def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
+        if kind != MessageType.ORDER_REPLY:
+            super()._on_report(payload, creator, kind)
+            return
+        reply = OrderReply.from_payload(payload)
+        if reply is None:
+            self._drop("an invalid reply to an order", payload)
+        else:
+            self._book.on_reply(creator, reply)
 
     def _begin(self) -> None:
         self._internet.connect(self)

@@ -11,11 +11,13 @@ import abc
 from typing import NamedTuple, Sequence
 
 from drone_mesh.communication.medium import UNDISTURBED, ChannelUse, Medium
+from drone_mesh.communication.order_record import OrderRecord
 
 PAYLOAD_BYTES = 32  # nRF24L01+ Product Specification 1.0, 7.3.4: a payload is 0..32 bytes
 MAX_NODE_ID = 253  # docs/protocol.md, "Identity"
 BROADCAST = 254  # final addressee: every node in range
 NO_ROUTE = 255  # "no such route", "no such node"
+UNLIMITED_ROOM = 2**31
 
 
 class IMeshNetwork(abc.ABC):
@@ -103,6 +105,10 @@ class IGatewayCommands(abc.ABC):
     def get_known_nodes(self) -> list[KnownNode]:
         """All other nodes that it has a route to or has heard from, by id."""
 
+    def get_orders(self) -> Sequence[OrderRecord]:
+        """The orders that it remembers, oldest first, and what became of them."""
+        return ()
+
 
 class IWirelessCommunication(abc.ABC):
     """A radio for 32-byte packets. No method raises for a lost packet."""
@@ -122,6 +128,10 @@ class IWirelessCommunication(abc.ABC):
         0 on a quiet channel: everything is probed in each round. More on a busy one.
         """
         return 0.0
+
+    def data_room(self) -> int:
+        """How many packets of users it would take now without delaying those of the mesh."""
+        return UNLIMITED_ROOM
 
     @abc.abstractmethod
     def start_antenna(self, mesh: IMeshNetwork) -> None:

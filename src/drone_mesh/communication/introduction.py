@@ -47,7 +47,7 @@ class Introduction:
         hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
         me = parts.node_id
         payload = IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
-        room = messages.extension_room(MessageType.PRESENT)
+        room = messages.EXTENSION_ROOM[MessageType.PRESENT]
         extension = parts.routing.extension(MessageType.PRESENT, room)
         if extension:
             payload = messages.extended(payload, extension)

@@ -35,6 +35,7 @@ class Medium:
     search_s: float = 0.0
     missing_quiet_s: float = 0.0
     silence_s: float = 0.0  # a neighbour heard since then is not lost by one undelivered packet
+    data_pause_s: float = 0.005  # between bursts of users' packets
 
 
 UNDISTURBED = Medium()

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import enum
 import math
+import operator
 import struct
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Union
+from typing import Callable, ClassVar, Mapping, NamedTuple, Union
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.drone.interfaces import Location
@@ -24,6 +25,11 @@ _CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # places of the header bytes
 HEADER_BYTES = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
 TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
+REPORT_TYPES = range(64, 128)
+DATA_TYPES = range(128, 256)  # of users; their bodies are described in data/packets.py
+ROUTE_RECORD = 194  # the one packet of users to which each node that forwards it adds its id
+ROUTE_RECORD_AT = HEADER_BYTES + 2  # place of the number of ids, which follow
+MOST_RECORDED = 16
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
 
@@ -38,6 +44,8 @@ class MessageType(enum.IntEnum):
     MISSING = 5  # its creator can no longer reach a node
     MOVE_TO_LOCATION = 6  # an order to fly
     MOVEMENT_NEGOTIATION = 7  # the bid of its creator to fly
+    ORDER_REPLY = 64  # what a drone says of a numbered order; see order_messages
+    ORDER_QUERY = 65  # asks for an ORDER_REPLY
 
 
 @dataclass(frozen=True)
@@ -262,15 +270,17 @@ _GATEWAY_PLACE_AT = {
     int(MessageType.MOVEMENT_NEGOTIATION): HEADER_BYTES + MovementNegotiationMessage.BODY.size,
 }
 _OLDEST_AGE_S = 2**16 - 2
+_ORDER_NUMBER = struct.Struct("<H")
+_ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
-_EXTENSION_AT = {  # places of the first byte behind a body that can be extended
-    int(MessageType.PRESENT): HEADER_BYTES + IntroduceMessage.BODY.size,
-    int(MessageType.HEARTBEAT): HEADER_BYTES + HeartbeatMessage.BODY.size,
+_EXTENSIONS = {  # the bytes behind a body that a routing technique may use
+    int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
+    int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
 }
-_NUMBERS: dict[int, struct.Struct] = {  # the floating point numbers at the start of a body
+TYPES_WITH_NUMBERS: Mapping[int, struct.Struct] = {  # the floats at the start of a body
     MessageType.LOCATION: struct.Struct("<ff"),
     MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
     MessageType.MOVEMENT_NEGOTIATION: struct.Struct("<f"),
@@ -302,30 +312,28 @@ class GatewayPlace(NamedTuple):
         return cls(gateway, Location(*place), age - 1.0)
 
 
-def header(payload: bytes) -> tuple[int, int, int, int, int]:
-    """Creator, from, type, to and forward of a packet."""
-    creator, from_, kind, to, forward = payload[:HEADER_BYTES]
-    return creator, from_, kind, to, forward
+# Read for each packet: these four and `header` cost no call of a Python function.
+
+header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct("<5B").unpack_from
+"""Creator, from, type, to and forward of a packet."""
 
 
-def sender(payload: bytes) -> int:
-    """The node that sends this hop."""
-    return payload[_FROM]
+sender: Callable[[bytes], int] = operator.itemgetter(_FROM)
+"""The node that sends this hop."""
+
+receiver: Callable[[bytes], int] = operator.itemgetter(_TO)
+"""The node that this hop is for."""
+
+type_of: Callable[[bytes], int] = operator.itemgetter(_TYPE)
+"""The type of a packet; see MessageType."""
+
+addressee: Callable[[bytes], int] = operator.itemgetter(_FORWARD)
+"""The node that a packet is for in the end, or BROADCAST."""
 
 
-def receiver(payload: bytes) -> int:
-    """The node that this hop is for."""
-    return payload[_TO]
-
-
-def type_of(payload: bytes) -> int:
-    """The type of a packet; see MessageType."""
-    return payload[_TYPE]
-
-
-def addressee(payload: bytes) -> int:
-    """The node that a packet is for in the end, or BROADCAST."""
-    return payload[_FORWARD]
+def is_data(payload: bytes) -> bool:
+    """Whether it is a packet of a user, of whatever type."""
+    return payload[_TYPE] >= DATA_TYPES.start
 
 
 def readdressed(payload: bytes, to: int) -> bytes:
@@ -355,6 +363,9 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
         if payload[_HEARTBEAT_HOPS] >= MAX_HOPS:
             return None
         forwarded[_HEARTBEAT_HOPS] += 1
+    elif payload[_TYPE] == ROUTE_RECORD and payload[ROUTE_RECORD_AT] < MOST_RECORDED:
+        forwarded[ROUTE_RECORD_AT] += 1
+        forwarded[ROUTE_RECORD_AT + forwarded[ROUTE_RECORD_AT]] = from_
     return bytes(forwarded)
 
 
@@ -365,15 +376,14 @@ def hops(payload: bytes) -> int:
     return payload[HEADER_BYTES]
 
 
-def extension_room(kind: int) -> int:
-    """The number of bytes behind the body that a routing technique may use; 0 for most types."""
-    return _extension_end(kind) - _EXTENSION_AT[kind] if kind in _EXTENSION_AT else 0
+EXTENSION_ROOM: Mapping[int, int] = {kind: len(part) for kind, part in _EXTENSIONS.items()}
+"""The number of bytes behind the body that a routing technique may use, for types that have any."""
 
 
 def extension(payload: bytes) -> bytes:
     """The bytes behind the body of a PRESENT or a HEARTBEAT; zero where no technique uses them."""
-    kind = payload[_TYPE]
-    return payload[_EXTENSION_AT[kind] : _extension_end(kind)]
+    part = _EXTENSIONS[payload[_TYPE]]
+    return payload[part.start : part.stop]
 
 
 def extended(payload: bytes, extension: bytes) -> bytes:
@@ -381,14 +391,11 @@ def extended(payload: bytes, extension: bytes) -> bytes:
 
     Raises PacketError if they do not fit.
     """
-    at, room = _EXTENSION_AT[payload[_TYPE]], extension_room(payload[_TYPE])
-    if len(extension) > room:
-        raise PacketError(f"{len(extension)} extension bytes do not fit into {room}")
+    part = _EXTENSIONS[payload[_TYPE]]
+    at = part.start
+    if len(extension) > len(part):
+        raise PacketError(f"{len(extension)} extension bytes do not fit into {len(part)}")
     return payload[:at] + extension + payload[at + len(extension) :]
-
-
-def _extension_end(kind: int) -> int:
-    return _FRAME_DIGEST_AT if kind == MessageType.PRESENT else PAYLOAD_BYTES
 
 
 def frame_digest(present: bytes) -> int:
@@ -399,6 +406,17 @@ def frame_digest(present: bytes) -> int:
 def with_frame_digest(present: bytes, digest: int) -> bytes:
     """The same PRESENT with this digest."""
     return present[:_FRAME_DIGEST_AT] + _FRAME_DIGEST.pack(digest)
+
+
+def order_number(order: bytes) -> int:
+    """The number behind the body of a MOVE_TO_LOCATION; 0: its creator wants no reply."""
+    return int(_ORDER_NUMBER.unpack_from(order, _ORDER_NUMBER_AT)[0])
+
+
+def with_order_number(order: bytes, number: int) -> bytes:
+    """The same MOVE_TO_LOCATION with this number."""
+    end = _ORDER_NUMBER_AT + _ORDER_NUMBER.size
+    return order[:_ORDER_NUMBER_AT] + _ORDER_NUMBER.pack(number) + order[end:]
 
 
 def body(payload: bytes) -> bytes:
@@ -414,9 +432,9 @@ def identity(payload: bytes) -> bytes:
 
 
 def is_finite(payload: bytes) -> bool:
-    """Whether all floats of a packet are finite; True for types without floats."""
-    numbers = _NUMBERS.get(payload[_TYPE])
-    return numbers is None or all(map(math.isfinite, numbers.unpack_from(payload, HEADER_BYTES)))
+    """Whether all floats of a packet are finite; its type is one of TYPES_WITH_NUMBERS."""
+    numbers = TYPES_WITH_NUMBERS[payload[_TYPE]].unpack_from(payload, HEADER_BYTES)
+    return all(map(math.isfinite, numbers))
 
 
 def _packed(message: _TypedMessage, *values: float) -> bytes:

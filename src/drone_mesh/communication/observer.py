@@ -29,6 +29,12 @@ class MeshEventKind(enum.Enum):
     FLIGHT_DECIDED = "flight decided"  # peer: the node whose place it takes
     FLIGHT_ORDERED = "flight ordered"  # peer: the creator of the order
     LANDED = "landed"
+    # What a gateway knows of an order; peer: its drone, detail: its number, and why
+    ORDER_SENT = "order sent"
+    ORDER_ACCEPTED = "order accepted"
+    ORDER_REFUSED = "order refused"
+    ORDER_ARRIVED = "order arrived"
+    ORDER_GIVEN_UP = "order given up"
 
 
 @dataclass(frozen=True)

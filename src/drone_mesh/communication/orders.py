@@ -1,20 +1,47 @@
-"""OrderIntake: which orders to fly a node takes (docs/protocol.md, "Flight")."""
+"""OrderIntake: which orders to fly a node takes, and what it says of them.
+
+docs/protocol.md, "Orders".
+"""
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import GoToLocationMessage
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.order_messages import OrderOutcome, reply_packets
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 
+ORDERS_KEPT = 8  # our choice: more than gateways that order one drone
+ARRIVED_WITHIN_M = 1.5  # our choice: a MAVLink drone counts 1 m as there (drone/route.py)
+REPLY_AGAIN_S = 1.0  # our choice: how often a drone without a route looks for one
+REPLY_TRIES = 120  # our choice: a query of the gateway comes after that
+
+OwnReply = Callable[[int, OrderOutcome, str], None]
+"""Takes what the gateway's own drone says: order number, outcome, reason."""
+
+
+@dataclass
+class _KnownOrder:
+    gateway: int
+    number: int
+    goal: Location
+    outcome: OrderOutcome
+    reason: str = ""
+    tries_left: int = 0  # to send the latest outcome
+
 
 class OrderIntake:
-    """Checks the orders for one drone and starts its flights."""
+    """Checks the orders for one drone, starts its flights, and replies to numbered orders."""
 
     def __init__(
         self, parts: NodeParts, complaints: Complaints, took_off: Callable[[], None]
@@ -23,27 +50,126 @@ class OrderIntake:
         self._parts = parts
         self._complaints = complaints
         self._took_off = took_off
+        self._known: deque[_KnownOrder] = deque(maxlen=ORDERS_KEPT)
+        self.on_own_reply: OwnReply = _ignore
 
-    def on_order(self, order: GoToLocationMessage) -> None:
+    def on_order(self, order: GoToLocationMessage, number: int) -> None:
         """An order from the air: taken, or refused with a line in the log."""
         try:
-            check_goal(*order.location)
-            self.check_can_fly()
+            self.take(order.creator, order.location, number)
         except GoalRefused as error:
             self._complaints.add("order refused", str(error), self._parts.now_s)
-            return
-        self.take(order.creator, order.location)
 
-    def check_can_fly(self) -> None:
-        """Raises GoalRefused if the drone would not fly to a goal now."""
-        why_not = self._parts.pilot.why_not_fly()
+    def take(self, gateway: int, goal: Location, number: int = 0) -> None:
+        """Fly to `goal`, unless the drone does so already: two gateways order the same flight.
+
+        The same order again (same gateway, number and goal) is only replied to again. Raises
+        GoalRefused if the drone does not fly there.
+        """
+        known = self._find(gateway, number)
+        if known is not None and known.goal == goal:
+            self._reply(known, known.outcome, known.reason)
+            return
+        order = _KnownOrder(gateway, number, goal, OrderOutcome.ACCEPTED)
+        if number:
+            self._remember(order)
+        try:
+            starts = self._obey(goal)
+        except GoalRefused as error:
+            self._reply(order, OrderOutcome.REFUSED, str(error))
+            raise
+        for other in self._under_way():
+            if other.goal != goal:
+                self._reply(other, OrderOutcome.GIVEN_UP, "another order came")
+        self._reply(order, OrderOutcome.ACCEPTED)
+        if starts:
+            self._parts.report(MeshEventKind.FLIGHT_ORDERED, gateway, f"to {goal.in_words()}")
+            self._took_off()
+
+    def on_query(self, gateway: int, number: int) -> None:
+        """A gateway asks what became of an order."""
+        known = self._find(gateway, number)
+        if known is not None:
+            self._reply(known, known.outcome, known.reason)
+        else:
+            unknown = _KnownOrder(gateway, number, _NOWHERE, OrderOutcome.UNKNOWN)
+            self._send(unknown)
+
+    def on_landed(self) -> None:
+        """A flight is over; whether it was an ordered one is looked up here."""
+        orders = self._under_way()
+        if not orders:
+            return
+        here = self._parts.pilot.location()
+        for order in orders:
+            if here is None:
+                self._reply(order, OrderOutcome.GIVEN_UP, "its place is not known")
+                continue
+            off_m = here.distance_m(order.goal)
+            if off_m <= ARRIVED_WITHIN_M:
+                self._reply(order, OrderOutcome.ARRIVED)
+            else:
+                why = self._parts.pilot.why_not_fly() or "the flight ended"
+                self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {off_m:.1f} m from the goal")
+
+    def on_due(self) -> None:
+        """Send the replies that had no route until now."""
+        self._parts.deadlines.set(Due.ORDER_REPLIES, math.inf)
+        for order in self._known:
+            if order.tries_left:
+                self._send(order)
+
+    def _obey(self, goal: Location) -> bool:
+        """Whether a flight starts by this; it does not if the drone already flies there."""
+        check_goal(*goal)
+        pilot = self._parts.pilot
+        why_not = pilot.why_not_fly()
         if why_not:
             raise GoalRefused(f"drone {self._parts.node_id} cannot fly: {why_not}")
+        if pilot.goal == goal:
+            return False
+        pilot.obey(goal)
+        return True
 
-    def take(self, creator: int, goal: Location) -> None:
-        """Fly to `goal`, unless the drone does so already: two gateways order the same flight."""
-        if self._parts.pilot.goal == goal:
-            return
-        self._parts.report(MeshEventKind.FLIGHT_ORDERED, creator, f"to {goal.in_words()}")
-        self._parts.pilot.fly_to(goal)
-        self._took_off()
+    def _find(self, gateway: int, number: int) -> _KnownOrder | None:
+        for order in self._known:
+            if number and (order.gateway, order.number) == (gateway, number):
+                return order
+        return None
+
+    def _remember(self, order: _KnownOrder) -> None:
+        known = self._find(order.gateway, order.number)
+        if known is not None:  # the gateway was restarted, and counts again
+            self._known.remove(known)
+        self._known.append(order)
+
+    def _under_way(self) -> list[_KnownOrder]:
+        return [order for order in self._known if order.outcome is OrderOutcome.ACCEPTED]
+
+    def _reply(self, order: _KnownOrder, outcome: OrderOutcome, reason: str = "") -> None:
+        order.outcome, order.reason = outcome, reason
+        if order.gateway == self._parts.node_id:
+            self.on_own_reply(order.number, outcome, reason)
+        elif order.number:
+            order.tries_left = REPLY_TRIES
+            self._send(order)
+
+    def _send(self, order: _KnownOrder) -> None:
+        """Towards its gateway; after a landing there is no route at first."""
+        parts = self._parts
+        packets = reply_packets(
+            order.number, order.outcome, order.reason, parts.node_id, order.gateway
+        )
+        has_route = parts.routing.get_direction_to_node(order.gateway) != NO_ROUTE
+        if has_route and all([parts.delivery.send_own(packet) for packet in packets]):
+            order.tries_left = 0
+        elif order.tries_left:
+            order.tries_left -= 1
+            parts.deadlines.set(Due.ORDER_REPLIES, parts.now_s + REPLY_AGAIN_S)
+
+
+_NOWHERE = Location(math.nan, math.nan, math.nan)
+
+
+def _ignore(_number: int, _outcome: OrderOutcome, _reason: str) -> None:
+    """A router's own drone takes no orders from itself."""

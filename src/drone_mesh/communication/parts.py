@@ -36,7 +36,7 @@ class NodeParts:
         """A heartbeat of this node for `forward`, with what the routing technique adds to it."""
         me = self.node_id
         payload = HeartbeatMessage(me, me, to, forward, connected, gateway, 0).to_payload()
-        room = messages.extension_room(MessageType.HEARTBEAT)
+        room = messages.EXTENSION_ROOM[MessageType.HEARTBEAT]
         extension = self.routing.extension(MessageType.HEARTBEAT, room)
         return messages.extended(payload, extension) if extension else payload
 

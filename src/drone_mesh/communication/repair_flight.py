@@ -119,7 +119,7 @@ class RepairFlight:
         goal = self.goal
         if self.stops_when_connected and here is not None:
             goal = towards(here, goal, self._leg_m)
-        self._parts.pilot.fly_to(goal, step_back=True)
+        self._parts.pilot.step_back_to(goal)
 
     def _leg_is_short(self, here: Location | None) -> bool:
         """Whether this was not the last leg, and the drone moves at all."""

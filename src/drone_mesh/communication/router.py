@@ -16,8 +16,12 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import GatewayPlace, MovementNegotiationMessage
-from drone_mesh.communication.observer import MeshObserver, ignore_events
+from drone_mesh.communication.messages import (
+    GatewayPlace,
+    LocationMessage,
+    MovementNegotiationMessage,
+)
+from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import RepairOptions
@@ -27,6 +31,8 @@ from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine, Location
+
+SHORT_FLIGHT = 0.25  # of the range, our choice: the discs before and after share 84 % of their area
 
 
 class MeshnetworkRouter(MeshnetworkComponent):
@@ -74,7 +80,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """As MeshnetworkComponent."""
         super().on_msg(payload, now_s)
-        self._repair_status = self._repair.status()
+        if self._states.nothing_to_repair:  # most packets
+            self._repair_status = NOTHING_TO_REPAIR
+        else:
+            self._repair_status = self._repair.status()
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered last time, or may still answer."""
@@ -152,11 +161,16 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _on_passing_heartbeat(
         self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
-        """On a shared channel the answer of a gateway proves the connection of each relay, too."""
-        proves = creator == preferred_gateway and self._antenna.medium.shared
-        proves = proves and self._repair.may_connect(NO_ROUTE, know_gateway)
+        """The answer of a gateway proves the connection of each relay, too."""
+        proves = creator == preferred_gateway and self._repair.may_connect(NO_ROUTE, know_gateway)
         if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
             self._repair.on_connected()
+
+    def _on_passing_location(self, creator: int, payload: bytes) -> None:
+        """Where the gateway is concerns each relay, too."""
+        if creator == self._connection.gateway:
+            location = LocationMessage.from_payload(payload).location
+            self.places.gateway_is_at(location, self._deadlines.now_s)
 
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
@@ -177,15 +191,26 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self.places.next_hop_is_at(node, location)
         self._repair.on_place(node, location)
 
+    def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
+        super()._on_missing(creator, missing, told_by)
+        self._connection.on_route_lost()
+
     def _on_neighbour_found(self, node: int) -> None:
         self._repair.on_neighbour_found(node)
 
     def _on_neighbour_lost(self, node: int) -> None:
-        self._connection.on_neighbour_lost()
+        self._connection.on_route_lost()
         self._repair.on_neighbour_lost(node)
 
     def _took_off(self) -> None:
-        self._repair.on_ordered_flight()
+        if not self._is_short_flight():
+            self._repair.on_ordered_flight()
+
+    def _is_short_flight(self) -> bool:
+        """Whether most neighbours will still be in reach, so that the router stays a relay."""
+        if not self._states.connected or self._states.repair is Repair.FLYING:
+            return False
+        return self._pilot.distance_m() <= SHORT_FLIGHT * self._repair.range_m
 
     def _watch_flight(self) -> None:
         if not self._pilot.watch():
@@ -194,5 +219,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._landed()
 
     def _landed(self) -> None:
-        self._repair.on_landed()
-        super()._landed()
+        if self._states.repair is Repair.FLYING:
+            self._repair.on_landed()
+            super()._landed()
+            return
+        self._report(MeshEventKind.LANDED)
+        self._orders.on_landed()
+        if self._antenna.on():
+            self._check(self._deadlines.now_s)

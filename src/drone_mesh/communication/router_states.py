@@ -19,6 +19,8 @@ from typing import Mapping
 class Link(enum.Enum):
     """The connection to the preferred gateway."""
 
+    __hash__ = object.__hash__  # each is one object; Enum's own hash is a Python function
+
     SEARCHING = "searching"  # not connected
     AWAITING_FIRST_ANSWER = "awaiting the first answer"  # a heartbeat is under way
     CONNECTED = "connected"
@@ -27,6 +29,8 @@ class Link(enum.Enum):
 
 class Repair(enum.Enum):
     """What the router does about a lost connection."""
+
+    __hash__ = object.__hash__
 
     AT_REST = "at rest"  # nothing: it is connected, or no check has noticed the loss
     LOST = "lost"  # waits for a gateway until the time is up
@@ -38,6 +42,8 @@ class Repair(enum.Enum):
 
 class RouterEvent(enum.Enum):
     """What moves a router from state to state."""
+
+    __hash__ = object.__hash__
 
     HEARTBEAT_SENT = "a heartbeat to the gateway leaves"
     ANSWER_MISSED = "the gateway did not answer in time, or the heartbeat could not be sent"
@@ -55,6 +61,7 @@ class RouterEvent(enum.Enum):
 
 
 CONNECTED_LINKS = frozenset((Link.CONNECTED, Link.AWAITING_ANSWER))
+AWAITING_LINKS = frozenset((Link.AWAITING_FIRST_ANSWER, Link.AWAITING_ANSWER))
 
 _ALL_TO_SEARCHING = {state: Link.SEARCHING for state in Link}
 _ALL_BUT_FLYING_TO_REST = {
@@ -109,21 +116,17 @@ REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[Repair, Repair]] = {
 
 
 class RouterStates:
-    """The present states of one router."""
+    """The present states of one router. All that it shows changes in `happened` only.
+
+    Read for each packet, hence plain attributes.
+    """
 
     def __init__(self) -> None:
         self.link = Link.SEARCHING
         self.repair = Repair.AT_REST
-
-    @property
-    def connected(self) -> bool:
-        """Whether the gateway answered the last heartbeat, or may still answer it."""
-        return self.link in CONNECTED_LINKS
-
-    @property
-    def awaiting(self) -> bool:
-        """Whether a heartbeat to the gateway is under way."""
-        return self.link in (Link.AWAITING_FIRST_ANSWER, Link.AWAITING_ANSWER)
+        self.connected = False  # the gateway answered the last heartbeat, or may still answer it
+        self.awaiting = False  # a heartbeat to the gateway is under way
+        self.nothing_to_repair = False  # connected, and the repair at rest
 
     def happened(self, event: RouterEvent) -> None:
         """Move on. Raises RuntimeError, and changes nothing, if `event` cannot happen now."""
@@ -137,3 +140,6 @@ class RouterStates:
                 f"and {self.repair.value}"
             ) from None
         self.link, self.repair = link, repair
+        self.connected = link in CONNECTED_LINKS
+        self.awaiting = link in AWAITING_LINKS
+        self.nothing_to_repair = self.connected and repair is Repair.AT_REST

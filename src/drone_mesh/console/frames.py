@@ -1,12 +1,13 @@
 """FrameStore: what a page should know, and the difference to what it knows already.
 
 A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), `gone` (ids),
-`events` and `samples` (new ones). A page that has version v gets what changed after v, however long
-ago that was: a page that falls behind gets a larger difference, and nothing is queued for it.
+`events` and `samples` (new ones), and `obstacles` (all, if they have changed). A page that has
+version v gets what changed after v, however long ago that was: a page that falls behind gets a
+larger difference, and nothing is queued for it.
 
 The fields of a node are those of NodeState.msg, with what is decided here and only shown there:
-its condition, the name of its colour, its trouble, its slot among nodes at the same position, and
-the links it has with nodes of higher ids.
+its condition, the name of its colour, its trouble, its slot among nodes at the same position, how
+far its latest order has come, and the links it has with nodes of higher ids.
 """
 
 from __future__ import annotations
@@ -18,7 +19,15 @@ from typing import Any, Iterable, Mapping, Sequence
 
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
+from drone_mesh.state.model import (
+    EventRecord,
+    MeshStatus,
+    NodeStatus,
+    ObstacleStatus,
+    footprint,
+    position_is_known,
+)
+from drone_mesh.state.orders import OrderWatch
 from drone_mesh.state.outages import MeshSample, take_sample
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 from drone_mesh.view.fan import fan_out
@@ -45,7 +54,10 @@ class FrameStore:
         self._samples: deque[tuple[int, MeshSample]] = deque(maxlen=SAMPLES_KEPT)
         self._sampled_at_s = float("-inf")
         self._lost_links = LostLinks()
+        self._orders = OrderWatch()
         self._run_began_at = 0
+        self._obstacles: list[dict[str, Any]] = []
+        self._obstacles_at = 0
         self._cache: dict[int, str] = {}
 
     def update_mesh(self, mesh: MeshStatus, wall_s: float) -> None:
@@ -71,10 +83,14 @@ class FrameStore:
             del self._nodes[gone]
             del self._changed_at[gone]
             self._gone_at[gone] = self.version
+        obstacles = [_obstacle(box) for box in mesh.obstacles]
+        if obstacles != self._obstacles:
+            self._obstacles, self._obstacles_at = obstacles, self.version
         slots = fan_out(mesh.nodes)
         for node in mesh.nodes:
             fields = _fields(node, troubles.get(node.id))
-            self._update_node(node.id, {**fields, "slot": slots.get(node.id)})
+            order = self._orders.words(node.id)
+            self._update_node(node.id, {**fields, "slot": slots.get(node.id), "order": order})
         for node_id, fields in self._links(mesh.nodes, wall_s).items():
             self._update_node(node_id, fields)
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:
@@ -83,7 +99,9 @@ class FrameStore:
 
     def add_events(self, events: Iterable[EventRecord]) -> None:
         """Add new events, oldest first."""
+        events = list(events)
         self._next_version()
+        self._orders.take(events)
         for event in events:
             self._events.append(
                 (
@@ -133,6 +151,8 @@ class FrameStore:
             if max(self._changed_at[node].values()) > version
         }:
             frame["nodes"] = nodes
+        if self._obstacles_at > version:
+            frame["obstacles"] = self._obstacles
         if gone := [node for node, at in self._gone_at.items() if at > version]:
             frame["gone"] = gone
         if events := [event for at, event in self._events if at > version]:
@@ -171,6 +191,7 @@ class FrameStore:
     def _forget_run(self) -> None:
         """Simulated time went back: a new world. Charts and log of every page start again."""
         self._run_began_at = self.version
+        self._orders.forget()
         self._events.clear()
         self._samples.clear()
 
@@ -195,6 +216,13 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "repair": node.repair,
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,
+    }
+
+
+def _obstacle(box: ObstacleStatus) -> dict[str, Any]:
+    return {
+        "corners": [_centimetres(corner) for corner in footprint(box)],
+        "top": round(float(box.center[2] + box.size[2] / 2), 2),
     }
 
 

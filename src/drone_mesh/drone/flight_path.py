@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Tuple
+from typing import Callable, Optional, Tuple
 
 Vector = Tuple[float, float, float]  # x (longitude), y (latitude), z (up): metres, world frame
 
@@ -81,3 +81,7 @@ class FlightPath:
     def is_descending(self, now_s: float) -> bool:
         """Whether the last, vertical part has begun."""
         return self.share_flown(now_s) >= DESCENT_STARTS_AT
+
+
+PlanFlight = Callable[[Vector, Vector, float, float], Optional[FlightPath]]
+"""From start, goal, time (s) and speed (m/s) to a flight; None: there is no way."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Optional, Protocol
+from typing import Any, Callable, Protocol
 
-from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, Vector
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 
@@ -17,10 +17,6 @@ class Time(Protocol):
     def now_s(self) -> float: ...
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None: ...
-
-
-PlanFlight = Callable[[Vector, Vector, float, float], Optional[FlightPath]]
-"""From start, goal, time and speed to a flight."""
 
 
 class InProcessDrone(IDroneEngine):

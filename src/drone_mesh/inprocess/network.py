@@ -11,6 +11,9 @@ from typing import Callable, Iterable
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.data.echo import OnEchoAnswer
+from drone_mesh.communication.data.ticket import Ticket
+from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import (
     NO_ROUTE,
@@ -175,6 +178,7 @@ class Network:
         self._link_map = LinkMap(self.clock, self.links)
         self.nodes: dict[int, Node] = {}
         self.events: list[MeshEvent] = []
+        self.received: dict[int, list[ReceivedMessage]] = {}  # by receiver, in order
 
     # Building --------------------------------------------------------------------------------
 
@@ -234,6 +238,7 @@ class Network:
             repair=self._make_repair(),
             repair_options=self._repair_options,
         )
+        node.component.data.on_received(functools.partial(self._receive, node_id))
         self.nodes[node_id] = node
         self.clock.call_at(start_s, Node.start, node)
 
@@ -263,6 +268,24 @@ class Network:
         taken = node.component.send_goal_request_to_drone(node_id, y, x, height, self.clock.now_s)
         node.plan()
         return taken
+
+    def send(
+        self, node_id: int, to: int, payload: bytes, port: int = 0, reliable: bool = True
+    ) -> Ticket:
+        """Have a node send a message; as Transport.send."""
+        node = self.nodes[node_id]
+        ticket = node.component.data.send(
+            to, payload, self.clock.now_s, port=port, reliable=reliable
+        )
+        node.plan()
+        return ticket
+
+    def echo(self, node_id: int, to: int, on_answer: OnEchoAnswer) -> bool:
+        """Have a node send an echo to another one; False: it knows no route."""
+        node = self.nodes[node_id]
+        token = node.component.data.echo(to, on_answer, self.clock.now_s)
+        node.plan()
+        return token is not None
 
     def inject(self, node_id: int, payload: bytes) -> None:
         """Let a node hear a packet from nowhere, also one whose antenna has no power."""
@@ -358,6 +381,9 @@ class Network:
             for node_id, node in self.nodes.items()
             if node.antenna.powered and node.component.get_connected_to_gateway()
         }
+
+    def _receive(self, node_id: int, message: ReceivedMessage) -> None:
+        self.received.setdefault(node_id, []).append(message)
 
     def _observe(self, event: MeshEvent) -> None:
         self.events.append(event)

@@ -14,12 +14,12 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import readdressed, receiver
+from drone_mesh.communication.messages import is_data, readdressed, receiver
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
-from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, MediumAccess, Outgoing
+from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, MediumAccess, Outgoing, Priority
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
@@ -99,15 +99,18 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         to = receiver(payload)
         if not self.powered or to > MAX_NODE_ID or to == self.node_id:
             return False
-        taken = self.access.offer(to, payload, self._clock.now_s)
+        taken = self.access.offer(to, payload, self._clock.now_s, _priority_of(payload))
         self._plan()
         return taken
 
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all."""
         if self.powered:
-            self.access.offer(ALL_NODES, payload, self._clock.now_s)
+            self.access.offer(ALL_NODES, payload, self._clock.now_s, _priority_of(payload))
             self._plan()
+
+    def data_room(self) -> int:
+        return self.access.data_room()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Nothing: the owner of the network has its nodes."""
@@ -243,3 +246,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
+
+
+def _priority_of(payload: bytes) -> Priority:
+    return Priority.DATA if is_data(payload) else Priority.CONTROL

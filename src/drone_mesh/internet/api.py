@@ -7,9 +7,9 @@ Python 3.8.
 import hmac
 import logging
 import math
-from typing import Any, Callable, Dict, List, Optional, Union
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
-from fastapi import Depends, FastAPI, Path, Request
+from fastapi import Depends, FastAPI, Path, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
@@ -19,11 +19,13 @@ from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, IGatewayCommands, KnownNode
+from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.internet.asking import AnswerLate, GatewayDesk, NotCarriedOut
+from drone_mesh.internet.orders import Responses, add_order_requests
 from drone_mesh.internet.request_guard import RequestGuard
 from drone_mesh.web.access import Access
 
@@ -37,9 +39,6 @@ Coordinate = Annotated[
 Height = Annotated[
     int, Path(ge=0, le=int(MAX_HEIGHT_M), description="Of the drone's underside, whole metres.")
 ]
-
-
-Responses = Dict[Union[int, str], Dict[str, Any]]
 
 
 class Refusal(BaseModel):
@@ -88,7 +87,7 @@ class EarthGoal(BaseModel, extra="forbid"):
 
 
 class OrderSent(BaseModel):
-    """The order was sent through the mesh. The arrival is not reported."""
+    """The order was sent through the mesh. The header Location says where to ask about it."""
 
     drone: int
     latitude: float = Field(description="y, metres")
@@ -186,10 +185,14 @@ def make_api(
         responses=order_refusals,
     )
     async def move_drone(
-        id: DroneId, latitude: Coordinate, longitude: Coordinate, height: Height
+        id: DroneId,
+        latitude: Coordinate,
+        longitude: Coordinate,
+        height: Height,
+        response: Response,
     ) -> OrderSent:
         """Send a drone to a place, through the mesh."""
-        await send(id, Location(latitude, longitude, float(height)))
+        await send(id, Location(latitude, longitude, float(height)), response)
         return OrderSent(drone=id, latitude=latitude, longitude=longitude, height=height)
 
     @app.post(
@@ -201,7 +204,9 @@ def make_api(
             409: {"model": Refusal, "description": "No origin"},
         },
     )
-    async def set_goal(id: DroneId, goal: Union[FrameGoal, EarthGoal]) -> GoalSent:
+    async def set_goal(
+        id: DroneId, goal: Union[FrameGoal, EarthGoal], response: Response
+    ) -> GoalSent:
         """Send a drone to a place, in metres or in degrees, through the mesh."""
         if isinstance(goal, FrameGoal):
             place = Location(goal.latitude, goal.longitude, float(goal.height))
@@ -212,7 +217,7 @@ def make_api(
             raise HTTPException(
                 409, "this gateway has no origin (--origin): give the goal in metres"
             )
-        await send(id, place)
+        await send(id, place, response)
         earth = None if origin is None else EarthGoal(**origin.to_earth(place)._asdict())
         return GoalSent(
             drone=id,
@@ -222,17 +227,26 @@ def make_api(
             earth=earth,
         )
 
-    async def send(drone: int, place: Location) -> None:
-        taken = await desk.ask(
-            lambda gateway, now_s: gateway.send_goal_request_to_drone(
-                drone, place.latitude, place.longitude, int(place.height), now_s
-            )
-        )
+    async def send(drone: int, place: Location, response: Response) -> None:
+        def order(gateway: IGatewayCommands, now_s: float) -> Tuple[bool, Sequence[OrderRecord]]:
+            goal = (place.latitude, place.longitude, int(place.height))
+            taken = gateway.send_goal_request_to_drone(drone, *goal, now_s)
+            return taken, gateway.get_orders()
+
+        taken, orders = await desk.ask(order)
+        if orders:
+            response.headers["Location"] = f"/orders/{orders[-1].number}"
         if not taken:
             raise HTTPException(
                 503, f"the gateway has no route to drone {drone}, which stays where it is"
             )
         _log.info("drone %d: order sent, to %s", drone, place.in_words())
+
+    not_found: Responses = {
+        404: {"model": Refusal, "description": "No such order, or forgotten"},
+        422: {"model": Refusal, "description": "Invalid number"},
+    }
+    add_order_requests(app, desk, guards, refusals, {**refusals, **not_found})
 
     if status is not None:
         read_status = status

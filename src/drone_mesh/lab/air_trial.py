@@ -56,7 +56,6 @@ class AirMesh(Protocol):
     def all_connected(self) -> bool: ...
     def connected(self, node_id: int) -> bool: ...
     def power(self, node_id: int, on: bool) -> None: ...
-    def next_hop(self, node_id: int) -> int: ...
     def place(self, node_id: int) -> Location: ...
     def order(self, node_id: int, x: float, y: float) -> object: ...
     def stop(self) -> None: ...
@@ -91,10 +90,6 @@ class ChipMesh:
         self.now_s, self.run_for = self.mesh.now_s, self.mesh.run_for
         self.all_connected, self.connected = self.mesh.all_connected, self.mesh.connected
         self.power, self.order, self.stop = self.mesh.power, self.mesh.order, self.mesh.stop
-
-    def next_hop(self, node_id: int) -> int:
-        """Of a node towards its gateway."""
-        return self.mesh.nodes[node_id].component.get_route_to_gateway()
 
     def place(self, node_id: int) -> Location:
         """Where a drone is."""
@@ -135,10 +130,6 @@ class ModelMesh:
             self.network.order,
             self.network.location,
         )
-
-    def next_hop(self, node_id: int) -> int:
-        """Of a node towards its gateway."""
-        return self.network.nodes[node_id].component.get_route_to_gateway()
 
     def stop(self) -> None:
         """Nothing to end."""
@@ -277,25 +268,24 @@ class Orders:
     reported: int  # of the rest: the gateway that sent them said so
 
 
-def give_orders(trial: AirTrial, kind: str, count: int, relays: bool) -> Orders:
-    """One order a second to a random drone, to stay where it is.
-
-    A drone that gets an order forgets its routes, as the protocol wants it, and all behind it have
-    to find others. `relays`: also such drones get orders that others depend on.
-    """
+def give_orders(trial: AirTrial, kind: str, count: int, flight_m: float) -> Orders:
+    """One order a second to a random drone, to a place `flight_m` from its own in the grid."""
     mesh = make_mesh(trial, kind)
     connect(mesh, 120.0)
     mesh.run_for(SETTLE_S)
     rng = random.Random(f"{trial.seed} orders")
+    homes = {node: mesh.place(node) for node in range(1, trial.nodes)}
     sent: list[tuple[float, int]] = []
     for _ in range(count):
-        nodes = range(1, trial.nodes)
-        used = set() if relays else {mesh.next_hop(node) for node in nodes}
-        used |= {node for _, node in sent[-10:]}  # the same order twice in a row changes nothing
-        node = rng.choice([node for node in nodes if node not in used and mesh.connected(node)])
-        place = mesh.place(node)
+        lately = {node for _, node in sent[-10:]}  # each order is told from the next by its drone
+        node = rng.choice([node for node in homes if node not in lately])
+        home, direction = homes[node], 2.0 * math.pi * rng.random()
         sent.append((mesh.now_s(), node))
-        mesh.order(node, place.longitude, place.latitude)
+        mesh.order(
+            node,
+            home.longitude + flight_m * math.cos(direction),
+            home.latitude + flight_m * math.sin(direction),
+        )
         mesh.run_for(1.0)
     mesh.run_for(10.0)
     mesh.stop()

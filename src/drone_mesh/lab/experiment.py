@@ -12,8 +12,9 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from typing_extensions import Annotated, Literal, get_args
 
+from drone_mesh.air import obstacle_file
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab import boxes, extensions, places
+from drone_mesh.lab import extensions, places
 from drone_mesh.lab.expression import ExpressionError, Where
 from drone_mesh.lab.marked_yaml import Lines, Place, nearest_line, read_marked
 from drone_mesh.lab.scenario import Fault, Part, Scenario
@@ -321,7 +322,7 @@ def _read_files(content: Dict[str, Any], source: _Source) -> None:
     """Put what other files say into the scenario: its id has to depend on that, not on a path."""
     for part, key, read in (
         ("layout", "places", places.rows_of_file),
-        ("obstacles", "boxes", boxes.rows_of_file),
+        ("obstacles", "boxes", obstacle_file.rows_of_file),
     ):
         holder = content.get(part)
         if not isinstance(holder, dict) or not isinstance(holder.get("path"), str):

@@ -6,7 +6,7 @@ import functools
 import math
 from typing import Callable
 
-from drone_mesh.air.obstacles import CUT_DB, Box, Obstacles
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess import Network
@@ -18,15 +18,7 @@ MARGIN_STEP_DB = 0.1  # of the fading table
 
 def obstacles_of(part: given.Obstacles) -> Obstacles:
     """The boxes of a scenario. A material is one of CUT_DB; brick is as damped as `cut_db` says."""
-    boxes = [
-        Box(
-            (box.center[0], box.center[1], box.center[2]),
-            (box.size[0], box.size[1], box.size[2]),
-            math.radians(box.yaw_deg),
-            part.cut_db if box.material == "brick" else CUT_DB[box.material],
-        )
-        for box in part.boxes
-    ]
+    boxes = [box.to_box(part.cut_db) for box in part.boxes]
     return Obstacles(boxes, part.radio == "block", part.metre_db, part.exponent, part.ceiling_m)
 
 

@@ -13,6 +13,7 @@ from pydantic import (
 )
 from typing_extensions import Annotated, Literal
 
+from drone_mesh.air.obstacle_file import BoxRow
 from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.drone.fleet import MAX_DRONES
@@ -119,15 +120,6 @@ class Repair(Part):
 
     clearance_m: Above0 = CLEARANCE_M
     avoid_wrecks: bool = False
-
-
-class Box(Part):
-    """An obstacle: an axis-aligned box, optionally turned about its vertical axis."""
-
-    center: Annotated[List[float], Field(min_length=3, max_length=3)]  # m
-    size: Annotated[List[Above0], Field(min_length=3, max_length=3)]  # m along x, y, z
-    yaw_deg: float = 0.0
-    material: Literal["brick", "wood", "window", "stone", "concrete"] = "brick"
 
 
 class Pick(Part):
@@ -281,7 +273,7 @@ class Obstacles(Part):
     """Boxes that block or damp the radio, and block flight."""
 
     path: Optional[str] = None  # a file of boxes, beside the experiment
-    boxes: List[Box] = []
+    boxes: List[BoxRow] = []
     radio: Literal["block", "wall"] = "block"
     cut_db: AtLeast0 = 9.0  # wall: per wall crossed (Sommer et al., WONS 2011, as in Veins)
     metre_db: AtLeast0 = 0.4  # wall: per metre inside, the same source

@@ -15,10 +15,10 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import readdressed, receiver, sender
+from drone_mesh.communication.messages import is_data, readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import ALL_NODES
+from drone_mesh.nrf24.medium_access import ALL_NODES, Priority
 from drone_mesh.nrf24.pace import medium_of
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.nrf24.sender import Sender
@@ -137,12 +137,16 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         to = receiver(payload)
         if to > MAX_NODE_ID or to == self._radio.node_id:
             return False
-        return self._sender.offer(to, bytes(payload))
+        return self._sender.offer(to, bytes(payload), _priority_of(payload))
 
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all; each receiver's antenna puts its own id into byte 3."""
         if self._powered and not self._silent and len(payload) == PAYLOAD_BYTES:
-            self._sender.offer(ALL_NODES, readdressed(payload, BROADCAST))
+            packet = readdressed(payload, BROADCAST)
+            self._sender.offer(ALL_NODES, packet, _priority_of(payload))
+
+    def data_room(self) -> int:
+        return self._sender.data_room()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Log one line about the node and the channel every DEBUG_PERIOD_S, or stop doing so."""
@@ -205,3 +209,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         if before == payload and now_s - then_s < DUPLICATE_S:
             self._duplicates += 1
         self._seen[sender(payload)] = (payload, now_s)
+
+
+def _priority_of(payload: bytes) -> Priority:
+    return Priority.DATA if is_data(payload) else Priority.CONTROL

@@ -49,6 +49,7 @@ class AccessRules:
     answer_jitter_s: float  # as does whatever is sent within that time after a broadcast was heard
     lifetime_s: float  # a packet that waited for so long is of no use to anyone
     queue_length: int  # packets that may wait, in all
+    data_queue_length: int  # of these: users' packets
     most_patience: float  # check periods without probes on a busy channel
     busy_at: float  # share of first tries that fail from which on a channel counts as busy
 
@@ -67,12 +68,13 @@ class AccessRules:
             answer_jitter_s=60 * cycle_s,
             lifetime_s=10.0,
             queue_length=300,
+            data_queue_length=60,
             most_patience=2.5,
             busy_at=0.3,
         )
 
     def __post_init__(self) -> None:
-        for name in ("tries", "tries_when_silent", "queue_length"):
+        for name in ("tries", "tries_when_silent", "queue_length", "data_queue_length"):
             if getattr(self, name) < 1:
                 raise ConfigurationError(f"medium access: {name} must be at least 1")
 
@@ -125,6 +127,7 @@ class MediumAccess:
         self._rng = rng
         self._lines: dict[int, deque[Outgoing]] = {}  # by receiver
         self._waiting = 0
+        self._waiting_data = 0
         self._free_s = -math.inf  # the gap after the last packet ends
         self._broadcast_heard_s = -math.inf
         self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
@@ -150,6 +153,8 @@ class MediumAccess:
             return True
         if self._waiting >= self.rules.queue_length:
             return False
+        if priority is Priority.DATA and self.data_room() <= 0:
+            return False
         rules, not_before_s = self.rules, now_s
         if receiver == ALL_NODES:
             not_before_s += self._rng.random() * rules.broadcast_jitter_s
@@ -157,9 +162,18 @@ class MediumAccess:
             not_before_s += self._rng.random() * rules.answer_jitter_s
         if line is None:
             line = self._lines[receiver] = deque()
-        line.append(Outgoing(receiver, payload, priority, now_s, not_before_s))
+        packet = Outgoing(receiver, payload, priority, now_s, not_before_s)
+        if priority is Priority.DATA:
+            self._waiting_data += 1
+            line.append(packet)
+        else:
+            line.insert(_before_untried_data(line), packet)
         self._waiting += 1
         return True
+
+    def data_room(self) -> int:
+        """How many packets of priority DATA it would take now."""
+        return self.rules.data_queue_length - self._waiting_data
 
     def heard(self, sender: int, now_s: float, *, broadcast: bool) -> None:
         """A packet came in."""
@@ -234,7 +248,7 @@ class MediumAccess:
         """Give up all that waits."""
         dropped = [packet for line in self._lines.values() for packet in line]
         self._lines.clear()
-        self._waiting = 0
+        self._waiting = self._waiting_data = 0
         return dropped
 
     def _learn(self, first_try_failed: bool) -> None:
@@ -252,5 +266,14 @@ class MediumAccess:
             return  # all was given up meanwhile
         line.remove(packet)
         self._waiting -= 1
+        self._waiting_data -= packet.priority is Priority.DATA
         if not line:
             del self._lines[packet.receiver]
+
+
+def _before_untried_data(line: deque[Outgoing]) -> int:
+    """The place in a line for a packet of the mesh: before all data that was not tried yet."""
+    place = len(line)
+    while place and line[place - 1].priority is Priority.DATA and not line[place - 1].tries:
+        place -= 1
+    return place

@@ -26,4 +26,5 @@ def medium_of(settings: RadioSettings) -> Medium:
         search_s=800 * cycle_s,
         missing_quiet_s=5.0,
         silence_s=3.0,
+        data_pause_s=4 * cycle_s,
     )

@@ -55,6 +55,11 @@ class Sender:
         self._wake()
         return taken
 
+    def data_room(self) -> int:
+        """How many packets of priority DATA it would take now."""
+        with self._lock:
+            return self._access.data_room()
+
     def heard(self, sender: int, *, broadcast: bool) -> None:
         """A packet of that node came in."""
         with self._lock:

@@ -6,7 +6,6 @@ import contextlib
 import logging
 import signal
 import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from types import FrameType
@@ -27,6 +26,7 @@ from drone_mesh.raspberry.node import MakeInternet, RadioNode, ReadStatus
 from drone_mesh.raspberry.node_status import one_line
 from drone_mesh.raspberry.options import Hardware, Options
 from drone_mesh.raspberry.service_manager import ServiceManager
+from drone_mesh.stopping import StopRequest
 
 LOOK_PERIOD_S = 0.5  # our choice: how often the main thread looks at the nodes
 ALIVE_PERIOD_S = 5.0  # our choice: several times in WatchdogSec of the units
@@ -40,13 +40,13 @@ _log = logging.getLogger(__name__)
 
 def run(program: str, parse: Callable[[], Options]) -> int:
     """Run until a signal ends it; returns the exit status."""
-    with _signals() as ended:
+    with _signals() as request:
         try:
             options = parse()
             logging.basicConfig(
                 format="%(asctime)s %(levelname)s %(message)s", level=options.log_level.upper()
             )
-            _run(options, ended)
+            _run(options, request)
         except MeshError as error:
             print(f"{program}: {error}", file=sys.stderr)
             return 1
@@ -54,23 +54,23 @@ def run(program: str, parse: Callable[[], Options]) -> int:
 
 
 @contextlib.contextmanager
-def _signals() -> Iterator[threading.Event]:
-    """An event that Ctrl-C, TERM or HUP sets; a second signal ends the program at once."""
-    ended = threading.Event()
+def _signals() -> Iterator[StopRequest]:
+    """A request that Ctrl-C, TERM or HUP make; a second signal ends the program at once."""
+    with StopRequest() as request:
 
-    def end(number: int, _frame: FrameType | None) -> None:
-        ended.set()
-        signal.signal(number, signal.SIG_DFL)
+        def end(number: int, _frame: FrameType | None) -> None:
+            request.make()
+            signal.signal(number, signal.SIG_DFL)
 
-    before = {number: signal.signal(number, end) for number in END_SIGNALS}
-    try:
-        yield ended
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        before = {number: signal.signal(number, end) for number in END_SIGNALS}
+        try:
+            yield request
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
-def _run(options: Options, ended: threading.Event) -> None:
+def _run(options: Options, request: StopRequest) -> None:
     with contextlib.ExitStack() as stack:
         fleet = None
         if options.emulated:
@@ -84,7 +84,7 @@ def _run(options: Options, ended: threading.Event) -> None:
         manager = ServiceManager()
         manager.ready()
         watch = _Watch(nodes, options, manager)
-        while not ended.wait(LOOK_PERIOD_S):
+        while not request.wait(LOOK_PERIOD_S):
             watch.look(time.monotonic())
             if fleet is not None:
                 fleet.move_radios()

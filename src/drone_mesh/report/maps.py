@@ -10,7 +10,7 @@ from drone_mesh.report.drawing import figure_with_columns, svg_of
 from drone_mesh.report.story import RunStory
 from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.links import LinkUse, links_by_use, shortest
-from drone_mesh.state.model import MeshStatus, position_is_known
+from drone_mesh.state.model import MeshStatus, footprint, position_is_known
 from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import LIGHT
 
@@ -56,6 +56,8 @@ def _draw_map(axes: Axes, mesh: MeshStatus, title: str) -> None:
         for low, high in shortest(links, list(placed.values()), MOST_LINKS):
             xs, ys = zip(placed[low].position[:2], placed[high].position[:2])
             axes.plot(xs, ys, color=LIGHT.of_link(use), lw=LINK_WIDTH[use], zorder=1)
+    for box in mesh.obstacles:
+        axes.fill(*zip(*footprint(box)), facecolor=LIGHT.obstacle, edgecolor=LIGHT.muted, zorder=0)
     size = 190 if len(placed) <= MOST_WITH_LARGE_DOTS else 45  # points squared
     slots = fan_out(list(placed.values()))
     for node in placed.values():

@@ -13,7 +13,7 @@ class Condition(enum.Enum):
     """What one can expect of a node now. The value is the word that people see."""
 
     CONNECTED = "connected"
-    FLYING = "flying"  # its routes are void until it lands
+    FLYING = "flying"
     DISCONNECTED = "disconnected"  # on, and looking for a gateway
     OFF = "off"
     SILENT = "silent"  # the process that hosts it has stopped reporting: its state is not known

@@ -45,6 +45,25 @@ class NodeStatus:
 
 
 @dataclass(frozen=True)
+class ObstacleStatus:
+    """One box of the world, as Obstacle.msg describes it."""
+
+    center: Sequence[float]  # (3,) m, map frame
+    size: Sequence[float]  # (3,) m, full edges along its own x, y and z
+    yaw: float = 0.0  # rad, turned about its vertical axis
+
+
+def footprint(box: ObstacleStatus) -> list[tuple[float, float]]:
+    """The four corners of a box as seen from above, in metres, counterclockwise."""
+    cos, sin = math.cos(box.yaw), math.sin(box.yaw)
+    half_x, half_y = box.size[0] / 2, box.size[1] / 2
+    return [
+        (box.center[0] + cos * x - sin * y, box.center[1] + sin * x + cos * y)
+        for x, y in ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
+    ]
+
+
+@dataclass(frozen=True)
 class EventRecord:
     """One thing that happened to one node, as MeshEvent.msg describes it."""
 
@@ -67,6 +86,7 @@ class MeshStatus:
     paused: bool = False
     routing: str = ""  # name of the routing technique; empty: not known
     repair_strategy: str = ""  # name of the repair strategy; empty: not known
+    obstacles: Sequence[ObstacleStatus] = ()
 
 
 def position_is_known(node: NodeStatus) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Iterable
+
 import numpy as np
 
+from drone_mesh.air.obstacles import Box
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath, Vector
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.model import NodeStatus
+from drone_mesh.state.model import NodeStatus, ObstacleStatus
 from drone_mesh.state.roster import DroneView
 
 OLDEST_AGE_S = 255  # the largest value of one byte
@@ -49,6 +52,11 @@ def describe_drone(
     x, y, z = centre
     ahead = path_ahead(path, now_s, half_height_m) if path else ()
     return DroneView(node_id, role, (x, y, z - half_height_m), ahead)
+
+
+def describe_obstacles(boxes: Iterable[Box]) -> list[ObstacleStatus]:
+    """These boxes in the terms of a MeshStatus."""
+    return [ObstacleStatus(box.center, box.size, box.yaw_rad) for box in boxes]
 
 
 def path_ahead(path: FlightPath, now_s: float, lower_by_m: float = 0.0) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ class LegendRow(NamedTuple):
 
 
 def legend_of(scene: Scene) -> list[LegendRow]:
-    """Connected gateways and routers, then the other conditions, flight paths and links."""
+    """Connected gateways and routers, other conditions, obstacles, flight paths and links."""
     rows: list[LegendRow] = []
     for role in (Role.GATEWAY, Role.ROUTER):
         connected = sum(
@@ -36,6 +36,9 @@ def legend_of(scene: Scene) -> list[LegendRow]:
         if count and condition is not Condition.CONNECTED:
             colour = LIGHT.of_node(Role.ROUTER, condition)
             rows.append(LegendRow(f"{condition.value} ({count})", colour, NODE_HEIGHT))
+    if scene.obstacles:
+        text = f"obstacle ({len(scene.obstacles)})"
+        rows.append(LegendRow(text, LIGHT.obstacle, NODE_HEIGHT))
     if any(drone.path for drone in scene.drones):
         rows.append(LegendRow("flight path", LIGHT.path, PATH_HEIGHT))
     for use in LinkUse:

@@ -25,6 +25,7 @@ class Palette:
     off: Colour
     silent: Colour
     known: Colour
+    obstacle: Colour
     # of what surrounds them
     page: Colour
     card: Colour
@@ -57,13 +58,13 @@ class Palette:
 
 LIGHT = Palette(
     gateway="#6d3fd1", connected="#08794f", flying="#a85400", disconnected="#c8231a",
-    off="#646b76", silent="#7d6512", known="#b4bfce",
+    off="#646b76", silent="#7d6512", known="#b4bfce", obstacle="#c9beab",
     page="#f3f5f8", card="#ffffff", hover="#eef2f9", line="#dde2e9", grid="#e7ebf1",
     ink="#18212d", muted="#5d6878", accent="#2458d3", accent_ink="#ffffff",
 )  # fmt: skip
 DARK = Palette(
     gateway="#b193ff", connected="#3ecf95", flying="#ffb14a", disconnected="#ff7b72",
-    off="#939aa5", silent="#d9bf6b", known="#3c4859",
+    off="#939aa5", silent="#d9bf6b", known="#3c4859", obstacle="#5c5345",
     page="#0d1116", card="#161b22", hover="#1e2630", line="#2a323d", grid="#1d242e",
     ink="#e4e9f0", muted="#97a2b2", accent="#6b9bff", accent_ink="#0d1116",
 )  # fmt: skip

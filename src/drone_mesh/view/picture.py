@@ -12,6 +12,7 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
+from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.fan import Slot, fan_offset
 from drone_mesh.view.palette import LIGHT, Colour
 
@@ -67,6 +68,7 @@ class Scene:
     drones: Sequence[DronePicture] = ()
     links: Sequence[LinkPicture] = ()
     title: str = ""
+    obstacles: Sequence[ObstacleStatus] = ()
 
     def points(self) -> list[Vector]:
         """Every point that has to be inside the picture."""

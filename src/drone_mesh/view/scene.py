@@ -34,6 +34,7 @@ def scene_of(mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneV
             for link in shortest(links, shown, MOST_LINKS)
         ],
         title=f"{mesh.stamp_s:.1f} s: {summary.text}",
+        obstacles=mesh.obstacles,
     )
 
 

@@ -50,7 +50,7 @@ def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE)
     draw_ground(sketch, scene.drones, scale)
     _draw_links(sketch, scene, scale)
     _draw_paths(sketch, scene.drones, scale)
-    paste_boxes(image, camera, scene.drones, scale)
+    paste_boxes(image, camera, scene.drones, scale, scene.obstacles)
     _draw_ids(sketch, scene.drones, scale)
     if _has_legend(size):
         _draw_legend(sketch, scene)

@@ -110,6 +110,7 @@ class WorldWindow:
         rescaled = not 1 / RESCALE_AT < scale / self._scale < RESCALE_AT
         if rescaled:
             self._scale = scale
+        self._items.show_obstacles(self._scene.obstacles)
         self._items.show(
             self._scene.drones, self._lines(), self._scale, rescaled, self._shows["ids"]
         )

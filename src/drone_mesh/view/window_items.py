@@ -7,7 +7,8 @@ from typing import Sequence, Tuple
 import pybullet
 
 from drone_mesh.drone.flight_path import Vector
-from drone_mesh.view.boxes import add_box
+from drone_mesh.state.model import ObstacleStatus
+from drone_mesh.view.boxes import add_box, add_obstacle
 from drone_mesh.view.camera import Camera
 from drone_mesh.view.palette import LIGHT, Colour, rgb
 from drone_mesh.view.picture import DronePicture
@@ -31,6 +32,7 @@ class WindowItems:
         self._client = client
         self._boxes: dict[int, tuple[int, DronePicture]] = {}
         self._ids: dict[int, _Item] = {}
+        self._obstacles: list[tuple[int, ObstacleStatus]] = []
         self._lines: dict[Line, _Item] = {}
         self._texts: list[_Item] = []
         self._written: object = None
@@ -49,6 +51,14 @@ class WindowItems:
         self._show_lines(lines)
         if busy:
             self._render(True)
+
+    def show_obstacles(self, boxes: Sequence[ObstacleStatus]) -> None:
+        """Show these boxes and no others."""
+        if [box for _, box in self._obstacles] == list(boxes):
+            return
+        for body, _ in self._obstacles:
+            pybullet.removeBody(body, physicsClientId=self._client)
+        self._obstacles = [(add_obstacle(self._client, box), box) for box in boxes]
 
     def write(self, words: Sequence[str], camera: Camera) -> None:
         """Lines of text in the upper left corner; they hang before the camera and move with it."""

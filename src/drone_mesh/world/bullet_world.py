@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pybullet
 
+from drone_mesh.air.obstacles import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.interfaces import World
+from drone_mesh.world.static_box import add_static_box
 
 GRAVITY_M_S2 = -9.81  # along z
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
@@ -40,6 +42,9 @@ class BulletWorld(World):
                 physicsClientId=self.client,
             )
         )
+
+    def add_obstacle(self, box: Box) -> None:
+        add_static_box(self.client, box.center, box.size, box.yaw_rad)
 
     def move_box(self, box: int, centre: Vector) -> None:
         pybullet.resetBasePositionAndOrientation(box, centre, UPRIGHT, physicsClientId=self.client)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from drone_mesh.drone.flight_path import Vector
+from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.world.body import BodyLimits
 from drone_mesh.world.bullet_world import BulletWorld
@@ -25,10 +25,12 @@ class VirtualDrone:
         longitude: float,
         latitude: float,
         wind: Vector | None = None,
+        plan_flight: PlanFlight = FlightPath,
     ) -> None:
         """Stands on the ground at this place (metres, world frame). Call in the world's thread.
 
         With a `wind` (m/s) physics moves it, in a BulletWorld; without one it follows its path.
+        Its flights are those of `plan_flight`.
         """
         half_height_m = self.ROLE.size_m[2] / 2
         centre = (longitude, latitude, half_height_m)
@@ -36,10 +38,12 @@ class VirtualDrone:
         self.engine: DroneEngine
         if wind is not None and isinstance(world, BulletWorld):
             self.box = world.add_body(self.ROLE.size_m, centre, BodyLimits().mass_kg)
-            self.engine = DynamicEngine(world, self.box, centre, half_height_m, wind)
+            self.engine = DynamicEngine(
+                world, self.box, centre, half_height_m, wind, plan_flight=plan_flight
+            )
         else:
             self.box = world.add_box(self.ROLE.size_m, centre)
-            self.engine = DroneEngine(world, self.box, centre, half_height_m)
+            self.engine = DroneEngine(world, self.box, centre, half_height_m, plan_flight)
 
 
 class GatewayDrone(VirtualDrone):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 
-from drone_mesh.drone.flight_path import FlightPath, Vector
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.route import Route
 from drone_mesh.errors import GoalRefused
@@ -13,7 +13,6 @@ from drone_mesh.world.body import GRAVITY_M_S2, BodyLimits, controller_force, dr
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.engine import DroneEngine
 
-SPEED_M_S = 2.0  # of the target that leads it
 ARRIVED_M = 0.15
 STANDS_M_S = 0.1
 ON_GROUND_M = 0.02  # of its underside
@@ -37,9 +36,10 @@ class DynamicEngine(DroneEngine):
         half_height_m: float,
         wind: Vector = (0.0, 0.0, 0.0),
         limits: BodyLimits = BodyLimits(),  # noqa: B008 (frozen)
+        plan_flight: PlanFlight = FlightPath,
     ) -> None:
         """`box` is a body with a mass; `wind` blows everywhere, m/s."""
-        super().__init__(world, box, centre, half_height_m)
+        super().__init__(world, box, centre, half_height_m, plan_flight)
         self._physics = world
         self._wind = wind
         self._limits = limits
@@ -104,10 +104,15 @@ class DynamicEngine(DroneEngine):
         here = Location.from_vector(position)
         if self.why_not_fly() or goal.distance_m(self._hover or here) <= ARRIVED_M:
             return
-        climb_m = here.distance_m(goal) / 2  # as docs/protocol.md, "World and flights"
-        self._route = Route(here, goal, here.height + climb_m, lands=False, speed_m_s=SPEED_M_S)
+        path = self._plan(position, goal.to_vector(), now_s)
+        if path is None:
+            _log.warning("box %d stays: obstacles leave no way to %s", self._box, goal.in_words())
+            return
+        # As high as the flight that a kinematic drone would make.
+        across_m = max(path.above_start[2], path.above_goal[2])
+        self._route = Route(here, goal, across_m, lands=False, speed_m_s=SPEED_M_S)
         self._hover = None
-        self._tell(position, FlightPath(position, goal.to_vector(), now_s), now_s)
+        self._tell(position, path, now_s)
 
     def _fly(self, position: Vector, passed_s: float) -> None:
         self._use_battery(position, passed_s)

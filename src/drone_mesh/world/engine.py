@@ -6,9 +6,10 @@ import logging
 from collections import deque
 from typing import Callable, NamedTuple
 
-from drone_mesh.drone.flight_path import FlightPath, Vector
+from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import GoalRefused
 from drone_mesh.world.interfaces import World
 
 ARRIVED_M = 0.01  # on each axis
@@ -40,11 +41,22 @@ class DroneEngine(IDroneEngine):
     of the last one.
     """
 
-    def __init__(self, world: World, box: int, centre: Vector, half_height_m: float) -> None:
-        """`box` is the drone's body in `world`, `centre` where that is now."""
+    def __init__(
+        self,
+        world: World,
+        box: int,
+        centre: Vector,
+        half_height_m: float,
+        plan_flight: PlanFlight = FlightPath,
+    ) -> None:
+        """`box` is the drone's body in `world`, `centre` where that is now.
+
+        `plan_flight` is asked for every flight, of the body's centre.
+        """
         self._world = world
         self._box = box
         self._half_height_m = half_height_m
+        self._plan_flight = plan_flight
         self._goals: deque[Vector] = deque()  # filled by any thread, emptied by the world's
         self._followed: Vector | None = None  # set by any thread, taken by the world's
         self._listeners: list[StateListener] = []
@@ -71,11 +83,16 @@ class DroneEngine(IDroneEngine):
         """Fly to this place (metres, world frame, height of the underside). Returns at once.
 
         The goal it already flies to, or already stands on, changes nothing; any other one replans
-        the flight from where the drone is. Raises GoalRefused for NaN, infinity and places out of
-        bounds.
+        the flight from where the drone is. Raises GoalRefused for NaN, infinity, places out of
+        bounds, and where obstacles leave no way.
         """
         check_goal(latitude, longitude, height)
-        self._goals.append(Location(latitude, longitude, height + self._half_height_m).to_vector())
+        goal = Location(latitude, longitude, height + self._half_height_m).to_vector()
+        if self._plan(self._state.position, goal, self._world.now_s) is None:
+            raise GoalRefused(
+                f"obstacles leave no way to x {longitude:g} m, y {latitude:g} m, z {height:g} m"
+            )
+        self._goals.append(goal)
         self._world.wake(self)
 
     def follow(self, centre: Vector) -> None:
@@ -118,8 +135,15 @@ class DroneEngine(IDroneEngine):
         position, path, _ = self._state
         if _is_close(goal, position if path is None else path.goal):
             return
-        self._state = DroneState(position, FlightPath(position, goal, now_s), now_s)
+        path = self._plan(position, goal, now_s)
+        if path is None:  # it has moved since the goal was accepted
+            _log.warning("box %d stays: obstacles leave no way to %s", self._box, goal)
+            return
+        self._state = DroneState(position, path, now_s)
         _log.debug("box %d flies from %s to %s", self._box, position, goal)
+
+    def _plan(self, start: Vector, goal: Vector, now_s: float) -> FlightPath | None:
+        return self._plan_flight(start, goal, now_s, SPEED_M_S)
 
 
 def _is_close(place: Vector, other: Vector) -> bool:

@@ -6,6 +6,7 @@ import abc
 from collections import deque
 from typing import Protocol, TypeVar
 
+from drone_mesh.air.obstacles import Box
 from drone_mesh.drone.flight_path import Vector
 
 _AnyWorld = TypeVar("_AnyWorld", bound="World")
@@ -59,6 +60,10 @@ class World(abc.ABC):
     @abc.abstractmethod
     def add_box(self, size: Vector, centre: Vector) -> int:
         """A box (full edge lengths in metres) that stays where it is put; returns its handle."""
+
+    @abc.abstractmethod
+    def add_obstacle(self, box: Box) -> None:
+        """A box that stands where it is, turned about its vertical axis, and that bodies hit."""
 
     @abc.abstractmethod
     def move_box(self, box: int, centre: Vector) -> None:

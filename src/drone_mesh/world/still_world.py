@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drone_mesh.air.obstacles import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.world.interfaces import World
 
@@ -16,6 +17,9 @@ class StillWorld(World):
     def add_box(self, size: Vector, centre: Vector) -> int:
         self.centres.append(centre)
         return len(self.centres) - 1
+
+    def add_obstacle(self, box: Box) -> None:
+        """Nothing can hit it."""
 
     def move_box(self, box: int, centre: Vector) -> None:
         self.centres[box] = centre

@@ -9,6 +9,8 @@ import pytest
 
 from drone_mesh.bench.processes import ProcessUse, Use, cores_between, family, name_of, take_use
 
+pytestmark = pytest.mark.slow
+
 BUSY = "x = bytearray(40_000_000)\nprint('up', flush=True)\nwhile True: pass"
 IDLE = "print('up', flush=True)\nimport sys; sys.stdin.read()"
 

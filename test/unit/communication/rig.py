@@ -10,6 +10,7 @@ import random
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.medium import UNDISTURBED
 from drone_mesh.communication.router import MeshnetworkRouter
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import LocationUnknown
@@ -28,6 +29,8 @@ class RecordingAntenna(IWirelessCommunication):
 
     `gets_lost(payload)` says so of single packets.
     """
+
+    medium = UNDISTURBED
 
     def __init__(self):
         self.taken = []

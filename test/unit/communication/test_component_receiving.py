@@ -190,8 +190,8 @@ def test_when_the_next_hop_does_not_take_it_one_other_route_is_tried():
     rig.hear("09 03 00 01 01")
     rig.routing.other_can_communicate_with_node(4, 9)
     rig.antenna.dead = {3}
-    rig.hear("05 02 80 01 09")
-    assert rig.tried(0x80) == [packet("05 01 80 03 09")] * 3 + [packet("05 01 80 04 09")]
+    rig.hear("05 02 7f 01 09")
+    assert rig.tried(0x7F) == [packet("05 01 7f 03 09")] * 3 + [packet("05 01 7f 04 09")]
     assert rig.routing.get_direction_to_node(9) == 4
 
 
@@ -199,9 +199,9 @@ def test_after_two_routes_that_do_not_take_it_it_is_dropped():
     rig = Rig()
     for child in (3, 4, 6):
         rig.routing.other_can_communicate_with_node(child, 9)
-    rig.antenna.gets_lost = lambda payload: payload[2] == 0x80 and payload[3] in (3, 4)
-    rig.hear("05 02 80 01 09")
-    assert rig.tried(0x80) == [packet("05 01 80 03 09")] * 3 + [packet("05 01 80 04 09")] * 3
+    rig.antenna.gets_lost = lambda payload: payload[2] == 0x7F and payload[3] in (3, 4)
+    rig.hear("05 02 7f 01 09")
+    assert rig.tried(0x7F) == [packet("05 01 7f 03 09")] * 3 + [packet("05 01 7f 04 09")] * 3
     assert rig.routing.get_direction_to_node(9) == 6
 
 

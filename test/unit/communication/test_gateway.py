@@ -101,11 +101,11 @@ def test_a_gateway_forwards_like_any_node():
 # Orders --------------------------------------------------------------------------------------
 
 
-def test_an_order_goes_to_the_next_hop():
+def test_an_order_goes_to_the_next_hop_with_its_number():
     rig = gateway_rig()
     rig.hear("05 02 00 01 01")
     assert rig.mesh.send_goal_request_to_drone(5, 1.5, -2.0, 7, rig.now_s)
-    assert rig.sent() == [packet("01 01 06 02 05 00 00 c0 3f 00 00 00 c0 07 00")]
+    assert rig.sent() == [packet("01 01 06 02 05 00 00 c0 3f 00 00 00 c0 07 00 01 00")]
 
 
 def test_an_order_goes_over_another_route_when_the_first_does_not_take_it():
@@ -114,7 +114,7 @@ def test_an_order_goes_over_another_route_when_the_first_does_not_take_it():
         rig.routing.other_can_communicate_with_node(child, 5)
     rig.antenna.dead = {2}
     assert rig.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, rig.now_s)
-    assert rig.sent(6) == [packet("01 01 06 03 05")]
+    assert rig.sent(6) == [packet("01 01 06 03 05 00 00 00 00 00 00 00 00 00 00 01 00")]
 
 
 def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(caplog):

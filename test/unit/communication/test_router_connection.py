@@ -6,8 +6,9 @@ import pytest
 from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.medium import Medium
 
-HEARTBEAT, PRESENT, REQUEST = 4, 3, 2
+HEARTBEAT, PRESENT, REQUEST, MISSING = 4, 3, 2, 5
 ANSWER = "00 00 04 01 01 01 00 00"  # of gateway 0, a neighbour
 INTRODUCTION_1_HOP = "01 01 03 fe fe 01 01"
 
@@ -379,6 +380,14 @@ def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
+def test_a_neighbour_that_had_to_take_a_longer_way_since_is_no_shortcut():
+    rig = Rig()
+    rig.connect_through(2, hops=4)
+    rig.hear("03 03 03 01 fe 02 01", "03 03 03 01 fe 06 01")
+    rig.mesh.send_heartbeat(0)
+    assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
+
+
 def test_only_a_neighbour_can_be_a_shortcut():
     """A neighbour that relays an introduction, or returns our own, is not a shortcut."""
     for creator in ("05", "01"):
@@ -507,3 +516,30 @@ def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
 
 def test_a_router_that_was_never_connected_knows_no_way_to_a_gateway():
     assert Rig().mesh.get_route_to_gateway() == NO_ROUTE
+
+
+# A shared channel ----------------------------------------------------------------------------
+
+
+def shared_rig():
+    rig = Rig()
+    rig.antenna.medium = Medium(shared=True, answer_s=1.0, heartbeats=3, missing_quiet_s=5.0)
+    return rig
+
+
+def test_a_packet_that_would_go_straight_back_concerns_only_the_neighbour_that_sent_it():
+    """For all others the route through this node still works."""
+    rig = shared_rig()
+    rig.know_neighbour(3)
+    rig.connect_through(2)
+    rig.hear("09 02 04 01 00 01 00 00")
+    assert rig.sent(MISSING) == [packet("01 01 05 02 02 00")]
+    assert rig.broadcasts() == []
+
+
+def test_a_router_whose_only_route_is_gone_asks_around_at_once():
+    rig = shared_rig()
+    rig.connect_through(2)
+    rig.hear("02 02 05 01 01 00")
+    assert not rig.mesh.get_connected_to_gateway()
+    assert packet("01 01 03 fe fe 02 00") in rig.broadcasts()

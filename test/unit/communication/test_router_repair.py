@@ -121,6 +121,50 @@ def test_an_ordered_flight_keeps_the_routes_until_the_landing():
     assert rig.mesh.get_neighbours() == {}
 
 
+def test_a_flight_of_a_quarter_of_the_range_keeps_the_connection_and_the_routes():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear(NEIGHBOUR_2_AT_0_8, "00 02 06 01 01 00 00 10 40")  # latitude 2.25
+    assert rig.mesh.get_connected_to_gateway()
+    fly(rig, Location(1.0, 0.0, 0.0))
+    fly(rig, Location(2.25, 0.0, 0.0))
+    assert "LANDED" in rig.kinds()
+    assert rig.mesh.get_hops_from_gateway_away() == 2
+    assert rig.mesh.get_last_good_known_location_id() == 2
+    assert rig.routing.get_direction_to_node(0) == 2
+
+
+def test_after_a_short_flight_it_looks_for_others_and_loses_whom_it_left_behind():
+    rig = Rig()
+    rig.know_neighbour(3)
+    rig.connect_through(2)
+    rig.hear("00 02 06 01 01 00 00 00 40")  # latitude 2
+    rig.antenna.dead = {3}
+    fly(rig, Location(1.9, 0.0, 0.0))
+    fly(rig, Location(2.0, 0.0, 0.0))
+    assert rig.broadcasts() == [packet("01 01 03 fe fe 02 01")]
+    assert rig.routing.get_set_of_children() == {2}
+    assert rig.sent(MISSING) == [packet("01 01 05 02 02 03")]
+
+
+def test_several_orders_in_one_flight_count_from_where_it_began():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.hear("00 02 06 01 01 00 00 00 40")  # latitude 2
+    fly(rig, Location(1.9, 0.0, 0.0))
+    assert rig.mesh.get_connected_to_gateway()
+    rig.hear("00 02 06 01 01 00 00 80 40")  # latitude 4
+    assert not rig.mesh.get_connected_to_gateway()
+
+
+def test_a_router_without_a_gateway_forgets_its_routes_after_a_short_flight_too():
+    rig = Rig()
+    rig.know_neighbour(2)
+    rig.hear("02 02 06 01 01 00 00 00 40")
+    fly(rig, Location(2.0, 0.0, 0.0))
+    assert rig.routing.empty()
+
+
 def test_it_has_landed_within_a_tenth_of_a_metre_of_the_goal_and_then_introduces_itself():
     rig = Rig()
     rig.connect_through(2)
@@ -945,6 +989,15 @@ def test_a_next_hop_passes_on_where_the_gateway_is():
     rig.hear("09 09 02 01 01")
     (answer,) = rig.sent(LOCATION)
     assert answer[19:] == bytes.fromhex("0b 00 00 00 00 80 40").ljust(13, b"\0")
+
+
+def test_a_router_learns_where_the_gateway_is_from_an_answer_that_it_forwards():
+    rig = Rig()
+    rig.connect_through(2)
+    rig.know_neighbour(5)
+    rig.hear("00 02 01 01 05 00 00 80 40", "07 02 01 01 05 00 00 00 41")
+    assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
+    assert [payload[4] for payload in rig.sent(LOCATION)] == [5, 5]
 
 
 def test_news_of_the_gateway_that_are_older_change_nothing():

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 from drone_mesh.console.frames import EVENTS_PER_FRAME, FrameStore
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.links import JUST_LOST_S
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, ObstacleStatus
 
 
 def mesh(stamp_s: float = 1.0, **router: object) -> MeshStatus:
@@ -47,6 +48,18 @@ def test_a_page_that_is_up_to_date_gets_only_what_changed():
     assert not delta["full"]
     assert delta["nodes"] == {"1": {"hops": 2}}
     assert delta["clock"]["t"] == 1.2
+
+
+def test_obstacles_are_sent_once_and_to_every_new_page():
+    store = FrameStore()
+    box = ObstacleStatus((5.0, 1.0, 2.0), (2.0, 4.0, 4.0), math.pi / 2)
+    store.update_mesh(replace(mesh(), obstacles=[box]), wall_s=0.0)
+    known = store.version
+    store.update_mesh(replace(mesh(1.2), obstacles=[box]), wall_s=0.2)
+    assert "obstacles" not in frame(store, known)
+    (shown,) = frame(store, 0)["obstacles"]
+    assert sorted(shown["corners"]) == [[3.0, 0.0], [3.0, 2.0], [7.0, 0.0], [7.0, 2.0]]
+    assert shown["top"] == 4.0
 
 
 def test_a_page_that_fell_behind_gets_the_newest_of_all_it_missed():
@@ -195,3 +208,11 @@ def test_nodes_at_one_position_come_with_their_slots():
     store.update_mesh(MeshStatus(1.0, [*nodes, NodeStatus(3)]), wall_s=0.0)
     slots = {node: fields["slot"] for node, fields in frame(store, 0)["nodes"].items()}
     assert slots == {"1": [0, 2], "2": [1, 2], "3": None}
+
+
+def test_the_latest_order_of_a_drone_is_shown_with_it():
+    store = FrameStore()
+    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7")])
+    store.update_mesh(mesh(), wall_s=0.0)
+    assert frame(store, 0)["nodes"]["1"]["order"] == "under way"
+    assert frame(store, 0)["nodes"]["0"]["order"] == ""

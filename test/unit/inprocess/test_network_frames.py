@@ -7,12 +7,12 @@ import logging
 import pytest
 from scenarios import line
 
-from drone_mesh.communication.frames import CommonFrame
+from drone_mesh.communication.frames import TYPES_WITH_PLACES, CommonFrame
 from drone_mesh.communication.messages import IntroduceMessage, frame_digest, with_frame_digest
 from drone_mesh.inprocess.drone import InProcessDrone
 
 ONE, OTHER = 0x1234, 0x4321
-LOCATION, HEARTBEAT, MOVE_TO_LOCATION = 1, 4, 6
+LOCATION, MOVE_TO_LOCATION = 1, 6
 
 
 @pytest.fixture
@@ -76,6 +76,8 @@ def test_a_place_is_taken_only_from_a_neighbour_with_the_same_origin(own, heard,
     if heard is not None:
         present = IntroduceMessage(2, 2, 254, 254, 3, True).to_payload()
         frame.heard(2, with_frame_digest(present, heard))
-    for kind in (LOCATION, MOVE_TO_LOCATION):
-        assert frame.refuses(2, kind) is refused
-    assert not frame.refuses(2, HEARTBEAT)
+    assert frame.refuses(2) is refused
+
+
+def test_two_types_of_packets_carry_places():
+    assert {LOCATION, MOVE_TO_LOCATION} == TYPES_WITH_PLACES

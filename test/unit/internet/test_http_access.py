@@ -119,6 +119,7 @@ def test_a_body_that_is_too_large_or_of_unknown_size_is_refused(
     assert mesh.sent() == sent
 
 
+@pytest.mark.slow
 def test_a_body_that_is_announced_as_huge_is_refused_before_it_comes(mesh):
     with socket.create_connection(("127.0.0.1", mesh.internet.port), timeout=20.0) as connection:
         head = f"POST {ORDER} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {10**19}\r\n\r\n"

@@ -38,6 +38,8 @@ def test_the_description_names_all_operations_and_what_may_come_back(mesh):
     assert answers == {
         ("get", "/ready"): sorted(always),
         ("get", "/nodes"): sorted(always),
+        ("get", "/orders"): sorted(always),
+        ("get", "/orders/{id}"): sorted(always | {"404", "422"}),
         ("post", "/drones/{id}/goal"): sorted(always | {"409", "422"}),
         ("post", "/DroneMovement/{id}/{latitude}/{longitude}/{height}"): sorted(always | {"422"}),
     }

@@ -17,6 +17,8 @@ import pytest
 from drone_mesh.communication.interfaces import IGatewayCommands
 from drone_mesh.internet.http_internet import HttpInternet
 
+pytestmark = pytest.mark.slow
+
 PATIENCE_S = 20.0  # for threads; nothing here takes a tenth of it
 
 

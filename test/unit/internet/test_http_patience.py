@@ -16,6 +16,8 @@ from drone_mesh.internet.http_internet import HttpInternet
 from drone_mesh.web import prompt_protocol
 from drone_mesh.web.tls import Certificate
 
+pytestmark = pytest.mark.slow
+
 TOKEN = "0123456789abcdef0123"
 GET = b"GET /ready HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 

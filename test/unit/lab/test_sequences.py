@@ -19,7 +19,7 @@ def test_no_sequence_ends_with_stacked_drones_or_a_needless_flight_or_a_node_giv
 
 def test_a_drone_that_knows_where_the_gateway_moved_flies_though_another_sought_it_elsewhere():
     moved = run_sequence(7027)
-    assert (moved.incidents, moved.unhealed, moved.stacked) == ("gateway moved", 0, 0)
+    assert (moved.incidents, moved.unexplained, moved.stacked) == ("gateway moved", 0, 0)
 
 
 def test_the_same_seed_gives_the_same_outcome():

@@ -22,6 +22,8 @@ from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.raspberry import program
 from drone_mesh.raspberry.options import parse_gateway, parse_router
 
+pytestmark = pytest.mark.slow
+
 PATIENCE_S = 20.0  # for threads; nothing here takes a tenth of it
 
 

@@ -18,6 +18,8 @@ from pathlib import Path
 import httpx
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0  # until all are connected; on an idle machine it takes 3 s
 END_WITHIN_S = 5.0

@@ -24,6 +24,8 @@ from drone_mesh.raspberry.program import without_internet
 from drone_mesh.raspberry.service_manager import ServiceManager
 from drone_mesh.raspberry.status_command import main
 
+pytestmark = pytest.mark.slow
+
 PATIENCE_S = 60.0
 
 

@@ -13,6 +13,7 @@ from PIL import Image
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
+from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.camera import Camera, Margins, frame
 from drone_mesh.view.palette import LIGHT, rgb
 from drone_mesh.view.picture import (
@@ -66,6 +67,15 @@ def share_of_colour(pixels, colour, place, radius):
     strength = np.linalg.norm(hues, axis=1)
     likeness = hues @ wanted / (np.maximum(strength, 1) * np.linalg.norm(wanted))
     return float(np.mean((likeness > 0.95) & (strength > 8)))
+
+
+def test_an_obstacle_is_shown_and_dims_the_drone_behind_it(shoot):
+    front = ObstacleStatus((0.0, -1.0, 1.0), (1.0, 0.5, 2.0))
+    behind = DronePicture(1, Role.ROUTER, (0.0, 0.0, 0.0))
+    free, hidden = shoot([behind]), shoot([behind], obstacles=[front])
+    x, y = map(int, camera_of([behind]).project([behind.centre()])[0])
+    assert hidden[y, x, 0] > free[y, x, 0] + 60  # the sandy box, where only the green drone was
+    assert hidden[y, x, 1] > hidden[y, x, 0] + 10  # which still shines through
 
 
 def test_a_picture_has_the_size_that_was_asked_for(shoot):

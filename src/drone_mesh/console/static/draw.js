@@ -19,6 +19,7 @@ export function readColours() {
     "disconnected",
     "off",
     "silent",
+    "obstacle",
     "known-link",
     "lost-link",
     "route-link",
@@ -65,6 +66,7 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
   context.clearRect(0, 0, camera.width, camera.height);
   context.lineCap = "round";
   drawGrid(context, camera, colours, options.covered);
+  for (const box of mesh.obstacles) drawObstacle(context, camera, box, colours);
   const selected = mesh.nodes.get(mesh.selected);
   if (options.ranges)
     for (const node of mesh.nodes.values()) drawRange(context, camera, mesh, node, colours, 0.35);
@@ -161,6 +163,26 @@ function drawGrid(context, camera, colours, { top, bottom }) {
       context.fillText(metres(y, step), camera.width - 8, py - 4);
   }
   context.stroke();
+}
+
+/** A box from above, with the height of its top where there is room for it. */
+function drawObstacle(context, camera, box, colours) {
+  const corners = box.corners.map(([x, y]) => camera.toScreen(x, y));
+  context.beginPath();
+  for (const corner of corners) context.lineTo(...corner);
+  context.closePath();
+  context.fillStyle = colours.obstacle;
+  context.fill();
+  context.strokeStyle = colours.muted;
+  context.lineWidth = 1;
+  context.stroke();
+  const middle = (axis) => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length;
+  const wide = Math.hypot(corners[1][0] - corners[0][0], corners[1][1] - corners[0][1]);
+  if (wide < 44) return;
+  context.fillStyle = colours.ink;
+  context.font = "11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.fillText(`${Math.round(box.top)} m`, middle(0), middle(1) + 4);
 }
 
 function metres(value, step) {

@@ -15,6 +15,9 @@ const TONE = {
   "flight decided": "flight",
   "flight ordered": "flight",
   landed: "flight",
+  "order refused": "bad",
+  "order given up": "bad",
+  "order arrived": "good",
 };
 const PEERS_SHOWN = 12;
 

@@ -17,6 +17,7 @@ export class MapView {
     this.top = card.querySelector("#map-top");
     this.note = card.querySelector("#map-note");
     this.legend = card.querySelector(".legend");
+    this.legendObstacle = card.querySelector("#legend-obstacle");
     this.fly = fly;
     this.camera = new Camera();
     this.options = { known: true, ranges: false };
@@ -115,6 +116,7 @@ export class MapView {
     const text = `${drawn.drones} drones, ${drawn.links} links${left}, ${drawn.routeLinks} on routes to a gateway`;
     if (this.note.textContent !== text) this.note.textContent = text;
     const { x, y, scale } = this.camera;
+    this.legendObstacle.hidden = !this.mesh.obstacles.length;
     Object.assign(this.note.dataset, drawn, { x, y, scale });
   }
 

@@ -24,6 +24,7 @@ export class Mesh extends EventTarget {
     this.layouts = [];
     this.limits = { coordinate: Infinity, height: Infinity }; // of goals, m
     this.nodes = new Map(); // id -> node
+    this.obstacles = []; // {corners: [[x, y]], top}, m
     this.links = { known: [], lost: [], route: [] }; // use -> [[id, higher id]]
     this.events = [];
     this.samples = [];
@@ -37,6 +38,7 @@ export class Mesh extends EventTarget {
       this.events = [];
       this.samples = [];
     }
+    if (frame.full || frame.obstacles) this.obstacles = frame.obstacles ?? [];
     this.clock = frame.clock;
     this.link = frame.link;
     const changed = new Set();

@@ -42,6 +42,7 @@ export class NodePanel {
   #facts(node) {
     const facts = [
       ...(node.repair ? [["Repair", node.repair, { wide: true }]] : []),
+      ...(node.order ? [["Latest order", node.order, { wide: true }]] : []),
       [node.condition === "connected" ? "Gateway" : "Last gateway", orDash(node.gateway)],
       ["Hops", orDash(node.hops)],
       [

@@ -8,7 +8,7 @@ import rospy
 
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.interfaces import Location
-from drone_mesh.msg import DroneInfo, MeshState, NodeState, RequestGatewayDroneFlight
+from drone_mesh.msg import DroneInfo, MeshState, NodeState, Obstacle, RequestGatewayDroneFlight
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg
 from drone_mesh.ros.graph import names
@@ -105,6 +105,7 @@ def state_msg(mesh: MeshStatus) -> MeshState:
         routing=mesh.routing,
         repair_strategy=mesh.repair_strategy,
         nodes=[node if isinstance(node, NodeState) else _node_msg(node) for node in mesh.nodes],
+        obstacles=[Obstacle(box.center, box.size, box.yaw) for box in mesh.obstacles],
     )
     message.header.stamp = ros_time(mesh.stamp_s)
     message.header.frame_id = names.MAP_FRAME
@@ -128,6 +129,7 @@ def mesh_status(message: MeshState) -> MeshStatus:
         message.paused,
         getattr(message, "routing", ""),
         getattr(message, "repair_strategy", ""),
+        getattr(message, "obstacles", ()),
     )
 
 

@@ -61,6 +61,16 @@ def power_switch(node_id: int) -> str:
     return f"/Nodes/{node_id}/powerSwitch"
 
 
+def send_service(node_id: int) -> str:
+    """SendData: people -> node."""
+    return f"/Nodes/{node_id}/send"
+
+
+def received_topic(node_id: int) -> str:
+    """ReceivedData: node -> people."""
+    return f"/Nodes/{node_id}/received"
+
+
 def goal_topic(node_id: int) -> str:
     """Location: connector -> engine."""
     return f"/Drones/{node_id}/goal"

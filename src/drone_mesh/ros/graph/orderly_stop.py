@@ -10,6 +10,8 @@ from types import FrameType
 
 import rospy
 
+from drone_mesh.stopping import StopRequest
+
 FINISH_TIMEOUT_S = 3.0  # our choice: `rosnode kill` waits this long (wall) for our threads
 
 
@@ -26,7 +28,7 @@ class OrderlyStop:
     """
 
     def __init__(self) -> None:
-        self._requested = threading.Event()
+        self._request = StopRequest()  # its pipe is open to the end of the program
         self._finished = threading.Event()
         self._failed = False
 
@@ -46,20 +48,20 @@ class OrderlyStop:
         """Log this error, leave, and exit with code 1. Any thread."""
         _log.error("%s", why)
         self._failed = True
-        self._requested.set()
+        self._request.make()
 
     def requested(self) -> bool:
         """Whether it is time to leave. Any thread."""
-        return self._requested.is_set()
+        return self._request.is_made()
 
     def wait(self, timeout_s: float) -> bool:
         """Return when it is time to leave (True), or after so many wall seconds (False)."""
-        return self._requested.wait(timeout_s)
+        return self._request.wait(timeout_s)
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        self._requested.set()
+        self._request.make()
 
     def _on_shutdown(self) -> None:
         """In the thread of rospy that shuts the node down, before its topics are closed."""
-        self._requested.set()
+        self._request.make()
         self._finished.wait(FINISH_TIMEOUT_S)

@@ -9,6 +9,8 @@ from typing import Callable, TypeVar
 import rospkg
 import rospy
 
+from drone_mesh.air.obstacle_file import read_obstacles
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.layouts import Layouts
@@ -33,6 +35,18 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
     """
     given = {key: rospy.get_param(f"~{key}", "") for key in keys}
     return load_configuration(file_parameter("config", "factory.yaml"), given)
+
+
+def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | None:
+    """The boxes that the configuration names; None: none. Raises ConfigurationError."""
+    path = configuration.obstacles
+    if not path:
+        return None
+    if not Path(path).expanduser().is_absolute():  # roslaunch starts nodes in a folder of its own
+        raise ConfigurationError(
+            f"invalid obstacles {path!r}: expected an absolute path, such as $PWD/{path}"
+        )
+    return read_obstacles(Path(path).expanduser(), configuration.obstacle_radio == "block")
 
 
 def manager_layouts() -> Layouts:

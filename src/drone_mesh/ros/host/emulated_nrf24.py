@@ -59,6 +59,9 @@ class EmulatedNRF24(IWirelessCommunication):
     def channel_use(self) -> ChannelUse:
         return self._antenna.channel_use()
 
+    def data_room(self) -> int:
+        return self._antenna.data_room()
+
     def statistics(self) -> RadioStatistics:
         """The counters of the radio."""
         return self._antenna.statistics()

@@ -14,6 +14,7 @@ from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.host.internet_mock import RosInternetMock
 from drone_mesh.ros.host.mesh_settings import MeshSettings
+from drone_mesh.ros.host.users_of_node import UsersOfNode
 
 
 class VirtualRaspberryPi(abc.ABC):
@@ -31,6 +32,7 @@ class VirtualRaspberryPi(abc.ABC):
         self.engine = RosDroneEngineConnector(node_id)
         self.antenna = antenna
         self.seat = seat
+        self._users = UsersOfNode(node_id, seat)
         self.component = assemble_component(
             node_id,
             antenna,
@@ -48,11 +50,13 @@ class VirtualRaspberryPi(abc.ABC):
     def start(self, now_s: float) -> None:
         """Switch on."""
         self.engine.connect()
+        self._users.start(self.component.data)
         self.component.start(now_s)
         self.seat.take(self.component)
 
     def stop(self, _now_s: float) -> None:
         """Switch off."""
+        self._users.stop()
         self.component.stop()
 
     @abc.abstractmethod

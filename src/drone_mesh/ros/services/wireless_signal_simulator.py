@@ -11,7 +11,7 @@ import threading
 import rospy
 
 from drone_mesh.air.node import AirError
-from drone_mesh.air.node_table import NodeTable
+from drone_mesh.air.node_table import NodeTable, Sees
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
@@ -20,7 +20,7 @@ from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.figures import Figures
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.parameters import factory_configuration, or_stop
+from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_stop
 from drone_mesh.ros.services.antenna_topic import AntennaTopic
 from drone_mesh.srv import (
     AreaScan,
@@ -44,7 +44,8 @@ _log = logging.getLogger(__name__)
 class WirelessSignalSimulator:
     """The simulated air: knows the position of each antenna and delivers packets within range.
 
-    Parameters (private): ~max_distance (float, metres), overriding the YAML file in ~config
+    Parameters (private): ~max_distance (float, metres), ~obstacles (the path of a file of boxes)
+                and ~obstacle_radio (block or wall), overriding the YAML file in ~config
                 (config/factory.yaml by default)
     Subscribes: /WirelessSignalSimulator (DroneInfo)
     Publishes:  the topic in each antenna's DroneInfo, usually /Node/<id> (NRF24)
@@ -54,12 +55,13 @@ class WirelessSignalSimulator:
     Figures:    delivered, lost in range, on /diagnostics
     """
 
-    # The handlers run in the threads of rospy's connections. `_lock` guards the node table and the
-    # counts, and is never held during a send; `_opening` guards the set of topics.
+    # The handlers run in the threads of rospy's connections. `_lock` guards the node table, the
+    # rays that it casts and the counts, and is never held during a send; `_opening` guards the set
+    # of topics.
 
-    def __init__(self, max_distance_m: float) -> None:
-        """Raises AirError for an invalid distance."""
-        self._nodes = NodeTable(max_distance_m)
+    def __init__(self, max_distance_m: float, sees: Sees = None) -> None:
+        """`sees` as for NodeTable. Raises AirError for an invalid distance."""
+        self._nodes = NodeTable(max_distance_m, sees)
         self._lock = threading.Lock()
         self._opening = threading.Lock()
         self._antenna_topics: dict[str, AntennaTopic] = {}
@@ -187,9 +189,21 @@ def main() -> None:
     """Run the node."""
     prepare_node(WirelessSignalSimulator.__doc__)
     rospy.init_node("WirelessSignalSimulator")
-    max_distance_m = or_stop(lambda: factory_configuration("max_distance")).max_distance
+    configuration = or_stop(
+        lambda: factory_configuration("max_distance", "obstacles", "obstacle_radio")
+    )
+    obstacles = or_stop(lambda: configured_obstacles(configuration))
     show_library_logs_on_rosout()
-    WirelessSignalSimulator(max_distance_m)
+    max_distance_m = configuration.max_distance
+    sees = None
+    if obstacles is not None and obstacles.boxes:
+        # Only here: without obstacles this node needs no physics.
+        from drone_mesh.world.ray_links import RayLinks
+
+        sees = RayLinks(obstacles, max_distance_m).sees
+        verb = "block" if obstacles.blocks else "damp"
+        _log.info("%d obstacles %s the radio", len(obstacles.boxes), verb)
+    WirelessSignalSimulator(max_distance_m, sees)
     _log.info("nodes closer than %g m hear each other", max_distance_m)
     MasterWatch().start()
     rospy.spin()

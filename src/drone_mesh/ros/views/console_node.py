@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import secrets
 import socket
-import threading
 import time
 from functools import partial
 
@@ -24,6 +23,7 @@ from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import manager_layouts
 from drone_mesh.ros.views.console_controls import RosControls
+from drone_mesh.stopping import StopRequest
 from drone_mesh.web.access import access_for, is_loopback
 
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
@@ -51,9 +51,9 @@ class MeshFeed:
         self._run_id: str | None = None
         self._subscribers: list[rospy.Subscriber] = []
 
-    def watch_master(self, stopped: threading.Event) -> None:
-        """Keep the subscriptions alive until `stopped`; for the main thread."""
-        while not stopped.wait(CHECK_PERIOD_S) and not rospy.is_shutdown():
+    def watch_master(self, stop: StopRequest) -> None:
+        """Keep the subscriptions alive until the program is to end; for the main thread."""
+        while not stop.wait(CHECK_PERIOD_S) and not rospy.is_shutdown():
             try:
                 run_id = rosgraph.Master(rospy.get_name()).getParam("/run_id")
             except (OSError, rosgraph.MasterException):
@@ -125,15 +125,15 @@ def _run() -> int:
     layouts = layout_names(manager_layouts())
     server = ConsoleServer(store, RosControls(), access_for(address, token), layouts)
     runner = ConsoleRunner(server, address, port)
-    stopped = threading.Event()
-    rospy.on_shutdown(stopped.set)
+    stop = StopRequest()  # rospy's signal handler makes it, in the thread that waits for it
+    rospy.on_shutdown(stop.make)
     runner.start()
     name = socket.gethostname() if address in EVERYWHERE else address
     name = f"[{name}]" if ":" in name else name
     # Not to the log, which is public on /rosout: the token is secret.
     print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
     try:
-        MeshFeed(store, runner).watch_master(stopped)
+        MeshFeed(store, runner).watch_master(stop)
     finally:
         runner.stop()
     return 0

@@ -14,7 +14,7 @@ from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use, shortest
-from drone_mesh.state.model import NodeStatus, position_is_known
+from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known
 from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 
@@ -25,6 +25,7 @@ LABEL_M = 0.5
 LINK_WIDTH_M = {LinkUse.ROUTE: 0.08, LinkUse.KNOWN: 0.03, LinkUse.LOST: 0.05}
 LINK_OPACITY = {LinkUse.ROUTE: 1.0, LinkUse.KNOWN: 0.6, LinkUse.LOST: 1.0}
 PATH_WIDTH_M = 0.06
+OBSTACLE_OPACITY = 0.85
 
 _Positions = Dict[int, Tuple[float, float, float]]
 
@@ -46,6 +47,7 @@ class MarkerMaker:
         positions = _fanned_positions(nodes)
         lost = self._lost.update(known_links(nodes), wall_s)
         array = MarkerArray()
+        self._add_obstacles(array, state.obstacles)
         for role in Role:
             self._add_boxes(array, [node for node in nodes if node.role == role], role, positions)
         for use, links in links_by_use(nodes, lost).items():
@@ -72,6 +74,17 @@ class MarkerMaker:
             marker.scale.x, marker.scale.y, marker.scale.z = x_m, y_m, z_m
             marker.points = [_point(positions[node.id], up=z_m / 2) for node in nodes]
             marker.colors = [_colour(colour) for colour in colours]
+
+    def _add_obstacles(self, array: MarkerArray, boxes: Sequence[ObstacleStatus]) -> None:
+        for number, box in enumerate(boxes):
+            marker = self._changed(array, "obstacles", number, [tuple(box.center)])
+            if marker:
+                marker.type = Marker.CUBE
+                marker.scale.x, marker.scale.y, marker.scale.z = box.size
+                marker.color = _colour(DARK.obstacle, OBSTACLE_OPACITY)
+                marker.pose.position = _point(box.center, up=0.0)
+                marker.pose.orientation.z = math.sin(box.yaw / 2)
+                marker.pose.orientation.w = math.cos(box.yaw / 2)
 
     def _add_lines(
         self, array: MarkerArray, name: str, lines: Sequence[tuple[Sequence[float], ...]],

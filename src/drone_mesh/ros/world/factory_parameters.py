@@ -6,12 +6,18 @@ from dataclasses import dataclass, fields
 
 import rospy
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.ros.graph.parameters import factory_configuration, manager_layouts
+from drone_mesh.ros.graph.parameters import (
+    configured_obstacles,
+    factory_configuration,
+    manager_layouts,
+)
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.view.window_process import require_screen
+from drone_mesh.world.factory import check_starts
 
 
 @dataclass(frozen=True)
@@ -20,18 +26,22 @@ class FactoryParameters:
 
     configuration: FactoryConfiguration
     settings: MeshSettings
+    obstacles: Obstacles | None
     hosts: int  # 1: the nodes run in this process; otherwise in others
 
     @classmethod
     def read(cls) -> FactoryParameters:
         """The private parameters over the configuration file. Raises ConfigurationError."""
         configuration = factory_configuration(*(key.name for key in fields(FactoryConfiguration)))
-        plan_fleet(
+        fleet = plan_fleet(
             configuration.gateways,
             configuration.routers,
             configuration.gridsize,
             configuration.spacing,
         )
+        obstacles = configured_obstacles(configuration)
+        if obstacles is not None:
+            check_starts(fleet, obstacles)
         if configuration.gui:
             require_screen()
         # With a bad file of layouts the manager would be restarted for ever; this ends the launch.
@@ -42,11 +52,15 @@ class FactoryParameters:
                 f"argument: invalid hosts {hosts!r}: expected a whole number, 0 or more"
             )
         if configuration.radio == "nrf24":
-            _require_wall_time_in_one_process(configuration, int(hosts))
-        return cls(configuration, MeshSettings.of(configuration), int(hosts))
+            _check_emulated_radio(configuration, int(hosts))
+        return cls(configuration, MeshSettings.of(configuration), obstacles, int(hosts))
 
 
-def _require_wall_time_in_one_process(configuration: FactoryConfiguration, hosts: int) -> None:
+def _check_emulated_radio(configuration: FactoryConfiguration, hosts: int) -> None:
+    if configuration.obstacles:
+        raise ConfigurationError(
+            "argument: obstacles need radio virtual: the emulated chips see no boxes"
+        )
     if hosts != 1:
         raise ConfigurationError(
             f"argument: invalid hosts {hosts}: must be 1 with radio nrf24: all emulated chips "

@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
-from typing import Callable, Iterable
+from typing import Callable, Iterable, Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -15,7 +15,7 @@ from drone_mesh.msg import HostReport, MeshEvent, MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import state_msg
 from drone_mesh.ros.world.diagnostics import diagnostics_msg
-from drone_mesh.state.model import MeshStatus
+from drone_mesh.state.model import MeshStatus, ObstacleStatus
 from drone_mesh.state.roster import DroneView, MeshRoster
 
 WATCHED_PERIOD_S = 0.2  # wall time between two states with a subscriber: flights look smooth
@@ -52,6 +52,7 @@ class MeshStatePublisher:
         max_distance_m: float,
         routing: str,
         repair_strategy: str,
+        obstacles: Sequence[ObstacleStatus] = (),
     ) -> None:
         """`look` is called in the thread of this object, and must not wait for the world.
 
@@ -60,6 +61,7 @@ class MeshStatePublisher:
         self._look = look
         self._max_distance_m = max_distance_m
         self._routing, self._repair_strategy = routing, repair_strategy
+        self._obstacles = obstacles
         self._roster = MeshRoster()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
         self._last_look: tuple[float, float] | None = None  # wall, simulated
@@ -125,6 +127,7 @@ class MeshStatePublisher:
             view.paused,
             self._routing,
             self._repair_strategy,
+            self._obstacles,
         )
         self._latest = mesh
         self._state.publish(state_msg(mesh))

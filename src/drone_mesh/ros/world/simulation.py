@@ -18,6 +18,7 @@ from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.ros.world.world_window import window_of
+from drone_mesh.state.observation import describe_obstacles
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
 
@@ -42,6 +43,7 @@ class Simulation:
             (configuration.wind_x, configuration.wind_y, 0.0)
             if configuration.flight == "dynamic"
             else None,
+            parameters.obstacles,
         ).drones
         _log.info(
             "fleet: gateways %d, routers %d, spacing %g m",
@@ -100,8 +102,13 @@ class Simulation:
             views = drone_views(drones, now_s)
             return WorldView(now_s, views, runner.wanted_factor, runner.paused)
 
+        obstacles = self._parameters.obstacles
         state = MeshStatePublisher(
-            look, configuration.max_distance, configuration.routing, configuration.repair
+            look,
+            configuration.max_distance,
+            configuration.routing,
+            configuration.repair,
+            describe_obstacles(obstacles.boxes if obstacles else ()),
         )
         state.start()
         window = window_of(world, drones, state) if configuration.gui else None

@@ -1,0 +1,122 @@
+"""Inbox: the messages that come from one sender."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from typing import Callable
+
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.ordering import PortOrder
+from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
+from drone_mesh.communication.data.reassembly import Reassembly, Whole
+
+ACK_DELAY_S = 0.02  # our choice: messages that are complete within this time share an ACK
+ACK_AT = 32  # our choice: fragments of complete messages that make an ACK leave at once
+REPEAT_S = 0.3  # our choice: an ACK that nothing asked for is not repeated sooner
+MOST_PORTS = 64  # whose order is kept per sender, the ones used last
+FORMER_SESSION_S = 30.0  # our choice: longer than a packet can wait on its way
+
+
+class Inbox:
+    """Puts together what one sender sends, and says when to acknowledge what."""
+
+    def __init__(self, room: int, acknowledge: Callable[[Ack], None]) -> None:
+        """`acknowledge` sends an ACK to the sender; `room`: bytes of a body."""
+        self._room = room
+        self._acknowledge = acknowledge
+        self._session = -1
+        self._former = (-1, -math.inf)  # the session before, and when it ended
+        self._reassembly = Reassembly(room)
+        self._ports: OrderedDict[tuple[int, bool], PortOrder] = OrderedDict()
+        self._unacknowledged = 0  # fragments of complete messages
+        self._complete = 0  # number of the latest complete reliable message
+        self._repeated_s = -math.inf
+        self.ack_due_s = math.inf
+
+    def fragment(self, index: int, body: bytes, now_s: float) -> list[Whole]:
+        """A fragment arrived: what can be delivered now. Raises PacketError for a damaged one."""
+        if index == 0 and not self._is_current(packets.head_of(body).session, now_s):
+            return []
+        number, reassembly = body[0], self._reassembly
+        if reassembly.is_done(number):
+            self._say_again(number, now_s)
+            return []
+        whole = reassembly.add(index, body, now_s)
+        if whole is None:
+            if reassembly.lacks_only_earlier(number, index):
+                self._say_again(number, now_s)
+            return []
+        reassembly.done(number)
+        if whole.head.reliable:
+            self._completed(whole, index, now_s)
+        return self._order(whole).take(whole, now_s)
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether messages are incomplete, or wait for earlier ones."""
+        return len(self._reassembly) > 0 or any(order.holds for order in self._ports.values())
+
+    def poll(self, poll: Poll, now_s: float) -> None:
+        """The sender asks what is here."""
+        self._acknowledge(self._ack(poll.number, poll.nonce, poll.session))
+
+    def on_time(self, now_s: float) -> list[Whole]:
+        """An ACK may be due; returns messages that have waited for earlier ones for too long."""
+        if now_s >= self.ack_due_s:
+            self._acknowledge_now()
+        self._reassembly.expire(now_s)
+        overdue = []
+        for order in self._ports.values():
+            if order.holds:
+                overdue += order.overdue(now_s)
+        return overdue
+
+    def _is_current(self, session: int, now_s: float) -> bool:
+        """Whether a message belongs to the sender's present session; a new one starts afresh."""
+        if session == self._session:
+            return True
+        former, ended_s = self._former
+        if session == former and now_s - ended_s < FORMER_SESSION_S:
+            return False
+        if self._session != -1:
+            self._former = self._session, now_s
+        self._session = session
+        self._reassembly = Reassembly(self._room)
+        self._ports.clear()
+        self._unacknowledged, self.ack_due_s = 0, math.inf
+        return True
+
+    def _order(self, whole: Whole) -> PortOrder:
+        key = (whole.head.port, whole.head.reliable)
+        order = self._ports.pop(key, None) or PortOrder()
+        self._ports[key] = order
+        while len(self._ports) > MOST_PORTS:
+            self._ports.popitem(last=False)
+        return order
+
+    def _completed(self, whole: Whole, index: int, now_s: float) -> None:
+        count = packets.count_of(whole.head.length, self._room)
+        self._complete = whole.head.number
+        self._unacknowledged += count
+        if self._unacknowledged >= ACK_AT or index != count - 1:
+            self._acknowledge_now()
+        else:
+            self.ack_due_s = min(self.ack_due_s, now_s + ACK_DELAY_S)
+
+    def _say_again(self, number: int, now_s: float) -> None:
+        if now_s - self._repeated_s >= REPEAT_S:
+            self._repeated_s = now_s
+            self._acknowledge(self._ack(number, 0, self._session))
+
+    def _acknowledge_now(self) -> None:
+        self._unacknowledged, self.ack_due_s = 0, math.inf
+        self._acknowledge(self._ack(self._complete, 0, self._session))
+
+    def _ack(self, number: int, nonce: int, session: int) -> Ack:
+        if session != self._session:
+            return Ack(session, nonce, number, 0, 0, 0)
+        newest, done = self._reassembly.newest_done()
+        has = self._reassembly.has(number)
+        assert has <= COMPLETE
+        return Ack(session, nonce, number, has, newest, done)

@@ -1,0 +1,297 @@
+"""Lane: the messages from this node to one destination.
+
+A message is cut into fragments. For a reliable one the receiver says which fragments it has, in an
+ACK: when the message is complete, when its last fragment came and others are missing, and when it
+is asked with a POLL. What is missing then is sent again. A POLL follows when no ACK comes in time,
+and when as many fragments are on their way as the window allows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Callable, Iterator, NamedTuple
+
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll
+from drone_mesh.communication.data.round_trip import RoundTrip
+from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
+
+LIFETIME_S = 240.0  # our choice: a loss is repaired within two minutes and a flight
+FIRST_WINDOW = 32  # our choice, in fragments: less than a message of 1,024 bytes
+LEAST_WINDOW = 4
+MOST_WINDOW = 128  # our choice: three messages of 1,024 bytes
+MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
+NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
+
+
+class DataPacket(NamedTuple):
+    """A packet to be sent, but for its header."""
+
+    kind: int
+    body: bytes
+    message: Outgoing
+
+
+class Outgoing:
+    """One message on its way."""
+
+    __slots__ = (
+        "asked_s", "asks", "expires_s", "head", "known", "nonce", "payload", "sent", "ticket",
+        "to_send", "whole",
+    )  # fmt: skip
+
+    def __init__(self, ticket: Ticket, payload: bytes, now_s: float) -> None:
+        self.ticket = ticket
+        self.payload = payload
+        self.expires_s = now_s + LIFETIME_S
+        self.head: Head | None = None  # once it is on its way
+        self.to_send: deque[int] = deque()  # indices of fragments
+        self.whole = False  # whether each fragment has left at least once
+        self.sent = 0  # fragments that left, as bits
+        self.known = 0  # fragments that the receiver has, as bits
+        self.asked_s = math.inf  # since when an answer is awaited
+        self.asks = 0  # questions without an answer
+        self.nonce = 0  # of the latest POLL; 0: none
+
+    def begin_again(self) -> None:
+        """Nothing of it was sent."""
+        self.head = None
+        self.whole = False
+        self.to_send.clear()
+        self.sent = self.known = self.asks = self.nonce = 0
+        self.asked_s = math.inf
+
+    @property
+    def in_flight(self) -> int:
+        """Fragments that left and of which nothing is known."""
+        return bin(self.sent & ~self.known).count("1")
+
+
+class Lane:
+    """The messages of one node to one destination, in the order in which they were handed in."""
+
+    def __init__(
+        self, to: int, session: int, room: int, ended: Callable[[TicketState], None]
+    ) -> None:
+        """`room`: bytes of a body; `ended` is called with the last state of each message."""
+        self.to = to
+        self._ended = ended
+        self._session = session
+        self._room = room
+        self._waiting: deque[Outgoing] = deque()
+        self._open: dict[int, Outgoing] = {}  # by number, oldest first
+        self._number = 0
+        self._orders: dict[tuple[int, bool], int] = {}  # next place, by port and reliability
+        self._round_trip = RoundTrip()
+        self._window = float(FIRST_WINDOW)
+        self._slow_start = True
+        self._nonce = 0
+        self.not_before_s = -math.inf  # there was no route; look again then
+
+    def __len__(self) -> int:
+        return len(self._waiting) + len(self._open)
+
+    def __iter__(self) -> Iterator[Outgoing]:
+        """All messages, oldest first."""
+        yield from self._open.values()
+        yield from self._waiting
+
+    def add(self, message: Outgoing) -> None:
+        """A message for this destination."""
+        self._waiting.append(message)
+
+    def next_packet(self, now_s: float) -> DataPacket | None:
+        """What to send now; `left` or `failed` says what became of it."""
+        in_flight = sum(message.in_flight for message in self._open.values())
+        for message in self._open.values():
+            if message.asks and now_s >= message.asked_s + self._timeout_s(message):
+                return self._poll(message)  # no answer came
+            if message.to_send and message.asked_s == math.inf:
+                if not message.ticket.reliable or in_flight < self._window:
+                    index = message.to_send[0]
+                    return DataPacket(packets.FRAGMENTS[index], self._body(message, index), message)
+                if message.in_flight:
+                    return self._poll(message)  # the window is full: what of it arrived?
+        if in_flight < self._window and self._may_open():
+            return self._opened(now_s)
+        return None
+
+    def left(self, packet: DataPacket, now_s: float) -> None:
+        """The packet is on its way."""
+        message = packet.message
+        if packet.kind == packets.POLL:
+            message.asked_s, message.asks = now_s, message.asks + 1
+            return
+        index = message.to_send.popleft()
+        message.sent |= 1 << index
+        if message.to_send:
+            return
+        message.whole = True
+        if message.ticket.reliable:
+            message.asked_s, message.asks = now_s, 1
+            if message.ticket.state is TicketState.QUEUED:
+                message.ticket.becomes(TicketState.SENT)
+        else:
+            self._close(message, TicketState.SENT)
+
+    def answered(self, ack: Ack, now_s: float) -> None:
+        """The receiver says what it has."""
+        if ack.session != self._session:
+            return
+        complete = {
+            number
+            for number, message in self._open.items()
+            if message.ticket.reliable
+            and message.whole
+            and (ack.newest - number) & 0xFF < packets.DONE_BITS
+            and ack.done >> ((ack.newest - number) & 0xFF) & 1
+        }
+        message = self._open.get(ack.number)
+        if message is not None and ack.has == COMPLETE:
+            if message.whole:
+                complete.add(ack.number)
+        elif message is not None and ack.number not in complete:
+            self._partly(message, ack, now_s)
+        for number in complete:
+            message = self._open[number]
+            if message.asks == 1 and (message.nonce == 0 or message.nonce == ack.nonce):
+                self._round_trip.measured(now_s - message.asked_s)
+            self._grow(message.in_flight)
+            self._close(message, TicketState.DELIVERED)
+
+    def due_s(self, now_s: float) -> float:
+        """When to look after this lane next; infinity while nothing waits in it."""
+        due_s = math.inf
+        if not len(self):
+            return due_s
+        for message in self._open.values():
+            if message.asked_s < math.inf:
+                due_s = min(due_s, message.asked_s + self._timeout_s(message))
+            due_s = min(due_s, message.expires_s)
+        if self._waiting:
+            due_s = min(due_s, self._waiting[0].expires_s)
+        return self.not_before_s if now_s < self.not_before_s else due_s
+
+    def expire(self, now_s: float, has_route: bool) -> None:
+        """Give up what waited for too long."""
+        where = destination_in_words(self.to)
+        reason = f"no acknowledgement from {where}" if has_route else f"no route to {where}"
+        for message in list(self):
+            if now_s >= message.expires_s:
+                self.give_up(message, f"{reason} for {LIFETIME_S:.0f} s")
+
+    def give_up(self, message: Outgoing, reason: str) -> None:
+        """The message will not be sent any more."""
+        self._close(message, TicketState.GIVEN_UP, reason)
+
+    def give_up_unreliable(self, reason: str) -> None:
+        """Messages that are sent now or never."""
+        for message in [message for message in self if not message.ticket.reliable]:
+            self.give_up(message, reason)
+
+    def take(self, to: int) -> list[Outgoing]:
+        """The messages that were addressed to `to`, as they were before anything was sent."""
+        messages = [message for message in self if message.ticket.to == to]
+        for message in messages:
+            self._remove(message)
+            message.begin_again()
+        return messages
+
+    # One message ------------------------------------------------------------------------------
+
+    def _may_open(self) -> bool:
+        """Whether the next message may start: the receiver remembers a bounded number of them."""
+        if not self._waiting or len(self._open) >= MOST_OPEN:
+            return False
+        if self._open and (self._number - next(iter(self._open))) & 0xFF >= NUMBER_SPAN:
+            return False
+        ticket = self._waiting[0].ticket
+        order = self._orders.get((ticket.port, ticket.reliable), 0)
+        return self._behind(ticket, order) <= packets.MOST_BEHIND
+
+    def _opened(self, now_s: float) -> DataPacket:
+        message = self._waiting.popleft()
+        ticket, payload = message.ticket, message.payload
+        key = (ticket.port, ticket.reliable)
+        order = self._orders.get(key, 0)
+        check = packets.checksum(self._session, ticket.port, order, payload)
+        message.head = Head(
+            self._number,
+            self._session,
+            ticket.port,
+            len(payload),
+            ticket.reliable,
+            0,
+            order,
+            check,
+        )
+        self._orders[key] = (order + 1) & 0xFFFF
+        count = packets.count_of(len(payload), self._room)
+        message.to_send.extend(range(count))
+        self._open[self._number] = message
+        self._number = (self._number + 1) & 0xFF
+        return DataPacket(packets.FRAGMENTS[0], self._body(message, 0), message)
+
+    def _behind(self, ticket: Ticket, order: int) -> int:
+        """From a place in the order of this port back to its oldest open message."""
+        behind = 0
+        for message in self._open.values():
+            head = message.head
+            if ticket.reliable and head is not None and head.reliable and head.port == ticket.port:
+                distance = (order - head.order) & 0xFFFF
+                behind = max(behind, distance if distance < 1 << 15 else 0)
+        return behind
+
+    def _body(self, message: Outgoing, index: int) -> bytes:
+        head = message.head
+        assert head is not None
+        if index == 0:
+            head = head._replace(behind=self._behind(message.ticket, head.order))
+            return packets.first_body(head, message.payload, self._room)
+        return packets.further_body(head.number, index, message.payload, self._room)
+
+    def _poll(self, message: Outgoing) -> DataPacket:
+        assert message.head is not None
+        if message.asks >= 2:
+            self._window, self._slow_start = float(LEAST_WINDOW), True
+        self._nonce = self._nonce % 0xFF + 1
+        message.nonce = self._nonce
+        poll = Poll(self._session, self._nonce, message.head.number)
+        return DataPacket(packets.POLL, packets.poll_body(poll), message)
+
+    def _partly(self, message: Outgoing, ack: Ack, now_s: float) -> None:
+        if ack.nonce != message.nonce or not message.ticket.reliable:
+            return  # an older answer: a newer one is on its way
+        if message.asks == 1:
+            self._round_trip.measured(now_s - message.asked_s)
+        lost = message.sent & ~ack.has
+        self._grow(bin(ack.has & message.sent & ~message.known).count("1"))
+        message.known = ack.has
+        message.sent &= ack.has
+        message.asked_s, message.asks = math.inf, 0
+        if lost:
+            self._slow_start = False
+            self._window = max(float(LEAST_WINDOW), self._window / 2)
+            again = [index for index in range(len(packets.FRAGMENTS)) if lost >> index & 1]
+            message.to_send.extendleft(reversed(again))
+
+    def _close(self, message: Outgoing, state: TicketState, reason: str = "") -> None:
+        self._remove(message)
+        message.ticket.becomes(state, reason)
+        self._ended(state)
+
+    def _remove(self, message: Outgoing) -> None:
+        if message.head is None:
+            self._waiting.remove(message)
+        else:
+            del self._open[message.head.number]
+
+    # Window and timeout -----------------------------------------------------------------------
+
+    def _grow(self, arrived: int) -> None:
+        self._window += arrived if self._slow_start else arrived / self._window * 4
+        self._window = min(self._window, float(MOST_WINDOW))
+
+    def _timeout_s(self, message: Outgoing) -> float:
+        return self._round_trip.timeout_s(max(0, message.asks - 1))

@@ -1,0 +1,68 @@
+"""Ordering: each message of a sender once, and per port in the order in which it was sent."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.data.reassembly import Whole
+
+HOLD_S = 300.0  # our choice: longer than a sender tries (LIFETIME_S of lane.py)
+_HALF = 1 << 15
+
+
+def ahead(order: int, of: int) -> int:
+    """By how many places `order` is ahead of another one; negative: behind (RFC 1982)."""
+    return (order - of + _HALF) % (1 << 16) - _HALF
+
+
+class PortOrder:
+    """The messages of one sender to one port, of one kind of delivery.
+
+    Memory: as many messages as a sender has on their way, MOST_BEHIND + 1.
+    """
+
+    def __init__(self) -> None:
+        self._next: int | None = None  # the place that comes next
+        self._held: dict[int, tuple[Whole, float]] = {}  # complete, but earlier ones are missing
+
+    def take(self, whole: Whole, now_s: float) -> list[Whole]:
+        """A complete message: all that can be delivered now, in order. A duplicate adds nothing."""
+        order = whole.head.order
+        if not whole.head.reliable:
+            if self._next is not None and ahead(order, self._next) < 0:
+                return []  # it comes late, or for the second time
+            self._next = (order + 1) & 0xFFFF
+            return [whole]
+        oldest = (order - whole.head.behind) & 0xFFFF
+        if self._next is None:
+            self._next = oldest
+        if ahead(order, self._next) < 0 or order in self._held:
+            return []
+        self._held[order] = whole, now_s
+        return self._ready_up_to(oldest)
+
+    def overdue(self, now_s: float) -> list[Whole]:
+        """Messages that waited for so long that no earlier one can come any more."""
+        waited = [order for order, (_, since_s) in self._held.items() if now_s - since_s >= HOLD_S]
+        if not waited or self._next is None:
+            return []
+        next_place = self._next
+        return self._ready_up_to(max(waited, key=lambda order: ahead(order, next_place)))
+
+    @property
+    def holds(self) -> bool:
+        """Whether messages wait for earlier ones."""
+        return bool(self._held)
+
+    def _ready_up_to(self, oldest: int) -> list[Whole]:
+        """What is complete before `oldest`, which no longer waits, and without a gap from there."""
+        ready = []
+        place = self._next if self._next is not None else oldest
+        while ahead(oldest, place) > 0 or place in self._held:
+            held = self._held.pop(place, None)
+            if held is not None:
+                ready.append(held[0])
+            elif not self._held:
+                place = oldest
+                break
+            place = (place + 1) & 0xFFFF
+        self._next = place
+        return ready

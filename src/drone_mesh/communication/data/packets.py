@@ -1,0 +1,151 @@
+"""The packets of users' data: their types and bodies (docs/protocol.md, "Data").
+
+No other module knows an offset in them. A message is cut into fragments. The type of a packet says
+which fragment it carries, so that one byte of the body, the message's id, is all the header that
+most fragments have.
+"""
+
+from __future__ import annotations
+
+import binascii
+import math
+import struct
+from typing import NamedTuple
+
+from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RECORD_AT
+from drone_mesh.errors import PacketError
+
+MAX_MESSAGE_BYTES = 1024
+FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
+ACK = 192  # what its creator has of a message
+POLL = 193  # asks for an ACK
+ECHO = ROUTE_RECORD  # asks for an ECHO_ANSWER; each node that forwards it adds its id
+ECHO_ANSWER = 195
+LEAST_ROOM = 20  # bytes of a body; with fewer, a long message would need more than 64 fragments
+
+_HEAD = struct.Struct("<BHBHHH")
+_LENGTH_BITS = 11
+_RELIABLE = 1 << _LENGTH_BITS
+_BEHIND_SHIFT = _LENGTH_BITS + 1
+MOST_BEHIND = (1 << 16 - _BEHIND_SHIFT) - 1
+_ACK = struct.Struct("<HBBQBI")
+_POLL = struct.Struct("<HBB")
+_TOKEN = struct.Struct("<H")
+
+
+class Head(NamedTuple):
+    """What the first fragment says of its message."""
+
+    number: int  # 0..255: of this message among those for the same destination
+    session: int  # 0..65535: another one after a restart of the sender
+    port: int  # 0..255
+    length: int  # bytes of the whole payload
+    reliable: bool
+    behind: int  # so many places back in the order is the oldest message that may still come
+    order: int  # 0..65535: place among the messages of this port and this kind of delivery
+    checksum: int  # of the whole message
+
+    @property
+    def fingerprint(self) -> tuple[int, ...]:
+        """What is the same in each transmission of the same message."""
+        return (*self[:5], *self[6:])
+
+
+class Ack(NamedTuple):
+    """What a receiver has."""
+
+    session: int  # of the sender whose messages these are
+    nonce: int  # that of the POLL that it answers; 0: none
+    number: int  # of a message
+    has: int  # bit n: fragment n of that message; all ones: all
+    newest: int  # number of a message
+    done: int  # bit n, 0..31: message `newest` - n is complete
+
+
+class Poll(NamedTuple):
+    """Asks what the receiver has of a message."""
+
+    session: int
+    nonce: int  # 1..255, another one each time: no two polls have the same bytes
+    number: int
+
+
+COMPLETE = (1 << len(FRAGMENTS)) - 1  # as Ack.has
+DONE_BITS = 32  # of Ack.done
+
+
+def checksum(session: int, port: int, order: int, payload: bytes) -> int:
+    """CRC-16/CCITT over a message and what tells it from others with the same number."""
+    prefix = struct.pack("<HBHH", session, port, order, len(payload))
+    return binascii.crc_hqx(prefix + payload, 0xFFFF)
+
+
+def count_of(length: int, room: int) -> int:
+    """The number of fragments of a payload of `length` bytes, with bodies of `room` bytes."""
+    return 1 + math.ceil(max(0, length - (room - _HEAD.size)) / (room - 1))
+
+
+def first_body(head: Head, payload: bytes, room: int) -> bytes:
+    """The body of fragment 0."""
+    meta = head.length | _RELIABLE * head.reliable | head.behind << _BEHIND_SHIFT
+    packed = _HEAD.pack(head.number, head.session, head.port, meta, head.order, head.checksum)
+    return packed + payload[: room - _HEAD.size]
+
+
+def further_body(number: int, index: int, payload: bytes, room: int) -> bytes:
+    """The body of fragment `index`, 1 or more."""
+    start = room - _HEAD.size + (index - 1) * (room - 1)
+    return bytes((number,)) + payload[start : start + room - 1]
+
+
+def head_of(body: bytes) -> Head:
+    """What the body of fragment 0 says. Raises PacketError for an impossible length."""
+    number, session, port, meta, order, check = _HEAD.unpack_from(body)
+    length = meta & (1 << _LENGTH_BITS) - 1
+    if length > MAX_MESSAGE_BYTES:
+        raise PacketError(f"a message of {length} bytes: at most {MAX_MESSAGE_BYTES} are allowed")
+    return Head(
+        number, session, port, length, bool(meta & _RELIABLE), meta >> _BEHIND_SHIFT, order, check
+    )
+
+
+def joined(bodies: list[bytes], length: int, room: int) -> bytes:
+    """The payload in the bodies of all fragments, in their order."""
+    chunks = [bodies[0][_HEAD.size : room], *(body[1:room] for body in bodies[1:])]
+    return b"".join(chunks)[:length]
+
+
+def ack_body(ack: Ack) -> bytes:
+    """The body of an ACK."""
+    return _ACK.pack(*ack)
+
+
+def ack_of(body: bytes) -> Ack:
+    """What the body of an ACK says."""
+    return Ack(*_ACK.unpack_from(body))
+
+
+def poll_body(poll: Poll) -> bytes:
+    """The body of a POLL."""
+    return _POLL.pack(*poll)
+
+
+def poll_of(body: bytes) -> Poll:
+    """What the body of a POLL says."""
+    return Poll(*_POLL.unpack_from(body))
+
+
+# The ids of the nodes that forward an ECHO are behind this: their number, then one byte each.
+_ROUTE_AT = ROUTE_RECORD_AT - (32 - BODY_BYTES)
+
+
+def echo_body(token: int, route: tuple[int, ...] = (), room: int = BODY_BYTES) -> bytes:
+    """The body of an ECHO, or of the answer to one that came along `route`."""
+    route = route[: room - _ROUTE_AT - 1]
+    return _TOKEN.pack(token) + bytes((len(route), *route))
+
+
+def echo_of(body: bytes) -> tuple[int, tuple[int, ...]]:
+    """Token, and the nodes that forwarded the ECHO, as far as there was room for them."""
+    (token,) = _TOKEN.unpack_from(body)
+    return token, tuple(body[_ROUTE_AT + 1 : _ROUTE_AT + 1 + body[_ROUTE_AT]])

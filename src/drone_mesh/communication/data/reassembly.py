@@ -1,0 +1,124 @@
+"""Reassembly: the fragments of messages from one sender, until a message is complete."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import NamedTuple
+
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.packets import COMPLETE, Head
+
+EXPIRES_S = 60.0  # our choice: a message of which nothing more came for so long is dropped
+MOST_PARTIAL = 24  # messages of one sender in the making; it has at most 16 on their way
+_LIVE = 64  # numbers: an older message than this is not on its way any more
+
+
+class Whole(NamedTuple):
+    """A complete message."""
+
+    head: Head
+    payload: bytes
+
+
+class _Partial:
+    __slots__ = ("bodies", "has", "head", "touched_s")
+
+    def __init__(self) -> None:
+        self.head: Head | None = None
+        self.bodies: dict[int, bytes] = {}
+        self.has = 0
+        self.touched_s = 0.0
+
+
+class Reassembly:
+    """Puts the messages of one sender together. Memory: MOST_PARTIAL messages at most."""
+
+    def __init__(self, room: int) -> None:
+        """`room`: bytes of a body."""
+        self._room = room
+        self._partial: OrderedDict[int, _Partial] = OrderedDict()  # by number, oldest first
+        self._done: OrderedDict[int, None] = OrderedDict()  # numbers of the latest complete ones
+
+    def add(self, index: int, body: bytes, now_s: float) -> Whole | None:
+        """A fragment arrived; the message, if that completes it. A damaged one is dropped whole."""
+        number = body[0]
+        partial = self._partial.get(number)
+        if partial is None:
+            partial = self._begin(number)
+        partial.touched_s = now_s
+        if index == 0:
+            head = packets.head_of(body)
+            if partial.head is not None and partial.head.fingerprint != head.fingerprint:
+                partial = self._begin(number)  # the number is that of another message by now
+                partial.touched_s = now_s
+            partial.head = head
+        partial.bodies[index] = body
+        partial.has |= 1 << index
+        head_now = partial.head
+        if head_now is None:
+            return None
+        count = packets.count_of(head_now.length, self._room)
+        if partial.has & (1 << count) - 1 != (1 << count) - 1:
+            return None
+        del self._partial[number]
+        payload = packets.joined(
+            [partial.bodies[n] for n in range(count)], head_now.length, self._room
+        )
+        right = packets.checksum(head_now.session, head_now.port, head_now.order, payload)
+        return Whole(head_now, payload) if right == head_now.checksum else None
+
+    def __len__(self) -> int:
+        """Messages that are incomplete."""
+        return len(self._partial)
+
+    def is_done(self, number: int) -> bool:
+        """Whether this message is complete: another fragment of it is a duplicate."""
+        return number in self._done
+
+    def done(self, number: int) -> None:
+        """The message is complete and taken; nothing older than the live numbers is kept."""
+        self._done.pop(number, None)
+        self._done[number] = None
+        while len(self._done) > _LIVE:
+            self._done.popitem(last=False)
+        for other in [n for n in self._partial if _LIVE <= (number - n) & 255 < 192]:
+            del self._partial[other]
+
+    def has(self, number: int) -> int:
+        """The fragments of a message that are here, as bits; COMPLETE for a complete one."""
+        if number in self._done:
+            return COMPLETE
+        partial = self._partial.get(number)
+        return partial.has if partial is not None else 0
+
+    def lacks_only_earlier(self, number: int, index: int) -> bool:
+        """Whether `index` is the last fragment of a message and others of it are missing."""
+        partial = self._partial.get(number)
+        if partial is None or partial.head is None:
+            return False
+        return index == packets.count_of(partial.head.length, self._room) - 1
+
+    def newest_done(self) -> tuple[int, int]:
+        """Number of the latest complete message, and as bits the complete ones up to it."""
+        if not self._done:
+            return 0, 0
+        newest = next(reversed(self._done))
+        bits = 0
+        for number in self._done:
+            back = (newest - number) & 255
+            if back < packets.DONE_BITS:
+                bits |= 1 << back
+        return newest, bits
+
+    def expire(self, now_s: float) -> None:
+        """Drop the messages of which nothing came for long."""
+        for number, partial in list(self._partial.items()):
+            if now_s - partial.touched_s >= EXPIRES_S:
+                del self._partial[number]
+
+    def _begin(self, number: int) -> _Partial:
+        self._partial.pop(number, None)
+        while len(self._partial) >= MOST_PARTIAL:
+            self._partial.popitem(last=False)
+        partial = self._partial[number] = _Partial()
+        return partial

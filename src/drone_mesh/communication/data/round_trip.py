@@ -1,0 +1,30 @@
+"""RoundTrip: how long to wait for an acknowledgement (RFC 6298)."""
+
+from __future__ import annotations
+
+FIRST_TIMEOUT_S = 1.0  # RFC 6298, 2.1
+LEAST_TIMEOUT_S = 0.3  # our choice: above the half second of circulation after one doubling
+MOST_TIMEOUT_S = 4.0  # our choice: how long a route that works again may stay unused
+
+
+class RoundTrip:
+    """The timeout for one destination, as its answers teach it."""
+
+    def __init__(self) -> None:
+        self._mean_s: float | None = None
+        self._deviation_s = 0.0
+
+    def measured(self, seconds: float) -> None:
+        """An answer came after so long, to a question that was asked only once."""
+        if self._mean_s is None:
+            self._mean_s, self._deviation_s = seconds, seconds / 2
+            return
+        self._deviation_s += (abs(seconds - self._mean_s) - self._deviation_s) / 4
+        self._mean_s += (seconds - self._mean_s) / 8
+
+    def timeout_s(self, unanswered: int) -> float:
+        """How long to wait for an answer after so many questions that remained without one."""
+        timeout_s = FIRST_TIMEOUT_S
+        if self._mean_s is not None:
+            timeout_s = max(LEAST_TIMEOUT_S, self._mean_s + 4 * self._deviation_s)
+        return min(MOST_TIMEOUT_S, timeout_s * 2.0 ** min(unanswered, 8))

@@ -1,0 +1,61 @@
+"""Tickets: what becomes of a message that was handed in."""
+
+from __future__ import annotations
+
+import enum
+from typing import Callable
+
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+
+TO_ALL = BROADCAST  # destination: every node of the mesh, best effort
+TO_GATEWAY = NO_ROUTE  # destination: the sender's own gateway, whichever that is
+
+
+class TicketState(enum.Enum):
+    """How far a message is."""
+
+    QUEUED = "queued"  # it waits, wholly or in part
+    SENT = "sent"  # all of it has left; final for a message that is not reliable
+    DELIVERED = "delivered"  # its receiver has it; final
+    GIVEN_UP = "given up"  # `reason` says why; final
+
+
+class Ticket:
+    """One message on its way. Any thread may read it; the component's thread changes it."""
+
+    __slots__ = ("changed", "number", "port", "reason", "reliable", "size", "state", "to")
+
+    def __init__(self, number: int, to: int, port: int, size: int, reliable: bool) -> None:
+        self.number = number  # counts the messages of this node, from 1
+        self.to = to  # as asked: a node, TO_ALL or TO_GATEWAY
+        self.port = port
+        self.size = size  # bytes
+        self.reliable = reliable
+        self.state = TicketState.QUEUED
+        self.reason = ""  # why it was given up
+        # Called with the ticket when its state changes, in the component's thread; it must not
+        # call back into the component.
+        self.changed: Callable[[Ticket], None] | None = None
+
+    def becomes(self, state: TicketState, reason: str = "") -> None:
+        """The state is another one now."""
+        if state is not self.state:
+            self.state, self.reason = state, reason
+            if self.changed is not None:
+                self.changed(self)
+
+    @property
+    def final(self) -> bool:
+        """Whether the state will not change any more."""
+        if self.state is TicketState.SENT:
+            return not self.reliable
+        return self.state in (TicketState.DELIVERED, TicketState.GIVEN_UP)
+
+    def __str__(self) -> str:
+        words = f"message {self.number} to {destination_in_words(self.to)}: {self.state.value}"
+        return f"{words}: {self.reason}" if self.reason else words
+
+
+def destination_in_words(to: int) -> str:
+    """A destination as people say it."""
+    return {TO_ALL: "all nodes", TO_GATEWAY: "the gateway"}.get(to, f"node {to}")

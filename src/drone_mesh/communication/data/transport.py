@@ -1,0 +1,353 @@
+"""Transport: users' messages to and from one node (docs/protocol.md, "Data").
+
+The component hands in the packets of users' types and the time; it has no thread and no clock of
+its own. What to send is decided by lanes, one per destination; what arrives goes to inboxes, one
+per sender. Packets leave a few at a time, so that the mesh's own are handled in between.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import OrderedDict
+from typing import Callable, NamedTuple
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
+from drone_mesh.communication.data.flood import SeenFloods
+from drone_mesh.communication.data.inbox import Inbox
+from drone_mesh.communication.data.lane import Lane, Outgoing
+from drone_mesh.communication.data.packets import Ack
+from drone_mesh.communication.data.reassembly import Whole
+from drone_mesh.communication.data.ticket import (
+    TO_ALL,
+    TO_GATEWAY,
+    Ticket,
+    TicketState,
+    destination_in_words,
+)
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.errors import MessageRefused, PacketError, QueueFull
+
+MOST_QUEUED = 64  # our choice: messages that wait or are on their way, in all
+BURST = 8  # our choice: packets that leave before others get their turn
+ROUTE_PERIOD_S = 0.5  # our choice: how often a lane without a route looks for one
+TIDY_PERIOD_S = 5.0  # our choice: how often old fragments are dropped
+MOST_INBOXES = 128  # senders whose messages are put together at once, the latest ones
+
+
+class ReceivedMessage(NamedTuple):
+    """A message of a user, complete and in order."""
+
+    sender: int
+    port: int
+    payload: bytes
+    to_all: bool
+    reliable: bool
+    received_s: float  # the core's clock
+
+
+Receiver = Callable[[ReceivedMessage], None]
+"""Runs in the component's thread, and must not call back into the component."""
+
+
+class DataFigures(NamedTuple):
+    """Counts since the start."""
+
+    messages_sent: int = 0  # handed in
+    messages_delivered: int = 0  # acknowledged by their receivers
+    messages_given_up: int = 0
+    messages_received: int = 0
+    bytes_sent: int = 0  # of the payloads handed in
+    bytes_received: int = 0
+
+
+class Transport:
+    """Sends and receives the messages of one node. Belongs to the component's thread."""
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        complaints: Complaints,
+        rng: random.Random,
+        my_gateway: Callable[[], int],
+        room: int = messages.BODY_BYTES,
+    ) -> None:
+        """`room`: bytes of a packet's body that are free; `my_gateway`: its id, or NO_ROUTE."""
+        if not packets.LEAST_ROOM <= room <= messages.BODY_BYTES:
+            raise ValueError(
+                f"invalid room {room}: must be {packets.LEAST_ROOM}..{messages.BODY_BYTES}"
+            )
+        self._parts = parts
+        self._complaints = complaints
+        self._rng = rng
+        self._my_gateway = my_gateway
+        self._room = room
+        self._session: int | None = None
+        self._lanes: OrderedDict[int, Lane] = OrderedDict()  # the next one to send comes first
+        self._for_gateway: list[Outgoing] = []  # wait until there is one
+        self._inboxes: OrderedDict[tuple[int, bool], Inbox] = OrderedDict()
+        self._floods = SeenFloods()
+        self._echoes = Echoes(self._send_packet, room)
+        self._receivers: list[Receiver] = []
+        self._numbered = 0
+        self._counts = dict.fromkeys(DataFigures._fields, 0)
+        self._tidy_s = math.inf
+
+    # For users ---------------------------------------------------------------------------------
+
+    def send(
+        self, to: int, payload: bytes, now_s: float, *, port: int = 0, reliable: bool = True
+    ) -> Ticket:
+        """Send a message to a node, to TO_GATEWAY or, never reliably, to TO_ALL.
+
+        Raises MessageRefused for a bad destination, port or size, and QueueFull if too many
+        messages wait.
+        """
+        self._parts.deadlines.now_s = now_s
+        self._check(to, payload, port)
+        reliable = reliable and to != TO_ALL
+        self._numbered += 1
+        ticket = Ticket(self._numbered, to, port, len(payload), reliable)
+        self._counts["messages_sent"] += 1
+        self._counts["bytes_sent"] += len(payload)
+        me = self._parts.node_id
+        if to == me or (to == TO_GATEWAY and self._my_gateway() == me):
+            self._deliver(ReceivedMessage(me, port, payload, False, reliable, now_s))
+            ticket.becomes(TicketState.DELIVERED)
+            return ticket
+        message = Outgoing(ticket, payload, now_s)
+        if to == TO_GATEWAY:
+            self._for_gateway.append(message)
+        else:
+            self._lane(to).add(message)
+        self._work()
+        return ticket
+
+    def on_received(self, receiver: Receiver) -> None:
+        """Have `receiver` called with each message that arrives."""
+        self._receivers.append(receiver)
+
+    def echo(self, to: int, on_answer: OnEchoAnswer, now_s: float) -> int | None:
+        """Send an echo to a node; its token, or None if there is no route to it."""
+        self._parts.deadlines.now_s = now_s
+        if not 0 <= to <= MAX_NODE_ID or to == self._parts.node_id:
+            raise MessageRefused(f"invalid node {to}: must be another node, 0..{MAX_NODE_ID}")
+        return self._echoes.send(to, on_answer, now_s)
+
+    def figures(self) -> DataFigures:
+        """Counts since the start. Any thread."""
+        return DataFigures(**self._counts)
+
+    # For the component -------------------------------------------------------------------------
+
+    def on_packet(self, payload: bytes) -> None:
+        """A packet of a user's type, for this node or for all."""
+        creator, _from, kind, _to, forward = messages.header(payload)
+        body = messages.body(payload)
+        if creator == self._parts.node_id:
+            return  # it came back
+        now_s = self._parts.now_s
+        try:
+            if kind in packets.FRAGMENTS:
+                self._fragment(payload, creator, kind - packets.FRAGMENTS.start, forward == TO_ALL)
+            elif kind == packets.ACK:
+                lane = self._lanes.get(creator)
+                if lane is not None:
+                    lane.answered(packets.ack_of(body), now_s)
+            elif kind == packets.POLL:
+                self._inbox(creator, to_all=False).poll(packets.poll_of(body), now_s)
+            elif kind == packets.ECHO:
+                self._echoes.asked(creator, body)
+            elif kind == packets.ECHO_ANSWER:
+                self._echoes.answered(creator, body, now_s)
+            else:
+                self._complaints.dropped("data of an unknown type", payload, now_s)
+        except PacketError as error:
+            self._complaints.dropped(f"data: {error}", payload, now_s)
+        self._work()
+
+    def on_due(self) -> None:
+        """The time that was asked for with Due.DATA has come."""
+        now_s = self._parts.now_s
+        for (sender, to_all), inbox in list(self._inboxes.items()):
+            for whole in inbox.on_time(now_s):
+                self._arrived(sender, to_all, whole)
+        if now_s >= self._tidy_s:
+            unfinished = any(inbox.unfinished for inbox in self._inboxes.values())
+            self._tidy_s = now_s + TIDY_PERIOD_S if unfinished else math.inf
+        self._work()
+
+    # Sending -----------------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        """Send what may leave now, and plan the next time."""
+        now_s = self._parts.now_s
+        if not self._lanes and not self._for_gateway:
+            self._plan(math.inf)
+            return
+        self._follow_gateway()
+        again_s = math.inf
+        left = min(BURST, self._parts.antenna.data_room())
+        if left <= 0:
+            again_s = now_s + self._parts.antenna.medium.data_pause_s
+        idle = 0
+        while left > 0 and idle < len(self._lanes):
+            to, lane = next(iter(self._lanes.items()))
+            self._lanes.move_to_end(to)
+            if self._send_one(lane, now_s):
+                left, idle = left - 1, 0
+            else:
+                idle += 1
+        if left <= 0:
+            again_s = now_s + self._parts.antenna.medium.data_pause_s
+        for to, lane in list(self._lanes.items()):
+            lane.expire(now_s, self._direction(to) != NO_ROUTE)
+            again_s = min(again_s, lane.due_s(now_s)) if len(lane) else again_s
+        if self._for_gateway:
+            again_s = min(again_s, now_s + ROUTE_PERIOD_S)
+        self._plan(again_s)
+
+    def _send_one(self, lane: Lane, now_s: float) -> bool:
+        """One packet of a lane; False if it has none now."""
+        if not len(lane) or now_s < lane.not_before_s:
+            return False
+        if lane.to != TO_ALL and not self._may_reach(lane, now_s):
+            return False
+        packet = lane.next_packet(now_s)
+        if packet is None:
+            return False
+        if self._send_packet(packet.kind, lane.to, packet.body):
+            lane.left(packet, now_s)
+            return True
+        if self._direction(lane.to) == NO_ROUTE:
+            self._may_reach(lane, now_s)
+        else:
+            lane.not_before_s = now_s + self._parts.antenna.medium.data_pause_s
+        return False
+
+    def _may_reach(self, lane: Lane, now_s: float) -> bool:
+        """Whether there is a route. If not: later, and what is not reliable is given up."""
+        if self._parts.antenna.on() and self._direction(lane.to) != NO_ROUTE:
+            return True
+        lane.not_before_s = now_s + ROUTE_PERIOD_S
+        lane.give_up_unreliable(f"no route to {destination_in_words(lane.to)}")
+        return False
+
+    def _direction(self, to: int) -> int:
+        return to if to == TO_ALL else self._parts.routing.get_direction_to_node(to)
+
+    def _send_packet(self, kind: int, to: int, body: bytes) -> bool:
+        me = self._parts.node_id
+        packet = messages.packet(kind, me, me, to, to, body)
+        if to == TO_ALL:
+            self._floods.is_new(me, body[0], kind - packets.FRAGMENTS.start, self._parts.now_s)
+            self._parts.antenna.broadcast_message(packet)
+            return True
+        return self._parts.delivery.send_own(packet)
+
+    def _follow_gateway(self) -> None:
+        """Messages for the gateway go to the one that this node uses now."""
+        gateway = self._my_gateway()
+        if gateway == NO_ROUTE:
+            self._give_up_without_gateway()
+            return
+        waiting, self._for_gateway = self._for_gateway, []
+        for to, lane in self._lanes.items():
+            if to not in (gateway, TO_ALL):
+                waiting += lane.take(TO_GATEWAY)
+        for message in waiting:
+            self._lane(gateway).add(message)
+
+    def _give_up_without_gateway(self) -> None:
+        now_s = self._parts.now_s
+        for message in list(self._for_gateway):
+            if now_s >= message.expires_s or not message.ticket.reliable:
+                self._for_gateway.remove(message)
+                message.ticket.becomes(TicketState.GIVEN_UP, "this node knows no gateway")
+                self._ended(TicketState.GIVEN_UP)
+
+    def _lane(self, to: int) -> Lane:
+        if self._session is None:
+            self._session = self._rng.randrange(1 << 16)
+        lane = self._lanes.get(to)
+        if lane is None:
+            lane = self._lanes[to] = Lane(to, self._session, self._room, self._ended)
+        return lane
+
+    def _ended(self, state: TicketState) -> None:
+        if state is TicketState.DELIVERED:
+            self._counts["messages_delivered"] += 1
+        elif state is TicketState.GIVEN_UP:
+            self._counts["messages_given_up"] += 1
+
+    def _check(self, to: int, payload: bytes, port: int) -> None:
+        if not 0 <= to <= MAX_NODE_ID and to not in (TO_ALL, TO_GATEWAY):
+            raise MessageRefused(
+                f"invalid destination {to}: must be a node 0..{MAX_NODE_ID}, "
+                f"{TO_ALL} for all nodes or {TO_GATEWAY} for the gateway"
+            )
+        if not 0 <= port <= 255:
+            raise MessageRefused(f"invalid port {port}: must be 0..255")
+        if len(payload) > packets.MAX_MESSAGE_BYTES:
+            raise MessageRefused(
+                f"the message is too large: {len(payload)} bytes, "
+                f"at most {packets.MAX_MESSAGE_BYTES} are possible"
+            )
+        queued = len(self._for_gateway) + sum(map(len, self._lanes.values()))
+        if queued >= MOST_QUEUED:
+            raise QueueFull(f"the queue is full: {queued} messages wait or are on their way")
+
+    # Receiving ---------------------------------------------------------------------------------
+
+    def _fragment(self, payload: bytes, creator: int, index: int, to_all: bool) -> None:
+        now_s, body = self._parts.now_s, messages.body(payload)
+        if to_all:
+            if not self._floods.is_new(creator, body[0], index, now_s):
+                return
+            onward = messages.next_hop(payload, self._parts.node_id, TO_ALL)
+            if onward is not None:
+                self._parts.antenna.broadcast_message(onward)
+        inbox = self._inbox(creator, to_all)
+        for whole in inbox.fragment(index, body, now_s):
+            self._arrived(creator, to_all, whole)
+        if self._tidy_s == math.inf and inbox.unfinished:
+            self._tidy_s = now_s + TIDY_PERIOD_S
+
+    def _inbox(self, sender: int, to_all: bool) -> Inbox:
+        key = (sender, to_all)
+        inbox = self._inboxes.get(key)
+        if inbox is None:
+            while len(self._inboxes) >= MOST_INBOXES:
+                self._inboxes.popitem(last=False)
+
+            def acknowledge(ack: Ack) -> None:
+                self._send_packet(packets.ACK, sender, packets.ack_body(ack))
+
+            inbox = self._inboxes[key] = Inbox(self._room, acknowledge)
+        self._inboxes.move_to_end(key)
+        return inbox
+
+    def _arrived(self, sender: int, to_all: bool, whole: Whole) -> None:
+        head = whole.head
+        self._deliver(
+            ReceivedMessage(
+                sender, head.port, whole.payload, to_all, head.reliable, self._parts.now_s
+            )
+        )
+
+    def _deliver(self, message: ReceivedMessage) -> None:
+        self._counts["messages_received"] += 1
+        self._counts["bytes_received"] += len(message.payload)
+        for receiver in self._receivers:
+            receiver(message)
+
+    def _plan(self, at_s: float) -> None:
+        """Have `on_due` called at `at_s`, or earlier for an ACK."""
+        for inbox in self._inboxes.values():
+            at_s = min(at_s, inbox.ack_due_s)
+        self._parts.deadlines.set(Due.DATA, min(at_s, self._tidy_s))

@@ -1,0 +1,91 @@
+"""What a drone and a gateway say about an order: reports of types 64 and 65.
+
+docs/protocol.md, "Orders". Both bodies fit into 14 bytes, so that they leave room for a seal.
+"""
+
+from __future__ import annotations
+
+import enum
+import struct
+from dataclasses import dataclass
+from typing import ClassVar
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.messages import HEADER_BYTES, MessageType
+
+TEXT_BYTES = 10  # of a reason, in one packet
+MOST_PARTS = 8  # our choice: 80 bytes of a reason; the rest is cut off
+
+
+class OrderOutcome(enum.IntEnum):
+    """What a drone says of an order."""
+
+    ACCEPTED = 1  # it flies there
+    REFUSED = 2  # it stays; with the reason
+    ARRIVED = 3  # it is there
+    GIVEN_UP = 4  # the flight ended elsewhere; with the reason
+    UNKNOWN = 5  # answer to a query: it knows no such order (any more)
+
+
+@dataclass(frozen=True)
+class OrderReply:
+    """One part of what a drone says of the order `number` to the gateway that sent it."""
+
+    TYPE: ClassVar[MessageType] = MessageType.ORDER_REPLY
+    BODY: ClassVar[struct.Struct] = struct.Struct(f"<HBB{TEXT_BYTES}s")
+
+    number: int  # 1..65535
+    outcome: OrderOutcome
+    part: int  # 0..last_part
+    last_part: int  # 0..MOST_PARTS - 1
+    text: bytes  # of the reason, UTF-8, at most TEXT_BYTES
+
+    def body(self) -> bytes:
+        """The body of the packet."""
+        parts = self.part | self.last_part << 4
+        return self.BODY.pack(self.number, self.outcome, parts, self.text)
+
+    @classmethod
+    def from_payload(cls, payload: bytes) -> OrderReply | None:
+        """Decode; None for an outcome or a part that does not exist."""
+        number, outcome, parts, text = cls.BODY.unpack_from(payload, HEADER_BYTES)
+        part, last_part = parts & 0x0F, parts >> 4
+        try:
+            known = OrderOutcome(outcome)
+        except ValueError:
+            return None
+        if not part <= last_part < MOST_PARTS:
+            return None
+        return cls(number, known, part, last_part, text.rstrip(b"\0"))
+
+
+def reply_packets(
+    number: int, outcome: OrderOutcome, reason: str, creator: int, gateway: int
+) -> list[bytes]:
+    """The reply in as many packets as its reason needs, from `creator` for `gateway`."""
+    text = reason.encode()[: TEXT_BYTES * MOST_PARTS]
+    parts = [text[at : at + TEXT_BYTES] for at in range(0, len(text), TEXT_BYTES)] or [b""]
+    replies = [
+        OrderReply(number, outcome, index, len(parts) - 1, part) for index, part in enumerate(parts)
+    ]
+    return [
+        messages.packet(reply.TYPE, creator, creator, gateway, gateway, reply.body())
+        for reply in replies
+    ]
+
+
+class OrderQuery:
+    """The gateway asks what became of an order; the body is its number."""
+
+    TYPE: ClassVar[MessageType] = MessageType.ORDER_QUERY
+    BODY: ClassVar[struct.Struct] = struct.Struct("<H")
+
+    @classmethod
+    def packet(cls, number: int, gateway: int, drone: int) -> bytes:
+        """The 32 bytes, from `gateway` for `drone`."""
+        return messages.packet(cls.TYPE, gateway, gateway, drone, drone, cls.BODY.pack(number))
+
+    @classmethod
+    def number_in(cls, payload: bytes) -> int:
+        """The number of the order."""
+        return int(cls.BODY.unpack_from(payload, HEADER_BYTES)[0])

@@ -1,0 +1,88 @@
+"""The requests about orders that a gateway has sent: what became of them.
+
+No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
+Python 3.8.
+"""
+
+from typing import Any, Dict, List, Sequence, Union
+
+from fastapi import FastAPI, Path
+from fastapi.params import Depends
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+from typing_extensions import Annotated
+
+from drone_mesh.communication.interfaces import IGatewayCommands
+from drone_mesh.communication.order_book import HIGHEST_NUMBER
+from drone_mesh.communication.order_record import OrderRecord, OrderState
+from drone_mesh.internet.asking import GatewayDesk
+
+OrderNumber = Annotated[
+    int, Path(ge=1, le=HIGHEST_NUMBER, description="As in the Location header of the order.")
+]
+Responses = Dict[Union[int, str], Dict[str, Any]]
+
+
+class OrderReport(BaseModel):
+    """One order, as the gateway knows it."""
+
+    id: int
+    drone: int
+    latitude: float = Field(description="y, metres")
+    longitude: float = Field(description="x, metres")
+    height: int = Field(description="metres")
+    state: OrderState
+    reason: str = Field(description="Of a refusal, or why it was given up; else empty.")
+    ordered_s_ago: float
+    changed_s_ago: float = Field(description="Seconds in this state.")
+
+
+class OrderReports(BaseModel):
+    """The orders that the gateway remembers, oldest first."""
+
+    gateway: int
+    orders: List[OrderReport]
+
+
+def add_order_requests(
+    app: FastAPI,
+    desk: GatewayDesk,
+    guards: Sequence[Depends],
+    refusals: Responses,
+    order_refusals: Responses,
+) -> None:
+    """`GET /orders`, which may be answered with `refusals`, and `GET /orders/{id}`."""
+
+    @app.get("/orders", dependencies=guards, responses=refusals)
+    async def orders() -> OrderReports:
+        """What became of the orders: the latest of each drone, and up to 100 older ones."""
+        return await desk.ask(_report_orders)
+
+    @app.get("/orders/{id}", dependencies=guards, responses=order_refusals)
+    async def order(id: OrderNumber) -> OrderReport:
+        """What became of one order."""
+        for report in (await desk.ask(_report_orders)).orders:
+            if report.id == id:
+                return report
+        raise HTTPException(404, f"there is no order {id}, or it was forgotten")
+
+
+def _report_orders(gateway: IGatewayCommands, now_s: float) -> OrderReports:
+    return OrderReports(
+        gateway=gateway.get_node_id(),
+        orders=[_report(order, now_s) for order in gateway.get_orders()],
+    )
+
+
+def _report(order: OrderRecord, now_s: float) -> OrderReport:
+    return OrderReport(
+        id=order.number,
+        drone=order.drone,
+        latitude=order.goal.latitude,
+        longitude=order.goal.longitude,
+        height=int(order.goal.height),
+        state=order.state,
+        reason=order.reason,
+        ordered_s_ago=round(max(0.0, now_s - order.ordered_s), 3),
+        changed_s_ago=round(max(0.0, now_s - order.changed_s), 3),
+    )

@@ -1,0 +1,88 @@
+"""RayLinks: which places have a radio link past the obstacles, by rays through a pybullet world."""
+
+from __future__ import annotations
+
+import math
+from typing import Sequence
+
+import numpy as np
+import pybullet
+
+from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.drone.flight_path import Vector
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.world.static_box import add_static_box
+
+MISSED = -1  # pybullet's body number of a ray that hits nothing more
+
+
+class RayLinks:
+    """The boxes of `obstacles` in a pybullet world of their own, and rays between places.
+
+    Gives the links that Obstacles.margin_db gives. Each pair is cast in both directions: one ray
+    enters a box where the other leaves it. Places inside a box are only known by the surface that
+    is missing; two of them in the same box have a link, but no drone can be there.
+    Not thread-safe.
+    """
+
+    def __init__(self, obstacles: Obstacles, range_m: float) -> None:
+        self._obstacles = obstacles
+        self._range_m = range_m
+        self._client = pybullet.connect(pybullet.DIRECT)
+        if self._client < 0:
+            raise ConfigurationError("pybullet has no room for another world: close one first")
+        self._cut_db = {
+            add_static_box(self._client, box.center, box.size, box.yaw_rad): box.cut_db
+            for box in obstacles.boxes
+        }
+
+    def close(self) -> None:
+        """Free the pybullet world. Closing twice changes nothing."""
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+    def sees(self, here: Vector, others: np.ndarray) -> np.ndarray:
+        """(n,) bool: which of these (n, 3) places, all within range, have a link to `here`."""
+        distances_m = np.maximum(np.linalg.norm(others - np.array(here), axis=1), 1e-3)
+        margins_db = 10 * self._obstacles.exponent * np.log10(self._range_m / distances_m)
+        linked: np.ndarray = margins_db > self._losses_db(here, others, distances_m)
+        return linked
+
+    def _losses_db(self, here: Vector, others: np.ndarray, distances_m: np.ndarray) -> list[float]:
+        count = len(others)
+        starts, ends = [here] * count, others.tolist()
+        entered = self._hits(starts, ends)
+        left = self._hits(ends, starts)
+        return [self._loss_db(entered[i], left[i], float(distances_m[i])) for i in range(count)]
+
+    def _loss_db(
+        self, entered: dict[int, float], left: dict[int, float], distance_m: float
+    ) -> float:
+        """From the shares of the way at which a ray meets each body, from either end."""
+        crossed = sorted({*entered, *left})
+        if self._obstacles.blocks:
+            return math.inf if crossed else 0.0
+        loss_db = 0.0
+        for body in crossed:
+            cuts = (body in entered) + (body in left)
+            inside = 1.0 - (entered.get(body, 0.0) + left.get(body, 0.0))
+            loss_db += cuts * self._cut_db[body] + inside * distance_m * self._obstacles.metre_db
+        return loss_db
+
+    def _hits(
+        self, starts: Sequence[Sequence[float]], ends: Sequence[Sequence[float]]
+    ) -> list[dict[int, float]]:
+        """For each ray, the bodies that it enters, and at which share of its way."""
+        found: list[dict[int, float]] = [{} for _ in starts]
+        for number in range(len(self._cut_db)):
+            hits = pybullet.rayTestBatch(
+                starts, ends, reportHitNumber=number, physicsClientId=self._client
+            )
+            bodies = [hit[0] for hit in hits]
+            for ray, hit in enumerate(hits):
+                if hit[0] != MISSED:
+                    found[ray].setdefault(hit[0], hit[2])
+            if self._obstacles.blocks or all(body == MISSED for body in bodies):
+                break
+        return found

@@ -1,0 +1,48 @@
+#!/usr/bin/env python3
+"""obstacles:=FILE: a wall hides a node from the mesh, and its drone flies over the wall."""
+
+from __future__ import annotations
+
+import unittest
+
+import rospy
+import rostest
+from rostest_support import LogWatch, MeshWatch, call
+
+from drone_mesh.msg import Location, MeshState
+from drone_mesh.srv import AreaScan
+
+WALL_TOP_M = 5.0
+
+
+class ObstaclesTest(unittest.TestCase):
+    def test_a_wall_hides_a_node_until_its_drone_has_flown_over_it(self) -> None:
+        rospy.init_node("test_obstacles")
+        log, mesh = LogWatch(), MeshWatch(3)
+        mesh.wait("router 1 connected", 60, lambda: mesh.connected([1]))
+        mesh.wait("router 2 heard of", 60, lambda: 2 in mesh.hops())
+        mesh.pass_time(25.0)  # two checks of each node
+        self.assertIsNone(mesh.hops()[2], "the wall does not stop the radio")
+        self.assertEqual(bytes(call("/SignalSimulator/othersinRange", AreaScan, 1).near), b"\0")
+        state = rospy.wait_for_message("/mesh/state", MeshState, timeout=20)
+        (box,) = state.obstacles
+        self.assertEqual((box.center[:2], box.size[2]), ((3.0, 0.0), WALL_TOP_M))
+
+        goal = rospy.Publisher("/Drones/2/goal", Location, queue_size=1, latch=True)
+        goal.publish(Location(latitude=2.0, longitude=1.0, height=0))
+        highest_m = 0.0
+
+        def has_arrived() -> bool:
+            nonlocal highest_m
+            x, y, height = mesh.place(2)
+            highest_m = max(highest_m, height)
+            return (x, y, height) == (1.0, 2.0, 0)
+
+        mesh.wait("drone 2 on this side of the wall", 60, has_arrived)
+        self.assertGreaterEqual(highest_m, WALL_TOP_M)
+        mesh.wait("all connected", 60, mesh.connected)
+        self.assertEqual(log.failures(), [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "obstacles", ObstaclesTest)

@@ -1,0 +1,166 @@
+import pytest
+
+from drone_mesh.communication.data.lane import LIFETIME_S
+from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, TicketState
+from drone_mesh.communication.data.transport import MOST_QUEUED
+from drone_mesh.communication.messages import is_data
+from drone_mesh.errors import MessageRefused, QueueFull
+from drone_mesh.inprocess import Network
+from drone_mesh.nrf24.medium_access import AccessRules, MediumAccess, Priority
+
+
+@pytest.fixture
+def network():
+    """Gateway 0 and routers 1, 2, 3 in a line, all connected."""
+    network = Network(seed=5)
+    network.add_gateway(0, 0.0, 0.0)
+    for node in (1, 2, 3):
+        network.add_router(node, 6.0 * node, 0.0)
+    assert network.run_until(network.all_connected, 30.0)
+    network.run_for(1.0)
+    return network
+
+
+def payloads(network, node):
+    return [message.payload for message in network.received.get(node, [])]
+
+
+@pytest.mark.parametrize("size", [0, 17, 18, 1024])
+def test_a_reliable_message_arrives_over_three_hops_and_its_ticket_says_so(network, size):
+    ticket = network.send(3, 0, b"x" * size, port=9)
+    assert ticket.state is TicketState.QUEUED or ticket.state is TicketState.SENT
+    network.run_for(1.0)
+    (message,) = network.received[0]
+    assert (message.sender, message.port, message.payload) == (3, 9, b"x" * size)
+    assert ticket.state is TicketState.DELIVERED
+
+
+def test_a_message_for_the_gateway_goes_to_the_one_that_the_node_uses(network):
+    ticket = network.send(2, TO_GATEWAY, b"up")
+    network.run_for(1.0)
+    assert payloads(network, 0) == [b"up"]
+    assert ticket.state is TicketState.DELIVERED
+
+
+def test_a_message_to_all_comes_to_each_node_once(network):
+    ticket = network.send(1, TO_ALL, b"to everyone in the whole mesh")
+    network.run_for(1.0)
+    assert {node: len(got) for node, got in network.received.items()} == {0: 1, 2: 1, 3: 1}
+    assert ticket.state is TicketState.SENT
+    assert ticket.final
+
+
+def test_a_message_to_itself_is_delivered_at_once(network):
+    assert network.send(2, 2, b"me").state is TicketState.DELIVERED
+    assert payloads(network, 2) == [b"me"]
+
+
+def test_without_acknowledgement_no_ack_comes_back(network):
+    sent = []
+    network.nodes[0].antenna.send_message_to = lambda payload: bool(sent.append(payload)) or True
+    ticket = network.send(1, 0, b"best effort", reliable=False)
+    network.run_for(1.0)
+    assert ticket.state is TicketState.SENT
+    assert payloads(network, 0) == [b"best effort"]
+    assert [payload for payload in sent if is_data(payload)] == []
+
+
+def test_a_reliable_message_waits_for_a_route_and_then_arrives(network):
+    network.power(2, False)
+    network.run_for(5.0)
+    ticket = network.send(3, 0, b"late")
+    network.run_for(10.0)
+    assert ticket.state is not TicketState.DELIVERED
+    network.power(2, True)
+    network.run_for(30.0)
+    assert ticket.state is TicketState.DELIVERED
+    assert payloads(network, 0) == [b"late"]
+
+
+def test_without_a_route_it_is_given_up_at_the_end_of_its_life_with_the_reason(network):
+    ticket = network.send(3, 77, b"nobody")
+    network.run_for(LIFETIME_S + 1.0)
+    assert str(ticket) == "message 1 to node 77: given up: no route to node 77 for 240 s"
+
+
+def test_without_a_route_best_effort_is_given_up_at_once(network):
+    ticket = network.send(3, 77, b"nobody", reliable=False)
+    assert (ticket.state, ticket.reason) == (TicketState.GIVEN_UP, "no route to node 77")
+
+
+@pytest.mark.parametrize(
+    ("to", "payload", "port", "why"),
+    [
+        (256, b"", 0, "invalid destination 256"),
+        (-1, b"", 0, "invalid destination -1"),
+        (0, b"", 256, "invalid port 256"),
+        (0, bytes(1025), 0, "too large: 1025 bytes, at most 1024"),
+    ],
+)
+def test_a_bad_message_is_refused_with_the_reason(network, to, payload, port, why):
+    with pytest.raises(MessageRefused, match=why):
+        network.send(1, to, payload, port)
+
+
+def test_a_full_queue_is_an_error_and_has_room_again_later(network):
+    for _ in range(MOST_QUEUED):
+        network.send(3, 0, bytes(200))
+    with pytest.raises(QueueFull, match="64 messages wait"):
+        network.send(3, 0, b"one more")
+    network.run_for(5.0)
+    network.send(3, 0, b"one more")
+    network.run_for(1.0)
+    assert len(payloads(network, 0)) == MOST_QUEUED + 1
+
+
+def test_after_a_restart_of_the_sender_its_messages_are_not_taken_for_old_ones(network):
+    network.send(3, 0, b"before")
+    network.run_for(1.0)
+    restarted = Network(seed=5)
+    restarted.add_gateway(0, 0.0, 0.0)
+    restarted.add_router(3, 6.0, 0.0)
+    restarted.run_for(20.0)
+    transport = restarted.nodes[3].component.data
+    transport._session = 1 + network.nodes[3].component.data._session
+    heard = []
+    restarted.nodes[0].component.on_msg = lambda payload, now_s: heard.append(payload)
+    restarted.send(3, 0, b"after")
+    restarted.run_for(0.1)
+    for payload in filter(is_data, heard):
+        network.inject(0, payload)
+    assert payloads(network, 0) == [b"before", b"after"]
+
+
+def test_an_echo_says_how_far_a_node_is_and_over_which_nodes(network):
+    answers = []
+    assert network.echo(0, 3, answers.append)
+    network.run_for(1.0)
+    (answer,) = answers
+    assert (answer.node, answer.hops, answer.route) == (3, 3, (1, 2))
+    assert answer.round_trip_s == pytest.approx(0.012)
+    assert not network.echo(0, 77, answers.append)
+
+
+def test_a_neighbour_counts_as_lost_only_after_nine_lost_packets_of_a_user(network):
+    tried = []
+    network.nodes[1].antenna.send_message_to = lambda payload: bool(tried.append(payload))
+    network.send(1, 0, b"one packet", reliable=False)
+    assert len([payload for payload in tried if is_data(payload) and payload[3] == 0]) == 9
+
+
+def test_packets_of_the_mesh_go_before_those_of_users():
+    access = MediumAccess(AccessRules.for_cycle(0.002), rng=None)
+    for name in (b"d1", b"d2"):
+        access.offer(5, name, 0.0, Priority.DATA)
+    access.offer(5, b"c1", 0.0)
+    access.offer(5, b"c2", 0.0)
+    assert access.due(1.0).payload == b"c1"
+
+
+def test_users_packets_leave_room_in_the_queue():
+    rules = AccessRules.for_cycle(0.002)
+    access = MediumAccess(rules, rng=None)
+    taken = [access.offer(5, b"%d" % n, 0.0, Priority.DATA) for n in range(rules.queue_length)]
+    assert sum(taken) == rules.data_queue_length
+    assert access.data_room() == 0
+    assert access.offer(5, b"of the mesh", 0.0)

@@ -1,0 +1,79 @@
+"""Orders in a mesh: what their gateway knows in the end is what the drone did."""
+
+from __future__ import annotations
+
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.inprocess import Network
+
+
+def line(**settings):
+    """Gateway 0 and the routers 1..4, 6 m apart, connected."""
+    network = Network(seed=3, **settings)
+    network.add_gateway(0, 0.0, 0.0)
+    for node_id in (1, 2, 3):
+        network.add_router(node_id, 6.0 * node_id, 0.0)
+    network.add_router(4, 24.0, 0.0, why_not_fly="it stands on the ground")
+    assert network.run_until(network.all_connected, within_s=30.0)
+    return network
+
+
+def ends(network):
+    """Drone, state and reason of each order."""
+    orders = network.nodes[0].component.get_orders()
+    return [(order.drone, order.state.value, order.reason) for order in orders]
+
+
+def test_a_drone_three_hops_away_accepts_flies_far_and_arrives():
+    network = line()
+    assert network.order(3, 18.0, 6.0)
+    network.run_for(0.5)
+    assert ends(network) == [(3, "under way", "")]
+    network.run_for(15.0)
+    assert ends(network) == [(3, "arrived", "")]
+
+
+def test_a_drone_on_the_ground_refuses_over_four_hops_with_its_reason():
+    network = line()
+    assert network.order(4, 24.0, 1.0)
+    network.run_for(0.5)
+    assert ends(network) == [(4, "refused", "drone 4 cannot fly: it stands on the ground")]
+
+
+def test_a_drone_that_flew_out_of_reach_is_given_up():
+    network = line()
+    assert network.order(3, 400.0, 400.0)
+    network.run_for(30.0 + 21 * 15.0)
+    assert ends(network) == [(3, "given up", "nothing more was heard of the drone")]
+
+
+def test_a_relay_that_dies_under_an_order_ends_it_without_a_route():
+    network = line()
+    network.power(2, False)
+    assert network.order(3, 18.0, 3.0)  # relay 1 took it
+    network.run_for(1.0)
+    assert ends(network) == [(3, "no route", "")]
+
+
+def test_on_a_lossy_medium_each_order_is_flown_once_and_its_end_is_known():
+    states = []
+    for seed in range(6):
+        network = Network(seed=seed, loss=0.35, timing=MeshTiming(send_attempts=2))
+        network.add_gateway(0, 0.0, 0.0)
+        for node_id in (1, 2):
+            network.add_router(node_id, 5.0 * node_id, 0.0)
+        flown = {1: [], 2: []}
+        for node_id, goals in flown.items():
+            drone = network.nodes[node_id].drone
+            fly = drone.set_goal
+            drone.set_goal = lambda *goal, fly=fly, goals=goals: (goals.append(goal), fly(*goal))
+        assert network.run_until(network.all_connected, within_s=60.0)
+        for node_id in flown:
+            network.order(node_id, 5.0 * node_id, 2.0)
+        network.run_for(400.0)
+        for drone, state, _reason in ends(network):
+            states.append(state)
+            ordered = [goal for goal in flown[drone] if goal == (2.0, 5.0 * drone, 0.0)]
+            assert len(ordered) <= 1
+            assert ordered or state != "arrived"
+    assert set(states) <= {"arrived", "no route", "given up"}
+    assert states.count("arrived") >= 6

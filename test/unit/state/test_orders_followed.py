@@ -1,0 +1,45 @@
+"""The events of gateways say how far the latest order of a drone has come."""
+
+from __future__ import annotations
+
+from drone_mesh.state.model import EventRecord
+from drone_mesh.state.orders import OrderWatch
+
+
+def watch(*events):
+    """(gateway, kind, detail) of drone 5."""
+    watch = OrderWatch()
+    watch.take(EventRecord(1.0, node, kind, (5,), detail) for node, kind, detail in events)
+    return watch
+
+
+SENT = (0, "order sent", "order 7: to x 1.00 m, y 2.00 m, z 3 m")
+
+
+def test_an_order_is_followed_from_the_question_to_the_arrival():
+    assert watch(SENT).words(5) == "asked: to x 1.00 m, y 2.00 m, z 3 m"
+    assert watch(SENT, (0, "order accepted", "order 7")).words(5) == "under way"
+    assert watch(SENT, (0, "order arrived", "order 7")).words(5) == "arrived"
+
+
+def test_a_refusal_and_the_end_of_a_flight_elsewhere_keep_their_reason():
+    refused = watch(SENT, (0, "order refused", "order 7: battery at 9 %: land"))
+    assert refused.words(5) == "refused: battery at 9 %: land"
+    assert watch(SENT, (0, "order given up", "order 7: lost")).words(5) == "given up: lost"
+
+
+def test_the_end_of_an_older_order_does_not_hide_the_latest_one():
+    followed = (0, "order sent", "order 8: to x 0.00 m, y 0.00 m, z 0 m")
+    ended = (0, "order given up", "order 7: another order came")
+    assert watch(SENT, followed, ended).words(5).startswith("asked")
+
+
+def test_a_second_gateway_without_a_route_does_not_hide_the_first_ones_success():
+    assert watch(SENT, (1, "no route", "order 3")).words(5).startswith("asked")
+    assert watch((1, "no route", "order 3"), SENT).words(5).startswith("asked")
+    assert watch((0, "no route", "order 7")).words(5) == "no route"
+
+
+def test_other_drones_and_relays_that_have_no_route_say_nothing_of_an_order():
+    assert watch(SENT).words(6) == ""
+    assert watch((3, "no route", "")).words(5) == ""

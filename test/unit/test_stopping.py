@@ -1,0 +1,75 @@
+"""StopRequest, as signal handlers and threads use it."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import threading
+
+import pytest
+
+from drone_mesh.stopping import StopRequest
+
+LONG_S = 60.0
+
+
+def test_a_request_that_was_not_made_is_waited_for_no_longer_than_asked():
+    with StopRequest() as request:
+        assert not request.wait(0.0)
+        assert not request.wait(0.001)
+        assert not request.is_made()
+
+
+def test_each_thread_that_waits_sees_a_request_now_and_later():
+    seen = []
+    with StopRequest() as request:
+        threads = [
+            threading.Thread(target=lambda: seen.append(request.wait(LONG_S))) for _ in range(3)
+        ]
+        for thread in threads:
+            thread.start()
+        request.make()
+        request.make()
+        for thread in threads:
+            thread.join(LONG_S)
+        assert seen == [True, True, True]
+        assert request.wait(LONG_S)
+
+
+def test_a_signal_handler_makes_it_while_its_own_thread_waits():
+    """At 300 different moments of the wait, which would catch a lock that the thread holds."""
+    before = signal.getsignal(signal.SIGUSR1)
+    try:
+        for _round in range(300):
+            with StopRequest() as request:
+                signal.signal(signal.SIGUSR1, lambda *_: request.make())
+                sender = threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGUSR1))
+                sender.start()
+                while not request.wait(0.00001):
+                    pass
+                sender.join()
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+
+def test_it_works_in_a_program_with_a_thousand_open_sockets():
+    limit, _most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if limit < 1100:
+        pytest.skip(f"this machine allows {limit} open files")
+    opened = [os.open(os.devnull, os.O_RDONLY) for _ in range(1030)]
+    try:
+        with StopRequest() as request:
+            assert not request.wait(0.0)
+            request.make()
+            assert request.wait(LONG_S)
+    finally:
+        for descriptor in opened:
+            os.close(descriptor)
+
+
+def test_closing_it_ends_the_wait_of_those_who_ask_later():
+    request = StopRequest()
+    request.close()
+    request.make()
+    assert request.wait(LONG_S)

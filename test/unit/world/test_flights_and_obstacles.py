@@ -1,0 +1,74 @@
+"""Drones of the world fly over obstacles, or refuse; and bodies hit them."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.air.obstacles import Box, Obstacles
+from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import ConfigurationError, GoalRefused
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.dynamic_engine import DynamicEngine
+from drone_mesh.world.factory import DroneFactory
+from drone_mesh.world.still_world import StillWorld
+
+TOWER = Box((3.0, 0.0, 3.0), (1.0, 1.0, 6.0))  # between the two routers, higher than their climb
+
+
+def fleet(world, box, wind=None):
+    return DroneFactory(world, 0, 2, 2, 6.0, False, wind, Obstacles([box])).drones
+
+
+@pytest.mark.parametrize("wind", [None, (0.0, 0.0, 0.0)], ids=["kinematic", "dynamic"])
+def test_a_flight_goes_over_a_tower(wind):
+    with BulletWorld() as world:
+        drone, _ = fleet(world, TOWER, wind)
+        drone.engine.set_goal(1.0, 5.0, 0)
+        places = []
+        drone.engine.add_listener(lambda state: places.append(state.position))
+        world.step()
+        while drone.engine.state.is_flying:
+            assert world.now_s < 60.0
+            world.step()
+        assert drone.engine.get_location().distance_m(Location(1.0, 5.0, 0.0)) < 0.3
+        above = [z for x, y, z in places if abs(x - 3.0) < 0.5 and abs(y) < 1.0]
+        assert above
+        assert min(above) > 6.3
+        assert not getattr(drone.engine, "crashed", False)
+
+
+def test_a_goal_in_or_against_a_box_is_refused_with_the_reason():
+    world = StillWorld()
+    drone, _ = fleet(world, TOWER)
+    for x in (3.0, 3.6):
+        with pytest.raises(GoalRefused, match=r"obstacles leave no way to x 3.* m, y 0 m, z 1 m"):
+            drone.engine.set_goal(0.0, x, 1)
+    world.step()
+    assert not drone.engine.state.is_flying
+
+
+def test_a_drone_under_a_roof_refuses_to_climb_through_it():
+    roof = Box((0.0, 0.0, 2.0), (2.0, 2.0, 0.2))
+    drone, other = fleet(StillWorld(), roof)
+    with pytest.raises(GoalRefused, match="obstacles leave no way"):
+        drone.engine.set_goal(3.0, 3.0, 0)
+    other.engine.set_goal(3.0, 3.0, 0)
+
+
+def test_a_drone_that_would_start_against_a_box_ends_the_start_with_one_line():
+    with pytest.raises(ConfigurationError, match="drone 1 would start in or against a box, at x 6"):
+        fleet(StillWorld(), Box((6.6, 0.0, 1.0), (1.0, 1.0, 2.0)))
+
+
+def test_a_body_that_flies_into_a_box_crashes_and_does_not_pass_through_it():
+    with BulletWorld() as world:
+        world.add_obstacle(TOWER)
+        body = world.add_body((0.2, 0.2, 0.1), (0.0, 0.0, 1.0), 1.0)
+        engine = DynamicEngine(world, body, (0.0, 0.0, 1.0), 0.05, plan_flight=FlightPath)
+        engine._hover = Location.from_vector((12.0, 0.0, 1.0))  # straight through the tower
+        for _ in range(500):
+            world.step()
+            assert engine.state.position[0] < 2.5
+        assert engine.crashed
+        assert engine.get_location().height < 0.05  # it fell
