@@ -1,8 +1,8 @@
 """FrameStore: what a page should know, and the difference to what it knows already.
 
 A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), `gone` (ids),
-`events` and `samples` (new ones), and `obstacles` (all, if they have changed). A page that has
-version v gets what changed after v, however long ago that was: a page that falls behind gets a
+`events` and `samples` (new ones), `obstacles` and `story` (all, if they have changed). A page that
+has version v gets what changed after v, however long ago that was: a page that falls behind gets a
 larger difference, and nothing is queued for it.
 
 The fields of a node are those of NodeState.msg, with what is decided here and only shown there:
@@ -55,6 +55,7 @@ class FrameStore:
         self._sampled_at_s = float("-inf")
         self._lost_links = LostLinks()
         self._orders = OrderWatch()
+        self._story: tuple[int, Mapping[str, Any]] = (0, {})
         self._run_began_at = 0
         self._obstacles: list[dict[str, Any]] = []
         self._obstacles_at = 0
@@ -116,6 +117,17 @@ class FrameStore:
                 )
             )
 
+    @property
+    def mesh(self) -> MeshStatus | None:
+        """The newest state."""
+        return self._mesh
+
+    def set_story(self, story: Mapping[str, Any]) -> None:
+        """Set what the page tells about a demonstration; empty: nothing."""
+        if story != self._story[1]:
+            self._next_version()
+            self._story = self.version, story
+
     def set_link(self, text: str) -> None:
         """Set why no states arrive, in words for the page; empty: they do."""
         if text != self._link:
@@ -159,6 +171,8 @@ class FrameStore:
             frame["events"] = events[-EVENTS_PER_FRAME:]
         if samples := [asdict(sample) for at, sample in self._samples if at > version]:
             frame["samples"] = samples
+        if self._story[0] > version:
+            frame["story"] = self._story[1]
         return frame
 
     def _links(self, nodes: Sequence[NodeStatus], wall_s: float) -> dict[int, dict[str, str]]:

@@ -96,16 +96,27 @@ class NeighbourWatch(_Request):
     node: NodeOrNone
 
 
+class Demonstrate(_Request):
+    """The page wants the demonstration of a repair to begin, or to end."""
+
+    do: Literal["demonstrate"]
+    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
+    on: bool
+
+
 class _Numbered(_Request):
     number: int
 
 
-_REQUESTS: TypeAdapter[PageOrder | NeighbourWatch] = TypeAdapter(
-    Annotated[Union[_Power, _Fly, _Layout, _Speed, NeighbourWatch], Field(discriminator="do")]
+_REQUESTS: TypeAdapter[PageOrder | NeighbourWatch | Demonstrate] = TypeAdapter(
+    Annotated[
+        Union[_Power, _Fly, _Layout, _Speed, NeighbourWatch, Demonstrate],
+        Field(discriminator="do"),
+    ]
 )
 
 
-def parse_request(text: str) -> PageOrder | NeighbourWatch:
+def parse_request(text: str) -> PageOrder | NeighbourWatch | Demonstrate:
     """Parse a page's message. Raises OrderRefused for anything but a valid request."""
     try:
         return _REQUESTS.validate_json(text)

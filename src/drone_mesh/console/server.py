@@ -29,6 +29,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import (
     LIMITS,
+    Demonstrate,
     MeshControls,
     NeighbourWatch,
     OrderRefused,
@@ -36,6 +37,7 @@ from drone_mesh.console.orders import (
     number_of,
     parse_request,
 )
+from drone_mesh.console.stage import Stage
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied
 
@@ -123,12 +125,16 @@ class ConsoleServer:
         controls: MeshControls,
         access: Access,
         layouts: Sequence[tuple[int, str]] = (),
+        demonstrate: bool = False,
     ) -> None:
+        """`demonstrate`: show a repair as soon as a page is open."""
         self._store = store
         self._controls = controls
         self._layouts = layouts
         self._pages: set[Page] = set()
         self._workers = ThreadPoolExecutor(ORDER_THREADS, thread_name_prefix="order")
+        self._stage = Stage(store, controls, self._workers)
+        self._demonstrate = demonstrate
         self.app = Starlette(
             routes=[
                 Route("/", self._index),
@@ -164,6 +170,9 @@ class ConsoleServer:
         sender = None
         try:
             await socket.accept()
+            if self._demonstrate:
+                self._demonstrate = False
+                self._stage.begin()
             sender = asyncio.ensure_future(self._send_frames(page))
             receiver = asyncio.ensure_future(self._receive(page))
             await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
@@ -225,6 +234,13 @@ class ConsoleServer:
             page.watching = request.node
             if request.node is not None:
                 await self._send(page, self._detail(request.node))
+        elif isinstance(request, Demonstrate):
+            try:
+                text = self._stage.begin() if request.on else self._stage.end()
+            except OrderRefused as error:
+                await self._answer(page, request.number, False, str(error))
+            else:
+                await self._answer(page, request.number, True, text)
         elif len(page.orders) >= MOST_ORDERS_WAITING:
             await self._answer(page, request.number, False, "too many orders at once")
         else:

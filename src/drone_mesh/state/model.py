@@ -11,10 +11,13 @@ from dataclasses import dataclass
 from typing import Sequence
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.router_states import Repair
 from drone_mesh.drone.roles import Role
 
 UNKNOWN_POSITION = (math.nan, math.nan, math.nan)
+REPAIR_STATES = tuple(Repair)  # in the order of the constants of NodeState.msg
 
 
 @dataclass
@@ -41,6 +44,10 @@ class NodeStatus:
     tries: float = 0.0  # per packet on a shared channel; 0 on another medium
     queue: int = 0  # packets that wait to be sent
     given_up: int = 0  # packets that no try could deliver
+    repair_state: int = 0  # index of REPAIR_STATES
+    bid: float = NO_BID
+    place_of: int = NO_ROUTE
+    emergency_in: float = math.inf  # simulated s
     repair: str = ""  # what it does about a lost connection, and why; empty: nothing to repair
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Iterable
 
 import numpy as np
 
 from drone_mesh.air.obstacles import Box
 from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR
+from drone_mesh.communication.router_states import Repair
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath, Vector
 from drone_mesh.drone.roles import Role
-from drone_mesh.state.model import NodeStatus, ObstacleStatus
+from drone_mesh.state.model import REPAIR_STATES, NodeStatus, ObstacleStatus
 from drone_mesh.state.roster import DroneView
 
 OLDEST_AGE_S = 255  # the largest value of one byte
@@ -34,7 +37,12 @@ def describe_component(
     use = component.get_channel_use()
     status.airtime, status.tries = use.airtime, use.tries
     status.queue, status.given_up = use.waiting, use.given_up
-    status.repair = component.get_repair_status().in_words(now_s) if on else ""
+    repair = component.get_repair_status() if on else NOTHING_TO_REPAIR
+    status.repair = repair.in_words(now_s)
+    status.repair_state = REPAIR_STATES.index(repair.state)
+    status.bid, status.place_of = repair.bid, repair.place_of
+    waits = repair.state is Repair.LOST
+    status.emergency_in = repair.emergency_s - now_s if waits else math.inf
     heard_s = component.get_neighbours()
     # numpy, because a crowd of 254 has 36,000 neighbours to list twice a second.
     ids = np.fromiter(heard_s, np.uint8, len(heard_s))

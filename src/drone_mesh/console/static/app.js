@@ -6,6 +6,7 @@ import { EventLog } from "./log.js";
 import { MapView } from "./map.js";
 import { Mesh } from "./mesh.js";
 import { NodePanel } from "./panel.js";
+import { Story } from "./story.js";
 import { NodeTable } from "./table.js";
 
 const TOAST_MS = 5000;
@@ -53,6 +54,8 @@ const panel = new NodePanel(
 );
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
+new Story(mesh, (on) => order({ do: "demonstrate", on }));
+mesh.addEventListener("story", () => mesh.story.running && !map.moved && map.fit());
 
 // The header
 

@@ -28,6 +28,7 @@ export class Mesh extends EventTarget {
     this.links = { known: [], lost: [], route: [] }; // use -> [[id, higher id]]
     this.events = [];
     this.samples = [];
+    this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}}
     this.selected = null;
     this.detail = null; // {node, neighbours: [[id, age]]} of the selected node
   }
@@ -37,6 +38,7 @@ export class Mesh extends EventTarget {
       this.nodes.clear();
       this.events = [];
       this.samples = [];
+      this.story = {};
     }
     if (frame.full || frame.obstacles) this.obstacles = frame.obstacles ?? [];
     this.clock = frame.clock;
@@ -58,6 +60,8 @@ export class Mesh extends EventTarget {
     if (linksChanged) this.#relink();
     if (frame.events) this.events = this.events.concat(frame.events).slice(-EVENTS_KEPT);
     if (frame.samples) this.samples = this.samples.concat(frame.samples).slice(-SAMPLES_KEPT);
+    if (frame.story) this.story = frame.story;
+    if (frame.full || frame.story) this.#notify("story");
     if (this.selected !== null && !this.nodes.has(this.selected)) this.select(null);
     this.#notify("frame", {
       changed,

@@ -29,6 +29,7 @@ from drone_mesh.web.access import access_for, is_loopback
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
 OLD_STATE_S = 3.0  # wall time without a state after which the page shows a warning
 TOKEN_BYTES = 18
+REPAIR_DEMO = "repair"
 EVERYWHERE = ("0.0.0.0", "::")  # addresses that mean all addresses of this machine
 
 log = logging.getLogger(__name__)
@@ -107,7 +108,8 @@ def main() -> None:
 
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
     (str): password of the console; if none is given, an address that other machines can reach
-    gets a random one. /DroneManager/casus (str): the file of the layouts.
+    gets a random one; ~demo (str): "repair" shows a repair as soon as a page is open.
+    /DroneManager/casus (str): the file of the layouts.
     """
     prepare_node(main.__doc__)
     run_tool("console", _run)
@@ -121,9 +123,13 @@ def _run() -> int:
     token = str(rospy.get_param("~token", ""))
     if not token and not is_loopback(address):
         token = secrets.token_urlsafe(TOKEN_BYTES)
+    demo = str(rospy.get_param("~demo", ""))
+    if demo not in ("", REPAIR_DEMO):
+        raise ConfigurationError(f"invalid demo {demo!r}: must be {REPAIR_DEMO} or empty")
     store = FrameStore()
     layouts = layout_names(manager_layouts())
-    server = ConsoleServer(store, RosControls(), access_for(address, token), layouts)
+    access = access_for(address, token)
+    server = ConsoleServer(store, RosControls(), access, layouts, demo == REPAIR_DEMO)
     runner = ConsoleRunner(server, address, port)
     stop = StopRequest()  # rospy's signal handler makes it, in the thread that waits for it
     rospy.on_shutdown(stop.make)
@@ -131,6 +137,8 @@ def _run() -> int:
     name = socket.gethostname() if address in EVERYWHERE else address
     name = f"[{name}]" if ":" in name else name
     # Not to the log, which is public on /rosout: the token is secret.
+    if demo:
+        print("the demonstration begins when a browser opens this page:", flush=True)
     print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
     try:
         MeshFeed(store, runner).watch_master(stop)

@@ -1,0 +1,58 @@
+// The demonstration of a repair: its sentences, and how long the mesh still waits at the last one.
+
+const byId = (id) => document.getElementById(id);
+
+export class Story {
+  /** `demonstrate(on)` begins a demonstration, or ends it and closes its story. */
+  constructor(mesh, demonstrate) {
+    this.mesh = mesh;
+    this.demonstrate = demonstrate;
+    mesh.addEventListener("story", () => this.#show());
+    byId("demonstrate").addEventListener("click", () => demonstrate(!this.running));
+    byId("story-close").addEventListener("click", () => demonstrate(false));
+  }
+
+  get running() {
+    return Boolean(this.mesh.story.running);
+  }
+
+  #show() {
+    const { steps = [], wait = {}, running = false } = this.mesh.story;
+    byId("story-card").hidden = !steps.length;
+    document.body.toggleAttribute("data-story", Boolean(steps.length));
+    byId("demonstrate").textContent = running ? "End" : "Show a repair";
+    byId("demonstrate").setAttribute("aria-pressed", running);
+    this.#list(steps);
+    byId("story-wait").hidden = wait.left === undefined;
+    if (wait.left === undefined) return;
+    byId("story-left").max = wait.of;
+    byId("story-left").value = wait.of - wait.left;
+    byId("story-wait").lastElementChild.textContent = `${wait.left} s`;
+  }
+
+  /** Rewrites only what changed: a screen reader announces each change. */
+  #list(steps) {
+    const list = byId("story");
+    while (list.children.length > steps.length) list.lastElementChild.remove();
+    let changed = false;
+    steps.forEach(({ t, text }, index) => {
+      const row = list.children[index] ?? list.appendChild(this.#row());
+      const [time, words] = row.children;
+      if (words.textContent === text) return;
+      time.textContent = `${t.toFixed(0)} s`;
+      words.textContent = text;
+      changed = true;
+    });
+    for (const row of list.children) {
+      if (row === list.lastElementChild) row.setAttribute("aria-current", "step");
+      else row.removeAttribute("aria-current");
+    }
+    if (changed) list.scrollTop = list.scrollHeight;
+  }
+
+  #row() {
+    const row = document.createElement("li");
+    row.append(document.createElement("time"), document.createElement("span"));
+    return row;
+  }
+}

@@ -1,0 +1,216 @@
+"""RepairStory: a repair in sentences, from one state of the mesh to the next.
+
+It reads nothing but states, so what it says holds for a live mesh and for a recording.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Iterable, Sequence
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.router_states import Repair
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus
+
+# Strategy -> what a bid is, what its unit is, and what makes the highest one. Others only bid.
+_BIDS = {
+    "thesis": ("its distance to the gateway", " m", "is farthest"),
+    "nearest": ("how near it is to that place", "", "is nearest"),
+}
+_ELECTION = (Repair.ASKING, Repair.NEGOTIATING, Repair.WATCHING)
+
+
+@dataclass(frozen=True)
+class StoryStep:
+    """One sentence. Times are simulated seconds."""
+
+    at_s: float  # when the step began
+    text: str
+    until_s: float = math.inf  # the mesh waits until then; inf: it does not wait
+
+
+class RepairStory:
+    """Adds a step when something new happens, and rewrites the last one while it lasts.
+
+    Belongs to one thread.
+    """
+
+    def __init__(self) -> None:
+        self.steps: list[StoryStep] = []
+        self._key: tuple[object, ...] | None = None  # of the step that lasts
+        self._before: dict[int, NodeStatus] = {}
+        self._lost: set[int] = set()  # since the last time that all were connected
+        self._lost_at_s = math.inf
+        self._fell_silent: dict[int, float] = {}  # node -> when it was switched off
+        self._bids: dict[int, float] = {}
+        self._fliers: dict[int, int] = {}  # node -> the node whose place it took
+        self._has_taken_off: set[int] = set()
+
+    def tell(self, text: str, at_s: float, until_s: float = math.inf) -> None:
+        """Add a sentence of the caller."""
+        self._key = None
+        self.steps.append(StoryStep(at_s, text, until_s))
+
+    def update(self, mesh: MeshStatus) -> None:
+        """Go on to this state: not older than the last one, and it does not change any more."""
+        nodes = {node.id: node for node in mesh.nodes}
+        self._tell_power(nodes, mesh.stamp_s)
+        routers = [node for node in nodes.values() if node.on and node.role == Role.ROUTER]
+        by_state = {
+            state: [node for node in routers if REPAIR_STATES[node.repair_state] is state]
+            for state in Repair
+        }
+        if by_state[Repair.FLYING]:
+            self._tell_flights(by_state[Repair.FLYING], mesh)
+        elif any(by_state[state] for state in _ELECTION):
+            self._tell_bids([n for state in _ELECTION for n in by_state[state]], mesh)
+        elif by_state[Repair.LOST]:
+            self._tell_loss(by_state[Repair.LOST], mesh)
+        elif self._lost and all(node.connected for node in routers if node.id in self._lost):
+            self._tell_end(mesh)
+        self._before = nodes
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no repair is under way."""
+        return not self._lost
+
+    def _tell_power(self, nodes: dict[int, NodeStatus], now_s: float) -> None:
+        off = [n for n, node in nodes.items() if not node.on and self._was(n).on]
+        for node_id in off:
+            self._fell_silent[node_id] = now_s
+            behind = [n.id for n in self._before.values() if node_id in list(n.route)[1:-1]]
+            way = f" It was on the way of {and_(behind)} to the gateway." if behind else ""
+            self.tell(f"{self._name(node_id)} is switched off.{way}", now_s)
+
+    def _tell_loss(self, waiting: Sequence[NodeStatus], mesh: MeshStatus) -> None:
+        """They wait for another way to a gateway."""
+        now_s, ids = mesh.stamp_s, [node.id for node in waiting]
+        if not self._lost:
+            self._lost_at_s = now_s
+        self._lost.update(ids)
+        until_s = now_s + min(node.emergency_in for node in waiting)
+        text = f"{and_(ids)} lost the gateway: no heartbeat is answered"
+        if self._fliers:
+            helped = [n.id for n in mesh.nodes if n.id in self._fliers and n.connected]
+            text = f"{and_(ids)} still {_each(ids, 'has', 'have')} no gateway"
+            text = (
+                f"{and_(helped)} {_each(helped, 'is', 'are')} connected; {text}" if helped else text
+            )
+        waits = _each(ids, "It waits", "Each waits")
+        text += f". {waits} for another route before it negotiates"
+        self._last(("lost", len(self._fliers)), text, now_s, until_s)
+
+    def _tell_bids(self, group: Sequence[NodeStatus], mesh: MeshStatus) -> None:
+        """They negotiate."""
+        now_s = mesh.stamp_s
+        if self._key is None or self._key[0] not in ("asking", "bids"):
+            self._bids.clear()
+        ids = sorted(node.id for node in group)
+        self._lost.update(ids)
+        ago = f" {now_s - self._lost_at_s:.0f} s ago" if self._lost_at_s < now_s else ""
+        lost = f"{and_(ids)} lost the gateway{ago}"
+        bidding = [n for n in group if REPAIR_STATES[n.repair_state] is not Repair.ASKING]
+        if not bidding:
+            asks = _each(ids, "it asks", "each asks")
+            self._last(("asking",), f"{lost}; {asks} where its neighbours stand", now_s)
+            return
+        for node in bidding:
+            self._bids[node.id] = node.bid
+        bids = sorted((n for n in bidding if n.bid >= 0), key=lambda n: (-n.bid, n.id))
+        what, unit, _why = _BIDS.get(mesh.repair_strategy, ("", "", ""))
+        parts = [lost]
+        if bids:
+            who = ", ".join(f"{n.id} bids {_bid(n.bid, unit)}" for n in bids)
+            meaning = f" (a bid is {what})" if what else ""
+            parts.append(f"to take the place of {and_({n.place_of for n in bids})}, {who}{meaning}")
+        abstain: dict[str, list[int]] = {}
+        for node in bidding:
+            if node.bid < 0:
+                abstain.setdefault(node.repair.partition("does not bid")[2], []).append(node.id)
+        for why, ids in abstain.items():
+            parts.append(f"{and_(ids)} {_each(ids, 'does', 'do')} not bid{why}")
+        self._last(("bids", len(self._fliers)), "; ".join(parts), now_s)
+
+    def _tell_flights(self, fliers: Sequence[NodeStatus], mesh: MeshStatus) -> None:
+        for node in fliers:
+            self._lost.add(node.id)
+            self._fliers[node.id] = node.place_of
+            self._tell_flight(node, mesh)
+
+    def _tell_flight(self, node: NodeStatus, mesh: MeshStatus) -> None:
+        now_s, place = mesh.stamp_s, self._place(node.place_of)
+        if len(node.path):
+            self._has_taken_off.add(node.id)
+        elif node.id in self._has_taken_off:
+            text = (
+                f"{node.id} has landed at {place}; it looks whether another drone stands there, "
+                "and introduces itself"
+            )
+            self._last(("landed", node.id), text, now_s)
+            return
+        others = sorted(self._lost - {node.id} - set(self._fliers))
+        rest = f"; {and_(others)} wait{_each(others, 's', '')} for it" if others else ""
+        _what, unit, is_best = _BIDS.get(mesh.repair_strategy, ("", "", "bids most"))
+        bids = {n: bid for n, bid in self._bids.items() if bid >= 0}
+        if not self._bids:
+            why = f"{node.id} has no neighbours left and flies"
+        elif list(bids) == [node.id]:
+            why = f"{node.id} alone bids, and flies"
+        else:
+            bid = f" ({_bid(bids[node.id], unit)})" if node.id in bids else ""
+            why = f"{node.id} {is_best}{bid} and flies"
+        self._last(("flies", node.id, node.place_of), f"{why} to {place}{rest}", now_s)
+
+    def _tell_end(self, mesh: MeshStatus) -> None:
+        now_s = mesh.stamp_s
+        text = f"{and_(sorted(self._lost))} {_each(self._lost, 'is', 'are')} connected again"
+        silent = [(at_s, node_id) for node_id, at_s in self._fell_silent.items()]
+        if silent:
+            at_s, node_id = max(silent)
+            text += f", {now_s - at_s:.0f} s after node {node_id} fell silent"
+        for flier, place_of in self._fliers.items():
+            text += f"; {flier} stands at {self._place(place_of)}"
+        self._last(("over",), text, now_s)
+        self._lost.clear()
+        self._bids.clear()
+        self._fliers.clear()
+        self._has_taken_off.clear()
+        self._lost_at_s = math.inf
+        self._key = None
+
+    def _last(
+        self, key: tuple[object, ...], text: str, now_s: float, until_s: float = math.inf
+    ) -> None:
+        """The step with this key: a new one, or the last one in new words."""
+        if key == self._key:
+            self.steps[-1] = replace(self.steps[-1], text=text, until_s=until_s)
+        else:
+            self.tell(text, now_s, until_s)
+            self._key = key
+
+    def _was(self, node_id: int) -> NodeStatus:
+        return self._before.get(node_id, NodeStatus(node_id, on=False))
+
+    def _name(self, node_id: int) -> str:
+        is_gateway = self._was(node_id).role == Role.GATEWAY
+        return f"{'Gateway' if is_gateway else 'Router'} {node_id}"
+
+    def _place(self, node_id: int) -> str:
+        return "the place that it knows" if node_id == NO_ROUTE else f"node {node_id}'s place"
+
+
+def and_(ids: Iterable[int]) -> str:
+    """3 · 3 and 4 · 3, 4 and 5."""
+    words = [str(node_id) for node_id in sorted(ids)]
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+
+
+def _bid(bid: float, unit: str) -> str:
+    return f"{bid:.1f}{unit}" if unit else f"{bid:.2f}"
+
+
+def _each(ids: Iterable[int], one: str, several: str) -> str:
+    return one if len(list(ids)) == 1 else several

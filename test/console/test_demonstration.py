@@ -1,0 +1,61 @@
+"""The page shows a repair step by step."""
+
+from __future__ import annotations
+
+import re
+
+from axe_playwright_python.sync_playwright import Axe
+from conftest import Visit
+
+HASTE = ("--skip", "15", "--spacing", "1", "--haste", "5")
+PHONE = {"viewport": {"width": 390, "height": 844}}
+
+
+def sentences(page: Visit) -> list[str]:
+    return page.page.locator("#story li span").all_inner_texts()
+
+
+def wait_for_sentence(page: Visit, pattern: str, within_s: float = 60.0) -> None:
+    page.wait_for(
+        f"a sentence like {pattern!r}",
+        lambda: any(re.search(pattern, text) for text in sentences(page)),
+        within_s,
+    )
+
+
+def test_the_button_shows_a_repair_from_the_loss_to_the_reconnection(start_console, visit):
+    page = visit(start_console(*HASTE).url)
+    page.wait_for_drones(18)
+    page.page.click("#demonstrate")
+    wait_for_sentence(page, "12 other drones would help")
+    wait_for_sentence(page, "Router 2 is switched off. It was on the way of 3, 4 and 5")
+    page.wait_for("a countdown", lambda: page.page.is_visible("#story-left"), 30.0)
+    wait_for_sentence(page, r"3 bids 18.0 m, 4 bids 15.5 m, 5 bids 15.3 m")
+    wait_for_sentence(page, "3 is farthest .* flies to node 2's place")
+    wait_for_sentence(page, "3, 4 and 5 are connected again, [0-9]+ s after node 2 fell silent")
+    page.wait_for("the end", lambda: page.page.inner_text("#demonstrate") == "Show a repair")
+    page.wait_for("the others are on", lambda: page.row(17, 2) != "off")
+    assert page.row(2, 2) == "off"
+    page.page.click("#story-close")
+    page.wait_for("the story closes", lambda: not page.page.is_visible("#story-card"))
+    assert page.complaints == []
+
+
+def test_a_demonstration_that_was_asked_for_at_the_start_begins_with_the_first_page(
+    start_console, visit
+):
+    page = visit(start_console(*HASTE, "--demonstrate").url, **PHONE)
+    wait_for_sentence(page, "The gateway sends five drones out")
+    assert page.page.evaluate("document.documentElement.scrollWidth") == 390
+    found = Axe().run(page.page)
+    assert found.violations_count == 0, found.generate_report()
+    page.page.click("#demonstrate")
+    wait_for_sentence(page, "Not finished: ended by hand")
+    page.wait_for("the rest is on again", lambda: page.page.inner_text("#demonstrate") != "End")
+
+
+def test_a_fleet_that_is_too_small_is_told_so(start_console, visit):
+    page = visit(start_console("--routers", "4", *HASTE).url)
+    page.wait_for_drones(5)
+    page.page.click("#demonstrate")
+    wait_for_sentence(page, "a repair takes a gateway and 5 routers to show")
