@@ -121,6 +121,12 @@ class NodeState(Message, NodeStatus):
     ROUTER: Final = 0
     GATEWAY: Final = 1
     UNKNOWN: Final = 255
+    AT_REST: Final = 0
+    LOST: Final = 1
+    ASKING: Final = 2
+    NEGOTIATING: Final = 3
+    WATCHING: Final = 4
+    FLYING: Final = 5
     id: int
     role: int
     on: bool
@@ -141,6 +147,10 @@ class NodeState(Message, NodeStatus):
     tries: float
     queue: int
     given_up: int
+    repair_state: int
+    bid: float
+    place_of: int
+    emergency_in: float
     repair: str
     def __init__(
         self,
@@ -164,6 +174,10 @@ class NodeState(Message, NodeStatus):
         tries: float = ...,
         queue: int = ...,
         given_up: int = ...,
+        repair_state: int = ...,
+        bid: float = ...,
+        place_of: int = ...,
+        emergency_in: float = ...,
         repair: str = ...,
     ) -> None: ...
 
