@@ -219,10 +219,15 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         else:
             self._process(payload, creator, from_, kind)
 
-    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+        """The routes learn from this."""
+        self._deadlines.now_s = now_s
+        self._delivery.delivered(neighbour, tries)
+
+    def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         """Send the packet over another route, if there is one; the routes learn from this."""
         self._deadlines.now_s = now_s
-        if not self._delivery.undelivered(payload):
+        if not self._delivery.undelivered(payload, tries):
             self._forwarding.stranded(payload, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:

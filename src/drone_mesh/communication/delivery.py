@@ -81,11 +81,14 @@ class Delivery:
     def _hand_over(self, payload: bytes, to: int) -> bool:
         """Have the antenna queue a packet; what becomes of it is known later."""
         taken = self._antenna.send_message_to(payload)
-        if taken:
-            self._sent(to, self._antenna.transmissions_of_last_send())
+        self.total_sent += taken
         return taken
 
-    def undelivered(self, payload: bytes) -> bool:
+    def delivered(self, to: int, tries: int) -> None:
+        """The antenna has delivered a packet that it had queued."""
+        self._routing.sent(to, True, tries)
+
+    def undelivered(self, payload: bytes, tries: int) -> bool:
         """The antenna gave a packet up. True if it goes on over another route.
 
         A neighbour that was heard a moment ago is not lost by that: the channel was busy. The
@@ -93,7 +96,7 @@ class Delivery:
         """
         to, other = messages.receiver(payload), messages.addressee(payload)
         self.total_sent -= 1
-        self._routing.sent(to, False, self._antenna.transmissions_of_last_send())
+        self._routing.sent(to, False, tries)
         silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
         heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
         if heard and messages.is_data(payload):

@@ -32,7 +32,11 @@ class IMeshNetwork(abc.ABC):
         """This node's id, 0..253."""
 
     @abc.abstractmethod
-    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+        """A neighbour has a packet that the antenna had taken over, after so many tries."""
+
+    @abc.abstractmethod
+    def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         """The antenna gives up a packet that it had taken over for the neighbour in byte 3."""
 
     @abc.abstractmethod
@@ -146,7 +150,7 @@ class IWirelessCommunication(abc.ABC):
         """Send to the node in byte 3. True: that node has it.
 
         On a shared medium True means that the antenna has taken the packet over; it calls
-        `on_undelivered` if it has to give up.
+        `on_delivered` or `on_undelivered` later.
         """
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:

@@ -24,6 +24,7 @@ from drone_mesh.state.model import (
     MeshStatus,
     NodeStatus,
     ObstacleStatus,
+    channel_in_words,
     footprint,
     position_is_known,
 )
@@ -228,6 +229,7 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "position": _centimetres(node.position) if position_is_known(node) else None,
         "path": _centimetres(node.path),
         "repair": node.repair,
+        "channel": channel_in_words(node),
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,
     }

@@ -200,9 +200,13 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         if packet is None:
             return
         fate = self.access.tried(packet, acknowledged, now_s)
-        if fate is Fate.GIVEN_UP and self._mesh is not None:
-            mesh = self._mesh
-            self._submit(lambda now_s: mesh.on_undelivered(packet.payload, now_s))
+        mesh, tries = self._mesh, packet.tries
+        if mesh is None or packet.receiver == ALL_NODES:
+            pass
+        elif fate is Fate.GIVEN_UP:
+            self._submit(lambda now_s: mesh.on_undelivered(packet.payload, tries, now_s))
+        elif fate is Fate.DELIVERED:
+            self._submit(lambda now_s: mesh.on_delivered(packet.receiver, tries, now_s))
         self._plan()
 
     # Receiving -------------------------------------------------------------------------------

@@ -56,7 +56,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._radio = radio
         self._submit = submit
         self._runtime = runtime or SystemRuntime()
-        self._sender = Sender(radio, self._runtime, self._given_up)
+        self._sender = Sender(radio, self._runtime, self._delivered, self._given_up)
         self._medium = medium_of(radio.settings)
         self._meter = ChannelMeter(self._runtime.now_s())
         self._on_payload = on_payload
@@ -159,10 +159,15 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         """Counters of the radio, and the duplicates that were seen."""
         return replace(self._radio.statistics(), duplicates=self._duplicates)
 
-    def _given_up(self, payload: bytes) -> None:
+    def _delivered(self, node: int, tries: int) -> None:
         mesh = self._mesh
         if mesh is not None and self._powered and not self._silent:
-            self._submit(lambda now_s: mesh.on_undelivered(payload, now_s))
+            self._submit(lambda now_s: mesh.on_delivered(node, tries, now_s))
+
+    def _given_up(self, payload: bytes, tries: int) -> None:
+        mesh = self._mesh
+        if mesh is not None and self._powered and not self._silent:
+            self._submit(lambda now_s: mesh.on_undelivered(payload, tries, now_s))
 
     def _show(self, info: IMeshDebugInfo) -> None:
         use = self.channel_use()

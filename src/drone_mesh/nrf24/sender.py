@@ -20,12 +20,17 @@ class Sender:
         self,
         radio: NRF24LowLevelInterface,
         runtime: Runtime,
-        on_given_up: Callable[[bytes], None],
+        on_delivered: Callable[[int, int], None],
+        on_given_up: Callable[[bytes, int], None],
     ) -> None:
-        """`on_given_up` takes a packet that no try could deliver; called in the sending thread."""
+        """Both are called in the sending thread, with the number of tries.
+
+        `on_delivered` takes the node that has a packet, `on_given_up` a lost packet.
+        """
         self._radio = radio
         self._access = radio.access
         self._runtime = runtime
+        self._on_delivered = on_delivered
         self._on_given_up = on_given_up
         self._lock = runtime.lock()
         self._news = runtime.signal()
@@ -105,4 +110,6 @@ class Sender:
         if fate is Fate.GIVEN_UP:
             radio.drop()
             if not self._closed:
-                self._on_given_up(payload)
+                self._on_given_up(payload, packet.tries)
+        elif fate is Fate.DELIVERED and packet.receiver != ALL_NODES and not self._closed:
+            self._on_delivered(packet.receiver, packet.tries)

@@ -96,6 +96,16 @@ class MeshStatus:
     obstacles: Sequence[ObstacleStatus] = ()
 
 
+def channel_in_words(node: NodeStatus) -> str:
+    """What a node does on a shared channel; empty on another medium."""
+    if not node.tries:
+        return ""
+    return (
+        f"{100 * node.airtime:.1f} % airtime, {node.tries:.2f} tries per packet, "
+        f"{node.queue} waiting, {node.given_up} given up"
+    )
+
+
 def position_is_known(node: NodeStatus) -> bool:
     """Whether the world or the node itself has reported where the node is."""
     return math.isfinite(node.position[0])

@@ -7,6 +7,7 @@ from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.techniques.etx_tree import EtxTree
 
 HEARTBEAT, PRESENT, REQUEST, MISSING = 4, 3, 2, 5
 ANSWER = "00 00 04 01 01 01 00 00"  # of gateway 0, a neighbour
@@ -543,3 +544,14 @@ def test_a_router_whose_only_route_is_gone_asks_around_at_once():
     rig.hear("02 02 05 01 01 00")
     assert not rig.mesh.get_connected_to_gateway()
     assert packet("01 01 03 fe fe 02 00") in rig.broadcasts()
+
+
+def test_a_queued_packet_teaches_the_routes_when_the_antenna_says_what_became_of_it():
+    routing = EtxTree()
+    rig = Rig(routing=routing)
+    rig.antenna.medium = Medium(shared=True)
+    rig.connect_through(2)
+    rig.mesh.send_heartbeat(0)
+    assert routing.links.etx(2) == 1.0
+    rig.mesh.on_delivered(2, 4, rig.now_s)
+    assert routing.links.etx(2) > 1.0

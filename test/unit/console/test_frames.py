@@ -216,3 +216,12 @@ def test_the_latest_order_of_a_drone_is_shown_with_it():
     store.update_mesh(mesh(), wall_s=0.0)
     assert frame(store, 0)["nodes"]["1"]["order"] == "under way"
     assert frame(store, 0)["nodes"]["0"]["order"] == ""
+
+
+def test_a_node_on_a_shared_channel_says_what_it_does_there():
+    store = FrameStore()
+    busy = {"airtime": 0.0123, "tries": 1.254, "queue": 2, "given_up": 1}
+    store.update_mesh(MeshStatus(1.0, [NodeStatus(1, **busy), NodeStatus(2)]), wall_s=0.0)
+    channels = {node: fields["channel"] for node, fields in frame(store, 0)["nodes"].items()}
+    words = "1.2 % airtime, 1.25 tries per packet, 2 waiting, 1 given up"
+    assert channels == {"1": words, "2": ""}

@@ -24,7 +24,7 @@ class Mesh(IMeshNetwork):
 
     def __init__(self, node_id):
         self.node_id = node_id
-        self.heard, self.undelivered = [], []
+        self.heard, self.delivered, self.undelivered = [], [], []
 
     def get_node_id(self):
         return self.node_id
@@ -32,7 +32,11 @@ class Mesh(IMeshNetwork):
     def on_msg(self, payload, now_s):
         self.heard.append((now_s, payload))
 
-    def on_undelivered(self, payload, now_s):
+    def on_delivered(self, neighbour, tries, now_s):
+        self.delivered.append((neighbour, tries))
+
+    def on_undelivered(self, payload, tries, now_s):
+        assert tries > 1
         self.undelivered.append(payload)
 
     def on_antenna_power(self, on, now_s):
@@ -102,6 +106,16 @@ def test_a_lost_acknowledgement_costs_a_frame_and_no_second_delivery():
     assert len(bench.meshes[1].heard) == 1
     assert bench.air.frames == 4
     assert bench.meshes[0].undelivered == []
+
+
+def test_the_mesh_learns_after_how_many_tries_a_packet_was_delivered():
+    bench = Bench(0.0, 6.0)
+    lost = []
+    bench.loses = lambda hop: len(lost) < 5 and not lost.append(hop)
+    bench.antennas[0].broadcast_message(packet(0, 254))
+    bench.antennas[0].send_message_to(packet(0, 1))
+    bench.run(2.0)
+    assert bench.meshes[0].delivered == [(1, 3)]  # two frames per try
 
 
 def test_a_receiver_that_is_gone_costs_18_frames_and_is_reported():

@@ -18,7 +18,7 @@ class Mesh(IMeshNetwork):
 
     def __init__(self, node_id):
         self.node_id = node_id
-        self.heard, self.power, self.undelivered = [], [], []
+        self.heard, self.power, self.delivered, self.undelivered = [], [], [], []
 
     def get_node_id(self):
         return self.node_id
@@ -26,7 +26,11 @@ class Mesh(IMeshNetwork):
     def on_msg(self, payload, now_s):
         self.heard.append(payload)
 
-    def on_undelivered(self, payload, now_s):
+    def on_delivered(self, neighbour, tries, now_s):
+        self.delivered.append((neighbour, tries))
+
+    def on_undelivered(self, payload, tries, now_s):
+        assert tries > 1
         self.undelivered.append(payload)
 
     def on_antenna_power(self, on, now_s):
@@ -70,6 +74,7 @@ def test_a_packet_reaches_the_node_in_byte_3_and_no_other(lab, nodes):
     lab.clock.sleep(0.1)
     assert [node.mesh.heard for node in nodes] == [[], [], [packet(2)]]
     assert nodes[2].shown == [packet(2)]
+    assert nodes[0].mesh.delivered == [(2, 1)]
 
 
 def test_a_broadcast_is_one_frame_and_each_receiver_finds_its_own_id_in_byte_3(lab, nodes):

@@ -53,6 +53,7 @@ export class NodePanel {
       ["Known nodes", String(node.known_nodes)],
       ["Messages sent", String(node.total_messages)],
       ["Position", node.position ? node.position.map((m) => m.toFixed(2)).join(", ") : "–"],
+      ...(node.channel ? [["Radio channel", node.channel, { wide: true }]] : []),
       ["Route", node.route.length ? node.route : "–", { glue: " › ", wide: true }],
       ["Neighbours, seconds since last heard", this.#neighbours(node), { glue: ", ", wide: true }],
     ];
