@@ -24,10 +24,7 @@ class InProcessMesh:
         gridsize: int,
         spacing: float,
         max_distance: float = 9.0,
-        haste: float = 1.0,
     ):
-        """`haste`: how many times faster than ordered its time runs."""
-        self._haste = haste
         self._lock = threading.Lock()
         self._network = Network(seed=1, max_distance_m=max_distance)
         self._network.add_fleet(1, routers, gridsize, spacing)
@@ -43,7 +40,7 @@ class InProcessMesh:
             now = time.monotonic()
             with self._lock:
                 if not self.paused:
-                    self._network.run_for((now - before) * self.factor * self._haste)
+                    self._network.run_for((now - before) * self.factor)
             before = now
 
     def skip(self, seconds: float) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Callable, Dict, Generator, List, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.router_states import Repair
 from drone_mesh.console.orders import MeshControls, OrderRefused
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus, position_is_known
@@ -26,8 +27,7 @@ _SETTLE_S = 25.0  # two checks of the default: each has asked where its next hop
 _REPAIR_WITHIN_S = 240.0
 # Simulated seconds per second: waiting is shortened, and what takes a moment is drawn out.
 _FAST, _WAITING, _BIDDING, _FLYING = 5.0, 3.0, 0.2, 0.5
-_PACE = {"LOST": _WAITING, "ASKING": _BIDDING, "NEGOTIATING": _BIDDING, "WATCHING": _BIDDING,
-         "FLYING": _FLYING}  # fmt: skip
+_SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss what follows
 
 
 class RepairDemonstration:
@@ -131,9 +131,7 @@ class RepairDemonstration:
                     f"{and_(group)} {_why_not(nodes)} after {_REPAIR_WITHIN_S:.0f} s: the "
                     f"demonstration ends (repair strategy: {mesh.repair_strategy or 'unknown'})"
                 )
-            busiest = max((node.repair_state for node in nodes), default=0)
-            pace = _PACE.get(REPAIR_STATES[busiest].name, _WAITING)
-            mesh = yield self._at_pace(pace)
+            mesh = yield self._at_pace(_pace(nodes))
 
     def _until(
         self,
@@ -192,6 +190,16 @@ def _stand_at(mesh: MeshStatus, goals: Places) -> bool:
 
 def _know_fallback(mesh: MeshStatus, group: Sequence[int], lost: int) -> bool:
     return all(node.fallback == lost for node in mesh.nodes if node.id in group)
+
+
+def _pace(group: Sequence[NodeStatus]) -> float:
+    states = {REPAIR_STATES[node.repair_state] for node in group}
+    if Repair.FLYING in states:
+        return _FLYING
+    if states & {Repair.ASKING, Repair.NEGOTIATING, Repair.WATCHING}:
+        return _BIDDING
+    soon = any(node.emergency_in < _SLOW_DOWN_S for node in group)
+    return _FLYING if soon else _WAITING
 
 
 def _why_not(nodes: Sequence[NodeStatus]) -> str:
