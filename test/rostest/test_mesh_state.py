@@ -93,6 +93,9 @@ class MeshStateTest(unittest.TestCase):
 
     def test_3_a_flight_is_seen_and_the_world_can_be_paused(self) -> None:
         wait_for("all connected", WALL_LIMIT_S, lambda: self.hops() == [0, 1, 1, 2])
+        call("/DroneManager/requestDroneMovement", RequestDroneFlight, 3, 1.0, 12.0, 0)
+        wait_for("3 arrived", WALL_LIMIT_S, lambda: self.has_event(0, "order arrived"))
+        self.assertTrue(self.has_event(0, "order accepted"))
         call("/DroneManager/requestDroneMovement", RequestDroneFlight, 3, 30.0, 12.0, 0)
         wait_for("3 flies", WALL_LIMIT_S, lambda: len(self.state.nodes[3].path) >= 3)
         self.assertEqual(list(self.state.nodes[3].path[-3:]), [12.0, 30.0, 0.0])
