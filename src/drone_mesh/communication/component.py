@@ -38,6 +38,7 @@ from drone_mesh.communication.messages import (
     MessageType,
 )
 from drone_mesh.communication.neighbours import Neighbours
+from drone_mesh.communication.node_reports import NodeReporter
 from drone_mesh.communication.observer import (
     MeshEventKind,
     MeshObserver,
@@ -123,6 +124,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._parts, self, self._frame, rng, lambda neighbour: self.send_heartbeat(neighbour)
         )
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
+        self._reporter = NodeReporter(self._parts, self)
         self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway)
 
     # Driven from outside ---------------------------------------------------------------------
@@ -135,6 +137,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._antenna.debugging_mode(self, True)
         first_check_s = now_s + self._rng.random() * self._timing.check_period_s
         self._deadlines.set(Due.CHECK, first_check_s)
+        self._reporter.start(share=(first_check_s - now_s) / self._timing.check_period_s)
         self._report(MeshEventKind.STARTED)
         self._begin()
         self._routing.start_routing(self)
@@ -167,6 +170,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             self._orders.on_due()
         if now_s >= deadlines.get(Due.DATA):
             self.data.on_due()
+        if now_s >= deadlines.get(Due.NODE_REPORT):
+            self._reporter.on_due()
         due_s = deadlines.get(Due.CHECK)
         if now_s >= due_s:
             period_s = self._timing.check_period_s

@@ -18,6 +18,7 @@ class Due(enum.IntEnum):
     ORDER_REPLIES = 6  # what a drone still has to say of its orders
     ORDERS = 7  # what a gateway does about orders under way
     DATA = 8  # what users' messages wait for
+    NODE_REPORT = 9  # the next report to the gateway
 
 
 class Deadlines:

@@ -55,15 +55,24 @@ class Pilot:
         return flight.goal if flight is not None else None
 
     def location(self) -> Location | None:
-        """Where the drone is; None if it cannot say."""
+        """Where the drone is; None, with a line in the log, if it cannot say."""
         try:
-            location = self._engine.get_location()
-            if not all(map(math.isfinite, location)):
-                raise LocationUnknown(f"invalid position of the drone: {location}")
-            return location
+            return self._located()
         except LocationUnknown as error:
             self._complaints.add("own location unknown", str(error), self._deadlines.now_s)
             return None
+
+    def look(self) -> Location | None:
+        """Where the drone is; None if it cannot say, for those who can do without."""
+        try:
+            return self._located()
+        except LocationUnknown:
+            return None
+
+    def battery_percent(self) -> int | None:
+        """The charge of its battery; None if that is not known."""
+        percent = self._engine.battery_percent()
+        return None if percent is None else round(max(0.0, min(100.0, percent)))
 
     def why_not_fly(self) -> str:
         """Why the drone would not fly to a goal now; empty while it would."""
@@ -112,6 +121,12 @@ class Pilot:
         """No longer watch the flight."""
         self._flight = None
         self._deadlines.set(Due.ASK_POSITION, math.inf)
+
+    def _located(self) -> Location:
+        location = self._engine.get_location()
+        if not all(map(math.isfinite, location)):
+            raise LocationUnknown(f"invalid position of the drone: {location}")
+        return location
 
     def _ask_position_later(self) -> None:
         now_s = self._deadlines.now_s

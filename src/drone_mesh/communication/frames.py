@@ -10,7 +10,9 @@ from __future__ import annotations
 from drone_mesh.communication.messages import MessageType, frame_digest
 
 NO_FRAME = 0  # the digest of a node without an origin, and of nodes that know nothing of origins
-TYPES_WITH_PLACES = frozenset((int(MessageType.LOCATION), int(MessageType.MOVE_TO_LOCATION)))
+TYPES_WITH_PLACES = frozenset(
+    map(int, (MessageType.LOCATION, MessageType.MOVE_TO_LOCATION, MessageType.NODE_REPORT))
+)
 
 
 class CommonFrame:

@@ -20,6 +20,7 @@ from drone_mesh.communication.messages import (
     MessageType,
     MovementNegotiationMessage,
 )
+from drone_mesh.communication.node_reports import ReportBook, ReportedNode
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.order_book import OrderBook
 from drone_mesh.communication.order_messages import OrderReply
@@ -50,6 +51,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
+        self._reports = ReportBook()
         self._book = OrderBook(self._parts)
         self._orders.on_own_reply = self._book.on_outcome
 
@@ -100,6 +102,10 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         """The orders that it remembers, oldest first, and what became of them."""
         return self._book.records()
 
+    def get_node_reports(self) -> list[ReportedNode]:
+        """What other nodes have reported, by id. Any thread."""
+        return self._reports.nodes()
+
     def get_known_nodes(self) -> list[KnownNode]:
         """All other nodes that it has a route to or has heard from, by id."""
         nodes = []
@@ -119,6 +125,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._book.on_missing(missing)
 
     def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
+        if kind in (MessageType.NODE_REPORT, MessageType.NODE_WORDS):
+            self._reports.on_packet(creator, kind, payload, self._deadlines.now_s)
+            return
         if kind != MessageType.ORDER_REPLY:
             super()._on_report(payload, creator, kind)
             return

@@ -46,6 +46,8 @@ class MessageType(enum.IntEnum):
     MOVEMENT_NEGOTIATION = 7  # the bid of its creator to fly
     ORDER_REPLY = 64  # what a drone says of a numbered order; see order_messages
     ORDER_QUERY = 65  # asks for an ORDER_REPLY
+    NODE_REPORT = 66  # the state of its creator, for the gateway; see node_report
+    NODE_WORDS = 67  # why its creator cannot fly
 
 
 @dataclass(frozen=True)

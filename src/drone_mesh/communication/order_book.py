@@ -16,6 +16,7 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_messages import OrderOutcome, OrderQuery, OrderReply
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.text_parts import TextAssembly
 from drone_mesh.drone.interfaces import Location
 
 OLD_ORDERS_KEPT = 100  # our choice: beside the latest of each drone
@@ -58,7 +59,7 @@ class _Order:
     due_s: float = math.inf  # next repeat or query
     unanswered: int = 0  # packets since the drone was last heard about it
     settled: bool = False  # the drone itself has said how it ended
-    parts: dict[int, bytes] = field(default_factory=dict)  # of a reason in several packets
+    reason_parts: TextAssembly = field(default_factory=TextAssembly)
 
 
 class OrderBook:
@@ -115,14 +116,9 @@ class OrderBook:
         order = self._orders.get(reply.number)
         if order is None or order.drone != drone:
             return
-        if reply.last_part == 0:
-            self.on_outcome(reply.number, reply.outcome, _decoded(reply.text))
-            return
-        order.parts[reply.part] = reply.text
-        if all(part in order.parts for part in range(reply.last_part + 1)):
-            text = b"".join(order.parts[part] for part in range(reply.last_part + 1))
-            order.parts.clear()
-            self.on_outcome(reply.number, reply.outcome, _decoded(text))
+        reason = order.reason_parts.add(reply.part, reply.text)
+        if reason is not None:
+            self.on_outcome(reply.number, reply.outcome, reason)
 
     def on_outcome(self, number: int, outcome: OrderOutcome, reason: str) -> None:
         """A drone has said what became of an order."""
@@ -218,7 +214,3 @@ class OrderBook:
             self._last_number = int(self._parts.now_s * NUMBERS_PER_S) % HIGHEST_NUMBER
         self._last_number = self._last_number % HIGHEST_NUMBER + 1
         return self._last_number
-
-
-def _decoded(text: bytes) -> str:
-    return text.decode(errors="replace")

@@ -12,9 +12,9 @@ from typing import ClassVar
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.messages import HEADER_BYTES, MessageType
+from drone_mesh.communication.text_parts import is_valid, split
 
 TEXT_BYTES = 10  # of a reason, in one packet
-MOST_PARTS = 8  # our choice: 80 bytes of a reason; the rest is cut off
 
 
 class OrderOutcome(enum.IntEnum):
@@ -36,41 +36,31 @@ class OrderReply:
 
     number: int  # 1..65535
     outcome: OrderOutcome
-    part: int  # 0..last_part
-    last_part: int  # 0..MOST_PARTS - 1
+    part: int  # see text_parts.split
     text: bytes  # of the reason, UTF-8, at most TEXT_BYTES
-
-    def body(self) -> bytes:
-        """The body of the packet."""
-        parts = self.part | self.last_part << 4
-        return self.BODY.pack(self.number, self.outcome, parts, self.text)
 
     @classmethod
     def from_payload(cls, payload: bytes) -> OrderReply | None:
         """Decode; None for an outcome or a part that does not exist."""
-        number, outcome, parts, text = cls.BODY.unpack_from(payload, HEADER_BYTES)
-        part, last_part = parts & 0x0F, parts >> 4
+        number, outcome, part, text = cls.BODY.unpack_from(payload, HEADER_BYTES)
         try:
             known = OrderOutcome(outcome)
         except ValueError:
             return None
-        if not part <= last_part < MOST_PARTS:
-            return None
-        return cls(number, known, part, last_part, text.rstrip(b"\0"))
+        return cls(number, known, part, text) if is_valid(part) else None
 
 
 def reply_packets(
     number: int, outcome: OrderOutcome, reason: str, creator: int, gateway: int
 ) -> list[bytes]:
     """The reply in as many packets as its reason needs, from `creator` for `gateway`."""
-    text = reason.encode()[: TEXT_BYTES * MOST_PARTS]
-    parts = [text[at : at + TEXT_BYTES] for at in range(0, len(text), TEXT_BYTES)] or [b""]
-    replies = [
-        OrderReply(number, outcome, index, len(parts) - 1, part) for index, part in enumerate(parts)
+    bodies = [
+        OrderReply.BODY.pack(number, outcome, part, text)
+        for part, text in split(reason, TEXT_BYTES)
     ]
     return [
-        messages.packet(reply.TYPE, creator, creator, gateway, gateway, reply.body())
-        for reply in replies
+        messages.packet(OrderReply.TYPE, creator, creator, gateway, gateway, body)
+        for body in bodies
     ]
 
 

@@ -9,6 +9,7 @@ from drone_mesh.errors import ConfigurationError
 HEARTBEAT_ANSWER_S = 0.5  # one heartbeat to the gateway under way at a time
 CIRCULATION_S = 0.5  # within this time the same packet from elsewhere circulates
 FLIGHT_POSITION_PERIOD_S = 1.0  # a flying node asks its position this often
+MIN_REPORT_PERIOD_S = 30.0  # docs/protocol.md, "Node reports"
 LANDED_WITHIN_M = 0.1  # docs/protocol.md, "Flight"
 
 
@@ -19,6 +20,7 @@ class MeshTiming:
     check_period_s: float = 10.0  # how often a node looks after its routes and its connection
     connection_lost_after_s: float = 30.0  # without a gateway for so long: emergency
     send_attempts: int = 3  # transmissions of a packet without success, in all
+    report_period_s: float = 0.0  # how often a node reports to its gateway; 0: never
 
     def __post_init__(self) -> None:
         """Raises ConfigurationError for a number outside its range."""
@@ -34,4 +36,9 @@ class MeshTiming:
         if self.send_attempts < 1:
             raise ConfigurationError(
                 f"invalid send_attempts {self.send_attempts}: must be at least 1"
+            )
+        if not (self.report_period_s == 0 or self.report_period_s >= MIN_REPORT_PERIOD_S):
+            raise ConfigurationError(
+                f"invalid report_period {self.report_period_s}: must be 0 (no reports) or at "
+                f"least {MIN_REPORT_PERIOD_S:g} seconds"
             )

@@ -66,6 +66,10 @@ class IDroneEngine(abc.ABC):
         """Whether a flight to a goal is under way; None: judge by the places it reports."""
         return None
 
+    def battery_percent(self) -> float | None:
+        """The charge of its battery, 0..100; None: not known."""
+        return None
+
     def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
         """Fly to the place of another node, to repair the mesh; else as `set_goal`.
 

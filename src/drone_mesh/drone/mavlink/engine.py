@@ -80,6 +80,10 @@ class MavlinkEngine(IDroneEngine):
         """Whether a flight to a goal is under way."""
         return bool(self._goals) or self.status().is_flying
 
+    def battery_percent(self) -> float | None:
+        """As the autopilot reports it."""
+        return self.status().battery_percent
+
     def frame_digest(self) -> int:
         """That of --origin."""
         return self._origin.digest
