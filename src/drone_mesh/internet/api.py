@@ -4,16 +4,11 @@ No `from __future__ import annotations` here: FastAPI reads the annotations at r
 Python 3.8.
 """
 
-import hmac
 import logging
 import math
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
-from fastapi import Depends, FastAPI, Path, Request, Response
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
-from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
-from fastapi_offline import FastAPIOffline
+from fastapi import FastAPI, Path, Query, Response
 from pydantic import BaseModel, BeforeValidator, Field
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
@@ -23,10 +18,10 @@ from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.interfaces import Location
-from drone_mesh.errors import GoalRefused
-from drone_mesh.internet.asking import AnswerLate, GatewayDesk, NotCarriedOut
-from drone_mesh.internet.orders import Responses, add_order_requests
-from drone_mesh.internet.request_guard import RequestGuard
+from drone_mesh.internet.asking import GatewayDesk
+from drone_mesh.internet.guarded_app import REFUSALS, Refusal, Responses, guarded_app
+from drone_mesh.internet.orders import add_order_requests
+from drone_mesh.internet.status import ReadStatus, add_status_request
 from drone_mesh.web.access import Access
 
 _log = logging.getLogger(__name__)
@@ -39,12 +34,6 @@ Coordinate = Annotated[
 Height = Annotated[
     int, Path(ge=0, le=int(MAX_HEIGHT_M), description="Of the drone's underside, whole metres.")
 ]
-
-
-class Refusal(BaseModel):
-    """The reason for a refusal."""
-
-    detail: str
 
 
 class Ready(BaseModel):
@@ -121,51 +110,25 @@ def make_api(
     desk: GatewayDesk,
     access: Access,
     origin: Optional[Origin] = None,
-    status: Optional[Callable[[], Dict[str, Any]]] = None,
+    status: Optional[ReadStatus] = None,
+    mesh: Optional[Callable[[int], Dict[str, Any]]] = None,
 ) -> FastAPI:
     """The application. Its page /docs loads nothing from the internet.
 
     With the origin of the common frame, goals may be given in degrees. `status` is what the node
-    says of itself, from any thread.
+    says of itself, from any thread; `mesh`, on the gateway's, what it knows of all nodes, with the
+    events after a number.
     """
-    app = FastAPIOffline(
-        title="drone_mesh gateway",
-        description="Sends drones to places and lists the nodes that this gateway knows.",
-        version="1",
-        redoc_url=None,
-        # Each operation has one spelling.
-        redirect_slashes=False,
+    app, guards = guarded_app(
+        "drone_mesh gateway",
+        "Sends drones to places and lists the nodes that this gateway knows.",
+        access,
     )
-    app.add_middleware(RequestGuard, access=access)
-    _answer_errors_with_a_reason(app)
-    bearer = HTTPBearer(auto_error=False, description="Not needed if started without a token.")
-
-    async def check_token(
-        credentials: Annotated[Optional[HTTPAuthorizationCredentials], Depends(bearer)],
-    ) -> None:
-        if access.token is None:
-            return
-        given = credentials.credentials if credentials is not None else ""
-        if not hmac.compare_digest(given.encode(), access.token.encode()):
-            reason = "invalid token" if given else "token missing: send Authorization: Bearer"
-            raise HTTPException(401, reason, headers={"WWW-Authenticate": "Bearer"})
-
-    refusals: Responses = {
-        400: {"model": Refusal, "description": "Invalid Content-Length"},
-        401: {"model": Refusal, "description": "Token missing or invalid"},
-        403: {"model": Refusal, "description": "Sent by a page of another site"},
-        411: {"model": Refusal, "description": "A body of unknown length"},
-        413: {"model": Refusal, "description": "Body too large; no request needs one"},
-        414: {"model": Refusal, "description": "Address too long"},
-        431: {"model": Refusal, "description": "Headers too large"},
-        503: {"model": Refusal, "description": "Not done; nothing was sent"},
-        504: {"model": Refusal, "description": "Started, but not finished in time"},
-    }
+    refusals = REFUSALS
     order_refusals: Responses = {
         **refusals,
         422: {"model": Refusal, "description": "Invalid drone id or place"},
     }
-    guards = [Depends(check_token)]
 
     @app.get("/ready", dependencies=guards, responses=refusals)
     async def ready() -> Ready:
@@ -249,12 +212,16 @@ def make_api(
     add_order_requests(app, desk, guards, refusals, {**refusals, **not_found})
 
     if status is not None:
-        read_status = status
+        add_status_request(app, guards, status)
+    if mesh is not None:
+        read_mesh = mesh
 
-        @app.get("/status", dependencies=guards, responses={401: refusals[401]})
-        async def node_status() -> Dict[str, Any]:
-            """What the gateway's own node says of itself: mesh, radio, flight, version."""
-            return read_status()
+        @app.get("/mesh", dependencies=guards, responses=order_refusals)
+        async def whole_mesh(
+            after: Annotated[int, Query(ge=0, description="Events with higher numbers.")] = 0,
+        ) -> Dict[str, Any]:
+            """All nodes as they reported themselves, and what happened: for the web console."""
+            return await desk.ask(lambda _gateway, _now_s: read_mesh(after))
 
     return app
 
@@ -274,24 +241,3 @@ def _report_node(node: KnownNode, now_s: float) -> NodeReport:
         hops=None if node.hops == NO_ROUTE else node.hops,
         heard_s_ago=round(max(0.0, now_s - node.heard_s), 3) if heard else None,
     )
-
-
-def _answer_errors_with_a_reason(app: FastAPI) -> None:
-    def refuse(status: int, reason: str) -> JSONResponse:
-        return JSONResponse({"detail": reason}, status)
-
-    @app.exception_handler(RequestValidationError)
-    async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
-        return refuse(422, "; ".join(f"{e['loc'][-1]}: {e['msg']}" for e in error.errors()))
-
-    @app.exception_handler(GoalRefused)
-    async def bad_goal(_request: Request, error: GoalRefused) -> JSONResponse:
-        return refuse(422, str(error))
-
-    @app.exception_handler(NotCarriedOut)
-    async def not_carried_out(_request: Request, error: NotCarriedOut) -> JSONResponse:
-        return refuse(503, str(error))
-
-    @app.exception_handler(AnswerLate)
-    async def answer_late(_request: Request, error: AnswerLate) -> JSONResponse:
-        return refuse(504, str(error))

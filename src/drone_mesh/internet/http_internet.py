@@ -10,12 +10,12 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk, Submit
+from drone_mesh.internet.status import MOST_CONNECTIONS, ReadStatus
 from drone_mesh.web.access import access_for, own_names
 from drone_mesh.web.server_thread import ServerThread
 from drone_mesh.web.tls import Certificate
 
 ANSWER_WITHIN_S = 2.0  # our choice: over ten times the duration of an order to a lost node
-MOST_CONNECTIONS = 64  # our choice; more are answered 503
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +36,8 @@ class HttpInternet(IInternetConnection):
         certificate: Certificate | None = None,
         names: Iterable[str] = (),
         origin: Origin | None = None,
-        status: Callable[[], dict[str, Any]] | None = None,
+        status: ReadStatus | None = None,
+        mesh: Callable[[int], dict[str, Any]] | None = None,
     ) -> None:
         """Take the port (0: any free one).
 
@@ -48,7 +49,7 @@ class HttpInternet(IInternetConnection):
         access = access_for(bind_address, token, own_names(*names) if token else ())
         self._desk = GatewayDesk(submit, answer_within_s)
         self._server = ServerThread(
-            make_api(self._desk, access, origin, status),
+            make_api(self._desk, access, origin, status, mesh),
             bind_address,
             port,
             name="http",

@@ -4,7 +4,7 @@ No `from __future__ import annotations` here: FastAPI reads the annotations at r
 Python 3.8.
 """
 
-from typing import Any, Dict, List, Sequence, Union
+from typing import List, Sequence
 
 from fastapi import FastAPI, Path
 from fastapi.params import Depends
@@ -16,11 +16,11 @@ from drone_mesh.communication.interfaces import IGatewayCommands
 from drone_mesh.communication.order_book import HIGHEST_NUMBER
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.internet.asking import GatewayDesk
+from drone_mesh.internet.guarded_app import Responses
 
 OrderNumber = Annotated[
     int, Path(ge=1, le=HIGHEST_NUMBER, description="As in the Location header of the order.")
 ]
-Responses = Dict[Union[int, str], Dict[str, Any]]
 
 
 class OrderReport(BaseModel):

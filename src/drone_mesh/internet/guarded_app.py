@@ -1,0 +1,96 @@
+"""An application with what all HTTP sides of nodes share: guard, token, and errors with a reason.
+
+No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
+Python 3.8.
+"""
+
+import hmac
+from typing import Any, Dict, List, Optional, Tuple, Union
+
+from fastapi import Depends, FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.params import Depends as Guard
+from fastapi.responses import JSONResponse
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from fastapi_offline import FastAPIOffline
+from pydantic import BaseModel
+from starlette.exceptions import HTTPException
+from typing_extensions import Annotated
+
+from drone_mesh.errors import GoalRefused
+from drone_mesh.internet.asking import AnswerLate, NotCarriedOut
+from drone_mesh.internet.request_guard import RequestGuard
+from drone_mesh.web.access import Access
+
+Responses = Dict[Union[int, str], Dict[str, Any]]
+
+
+class Refusal(BaseModel):
+    """The reason for a refusal."""
+
+    detail: str
+
+
+REFUSALS: Responses = {
+    400: {"model": Refusal, "description": "Invalid Content-Length"},
+    401: {"model": Refusal, "description": "Token missing or invalid"},
+    403: {"model": Refusal, "description": "Sent by a page of another site"},
+    411: {"model": Refusal, "description": "A body of unknown length"},
+    413: {"model": Refusal, "description": "Body too large; no request needs one"},
+    414: {"model": Refusal, "description": "Address too long"},
+    431: {"model": Refusal, "description": "Headers too large"},
+    503: {"model": Refusal, "description": "Not done; nothing was sent"},
+    504: {"model": Refusal, "description": "Started, but not finished in time"},
+}
+"""What any request may be answered with."""
+
+
+def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, List[Guard]]:
+    """The application, and the dependencies of each operation that needs the token.
+
+    Its page /docs loads nothing from the internet.
+    """
+    app = FastAPIOffline(
+        title=title,
+        description=description,
+        version="1",
+        redoc_url=None,
+        # Each operation has one spelling.
+        redirect_slashes=False,
+    )
+    app.add_middleware(RequestGuard, access=access)
+    _answer_errors_with_a_reason(app)
+    bearer = HTTPBearer(auto_error=False, description="Not needed if started without a token.")
+
+    async def check_token(
+        credentials: Annotated[Optional[HTTPAuthorizationCredentials], Depends(bearer)],
+    ) -> None:
+        if access.token is None:
+            return
+        given = credentials.credentials if credentials is not None else ""
+        if not hmac.compare_digest(given.encode(), access.token.encode()):
+            reason = "invalid token" if given else "token missing: send Authorization: Bearer"
+            raise HTTPException(401, reason, headers={"WWW-Authenticate": "Bearer"})
+
+    return app, [Depends(check_token)]
+
+
+def _answer_errors_with_a_reason(app: FastAPI) -> None:
+    def refuse(status: int, reason: str) -> JSONResponse:
+        return JSONResponse({"detail": reason}, status)
+
+    @app.exception_handler(RequestValidationError)
+    async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
+        return refuse(422, "; ".join(f"{e['loc'][-1]}: {e['msg']}" for e in error.errors()))
+
+    @app.exception_handler(GoalRefused)
+    async def bad_goal(_request: Request, error: GoalRefused) -> JSONResponse:
+        return refuse(422, str(error))
+
+    @app.exception_handler(NotCarriedOut)
+    async def not_carried_out(_request: Request, error: NotCarriedOut) -> JSONResponse:
+        return refuse(503, str(error))
+
+    @app.exception_handler(AnswerLate)
+    async def answer_late(_request: Request, error: AnswerLate) -> JSONResponse:
+        return refuse(504, str(error))

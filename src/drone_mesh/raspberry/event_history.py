@@ -1,0 +1,66 @@
+"""EventHistory: the latest events of the nodes of one program, for the log and for readers."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from typing import Any
+
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+
+EVENTS_KEPT = 500  # our choice: an hour of a restless mesh
+
+_ABOUT_GATEWAYS = frozenset(
+    (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)
+)
+_WITHOUT_LINE = frozenset((MeshEventKind.NO_ROUTE, MeshEventKind.FLIGHT_ORDERED))
+
+_log = logging.getLogger(__name__)
+
+
+class EventHistory:
+    """Any thread. The lock guards number and history, and is held for no longer than a copy."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._number = 0
+        self._kept: deque[tuple[int, MeshEvent]] = deque(maxlen=EVENTS_KEPT)
+
+    def observe(self, event: MeshEvent) -> None:
+        """A MeshObserver."""
+        with self._lock:
+            self._number += 1
+            self._kept.append((self._number, event))
+        _log_event(event)
+
+    def since(self, number: int, started_s: float) -> list[dict[str, Any]]:
+        """The events after this number, oldest first, as JSON values; times count from a start."""
+        with self._lock:
+            kept = list(self._kept)
+        return [
+            {
+                "number": at,
+                "t": round(event.now_s - started_s, 2),
+                "node": event.node,
+                "kind": event.kind.value,
+                "peers": [event.peer] if event.peer <= MAX_NODE_ID else [],
+                "detail": event.detail,
+            }
+            for at, event in kept
+            if at > number
+        ]
+
+
+def _log_event(event: MeshEvent) -> None:
+    """One line per event; orders that are lost or flown have their own lines already."""
+    if event.kind in _WITHOUT_LINE:
+        return
+    words = [event.kind.value]
+    if event.peer <= MAX_NODE_ID:
+        words.append(f"gateway {event.peer}" if event.kind in _ABOUT_GATEWAYS else str(event.peer))
+    if event.detail:
+        words.append(f"({event.detail})")
+    level = logging.WARNING if event.kind is MeshEventKind.EMERGENCY else logging.INFO
+    _log.log(level, "node %d: %s", event.node, " ".join(words))
