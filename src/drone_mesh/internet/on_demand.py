@@ -10,6 +10,7 @@ from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 
 if TYPE_CHECKING:
     from drone_mesh.internet.asking import Submit
+    from drone_mesh.internet.status import ReadStatus, StatusServer
 
 
 def http_internet(
@@ -27,3 +28,14 @@ def http_internet(
             f"orders over HTTP need the Python package {error.name}: pip install 'drone_mesh[http]'"
         ) from error
     return HttpInternet(submit, address, port, token, **settings)
+
+
+def status_server(status: ReadStatus, *settings: Any) -> StatusServer:
+    """A StatusServer, see there. Raises ConfigurationError also if its libraries are missing."""
+    try:
+        from drone_mesh.internet.status import StatusServer
+    except ImportError as error:
+        raise ConfigurationError(
+            f"--http needs the Python package {error.name}: pip install 'drone_mesh[http]'"
+        ) from error
+    return StatusServer(status, *settings)

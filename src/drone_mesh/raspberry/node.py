@@ -6,16 +6,18 @@ import dataclasses
 import logging
 import random
 import time
-from typing import Any, Callable, Dict
+from typing import Any, Callable
 
 from drone_mesh.communication.assembly import assemble_component
-from drone_mesh.communication.interfaces import MAX_NODE_ID, IInternetConnection
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.raspberry.event_history import EventHistory
+from drone_mesh.raspberry.mesh_report import mesh_report
 from drone_mesh.raspberry.node_status import node_status
 from drone_mesh.raspberry.options import Options
 
@@ -23,11 +25,8 @@ ALIVE_WITHIN_S = 20.0  # our choice: two check periods; systemd's watchdog waits
 
 _log = logging.getLogger(__name__)
 
-ReadStatus = Callable[[], Dict[str, Any]]
-"""The status of a node; any thread may call it."""
-
-MakeInternet = Callable[[Callable[[Work], None], ReadStatus], IInternetConnection]
-"""Creates the internet connection of a gateway from `submit` and its node's status."""
+MakeInternet = Callable[["RadioNode"], IInternetConnection]
+"""Creates the internet connection of a gateway from its node, whose component comes later."""
 
 
 class RadioNode:
@@ -42,16 +41,20 @@ class RadioNode:
         engine: IDroneEngine,
         options: Options,
         make_internet: MakeInternet | None = None,
+        events: EventHistory | None = None,
     ) -> None:
-        """Takes ownership of radio and engine. Raises what `make_internet` raises."""
+        """Takes ownership of radio and engine. Raises what `make_internet` raises.
+
+        `events` is shared by the nodes of one program.
+        """
         self.radio = radio
         self.engine = engine
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
         self._seat = self._executor.seat()
         self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
-        self._internet = (
-            make_internet(self._seat.submit, self.status) if make_internet is not None else None
-        )
+        self._origin = options.flight.origin
+        self._events = EventHistory() if events is None else events
+        self._internet = None if make_internet is None else make_internet(self)
         self.component = assemble_component(
             radio.node_id,
             self._antenna,
@@ -62,10 +65,25 @@ class RadioNode:
             repair=options.repair,
             repair_options=RepairOptions(clearance_m=options.clearance_m),
             timing=options.timing,
-            observer=_log_event,
+            observer=self._events.observe,
         )
         self._started = False
         self._started_s = self._beat_s = time.monotonic()
+
+    def submit(self, work: Work) -> None:
+        """Have the node's own thread do this soon. Any thread."""
+        self._seat.submit(work)
+
+    def mesh(self, after: int) -> dict[str, Any]:
+        """A gateway's `mesh_report`, with the events after this number; for the node's thread."""
+        component, now_s = self.component, time.monotonic()
+        assert isinstance(component, MeshnetworkGateway)
+        report = mesh_report(component, self.engine, self._antenna.on(), self._origin, now_s)
+        return {
+            **report,
+            "uptime_s": round(now_s - self._started_s, 2),
+            "events": self._events.since(after, self._started_s),
+        }
 
     def status(self) -> dict[str, Any]:
         """What `node_status` says; any thread may call it."""
@@ -109,22 +127,3 @@ class RadioNode:
                 self._internet.disconnect()
             self.radio.close()
         self.engine.close()
-
-
-_ABOUT_GATEWAYS = frozenset(
-    (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)
-)
-_WITHOUT_LINE = frozenset((MeshEventKind.NO_ROUTE, MeshEventKind.FLIGHT_ORDERED))
-
-
-def _log_event(event: MeshEvent) -> None:
-    """One line per event; orders have their own lines already."""
-    if event.kind in _WITHOUT_LINE:
-        return
-    words = [event.kind.value]
-    if event.peer <= MAX_NODE_ID:
-        words.append(f"gateway {event.peer}" if event.kind in _ABOUT_GATEWAYS else str(event.peer))
-    if event.detail:
-        words.append(f"({event.detail})")
-    level = logging.WARNING if event.kind is MeshEventKind.EMERGENCY else logging.INFO
-    _log.log(level, "node %d: %s", event.node, " ".join(words))

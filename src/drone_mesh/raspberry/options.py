@@ -15,7 +15,7 @@ from drone_mesh.communication.repair_strategies import (
     create_repair_strategy,
 )
 from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_technique
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S, MeshTiming
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
@@ -77,7 +77,8 @@ class Options:
     emulated: int  # number of emulated nodes that replace the real one; 0: none
     trace: Path | None  # file for the frames on the emulated air
     log_level: str
-    http: HttpOptions | None  # None: not a gateway
+    gateway: bool
+    http: HttpOptions | None  # a router has it only if asked for
 
 
 def parse_router(
@@ -92,6 +93,12 @@ def parse_router(
         "--id", type=whole(0, MAX_NODE_ID), help="node id, 0..253, unique in the mesh"
     )
     _add_emulated(node)
+    http = parser.add_argument_group("HTTP")
+    http.add_argument(
+        "--http", action="store_true", help="answer GET /status over HTTP, for raspberry_status"
+    )
+    _add_http(http)
+    parser.set_defaults(gateway=False)
     return _options(parser, parser.parse_args(arguments), environment)
 
 
@@ -111,7 +118,12 @@ def parse_gateway(
         help="node id, 0..253, unique in the mesh (default: %(default)s)",
     )
     _add_emulated(node)
-    http = parser.add_argument_group("HTTP")
+    _add_http(parser.add_argument_group("HTTP"))
+    parser.set_defaults(gateway=True, http=True)
+    return _options(parser, parser.parse_args(arguments), environment)
+
+
+def _add_http(http: argparse._ArgumentGroup) -> None:
     http.add_argument(
         "--bind",
         metavar="ADDRESS",
@@ -140,7 +152,6 @@ def parse_gateway(
     )
     http.add_argument("--cert", metavar="FILE", type=Path, help="certificate (PEM), for HTTPS")
     http.add_argument("--key", metavar="FILE", type=Path, help="its private key (PEM)")
-    return _options(parser, parser.parse_args(arguments), environment)
 
 
 def _parser(program: str, description: str) -> argparse.ArgumentParser:
@@ -196,6 +207,14 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         default=MeshTiming.connection_lost_after_s,
         metavar="SECONDS",
         help="time without a gateway until the node repairs the mesh (default: %(default)g)",
+    )
+    mesh.add_argument(
+        "--report-period",
+        type=float,
+        default=MIN_REPORT_PERIOD_S,
+        metavar="SECONDS",
+        help="how often a router reports its state to its gateway, for GET /mesh and the web "
+        f"console: at least {MIN_REPORT_PERIOD_S:g}, 0 for never (default: %(default)g)",
     )
     mesh.add_argument(
         "--routing",
@@ -260,6 +279,9 @@ def _options(
         parser.error("--trace needs --emulated: a real radio cannot record the frames of others")
     if (parsed.latitude is None) != (parsed.longitude is None):
         parser.error("--latitude and --longitude: give both, or neither")
+    for name in () if parsed.http else ("bind", "port", "token_file", "name", "cert", "key"):
+        if getattr(parsed, name) != parser.get_default(name):
+            parser.error(f"--{name.replace('_', '-')} needs --http")
     location = None
     if parsed.latitude is not None:
         location = Location(parsed.latitude, parsed.longitude, parsed.height)
@@ -279,7 +301,11 @@ def _options(
                 crc_bytes=parsed.crc // 8,
                 broadcast_mode=_BROADCASTS[parsed.broadcast],
             ),
-            timing=MeshTiming(parsed.check_period, parsed.connection_lost_after),
+            timing=MeshTiming(
+                parsed.check_period,
+                parsed.connection_lost_after,
+                report_period_s=parsed.report_period,
+            ),
             routing=parsed.routing,
             repair=parsed.repair,
             clearance_m=parsed.clearance,
@@ -289,7 +315,8 @@ def _options(
             emulated=parsed.emulated,
             trace=parsed.trace,
             log_level=parsed.log_level,
-            http=_http_options(parsed, environment) if "bind" in parsed else None,
+            gateway=parsed.gateway,
+            http=_http_options(parsed, environment) if parsed.http else None,
         )
     except MeshError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")

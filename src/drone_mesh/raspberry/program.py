@@ -9,24 +9,27 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from types import FrameType
-from typing import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.engines import create_engine
 from drone_mesh.errors import MeshError
-from drone_mesh.execution import Work
-from drone_mesh.internet.on_demand import http_internet
+from drone_mesh.internet.on_demand import http_internet, status_server
 from drone_mesh.nrf24.gpio import GpiodCe, GpiodIrq
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import open_spi
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
-from drone_mesh.raspberry.node import MakeInternet, RadioNode, ReadStatus
+from drone_mesh.raspberry.event_history import EventHistory
+from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.node_status import one_line
-from drone_mesh.raspberry.options import Hardware, Options
+from drone_mesh.raspberry.options import Hardware, HttpOptions, Options
 from drone_mesh.raspberry.service_manager import ServiceManager
 from drone_mesh.stopping import StopRequest
+
+if TYPE_CHECKING:
+    from drone_mesh.internet.status import StatusServer
 
 LOOK_PERIOD_S = 0.5  # our choice: how often the main thread looks at the nodes
 ALIVE_PERIOD_S = 5.0  # our choice: several times in WatchdogSec of the units
@@ -79,6 +82,10 @@ def _run(options: Options, request: StopRequest) -> None:
         else:
             nodes = [_real_node(options)]
         stack.callback(_stop, nodes)
+        if not options.gateway and options.http is not None:
+            server = _status_server(nodes[0], options.http)
+            server.start()
+            stack.callback(server.stop)
         for node in nodes:
             node.start()
         manager = ServiceManager()
@@ -105,7 +112,7 @@ def _real_node(options: Options) -> RadioNode:
         opened.callback(radio.close)
         engine = create_engine(options.node_id, options.location, options.flight)
         opened.callback(engine.close)
-        node = RadioNode(radio, engine, options, _internet(options))
+        node = RadioNode(radio, engine, options, _internet(options) if options.gateway else None)
         opened.pop_all()
     hardware = options.hardware
     _log.info(
@@ -144,12 +151,15 @@ def _emulated_fleet(options: Options, stack: contextlib.ExitStack) -> EmulatedFl
 
 def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
+    events = EventHistory()
+    make_internet = (_internet(options) if options.gateway else None) or without_internet
     return [
         RadioNode(
             fleet.air.radio(node_id, options.radio),
             fleet.engine(node_id),
             options,
-            None if node_id else (_internet(options) or without_internet),
+            None if node_id else make_internet,
+            events,
         )
         for node_id in range(options.emulated)
     ]
@@ -164,9 +174,23 @@ def _internet(options: Options) -> MakeInternet | None:
         "names": http.names,
         "origin": options.flight.origin,
     }
-    return lambda submit, status: http_internet(
-        submit, http.address, http.port, http.token, status=status, **settings
+    return lambda node: http_internet(
+        node.submit,
+        http.address,
+        http.port,
+        http.token,
+        status=node.status,
+        mesh=node.mesh,
+        **settings,
     )
+
+
+def _status_server(node: RadioNode, http: HttpOptions) -> StatusServer:
+    server = status_server(
+        node.status, http.address, http.port, http.token, http.certificate, http.names
+    )
+    _log.info("node %d: its status over HTTP at %s/status", node.radio.node_id, server.url)
+    return server
 
 
 class _NoInternet(IInternetConnection):
@@ -179,7 +203,7 @@ class _NoInternet(IInternetConnection):
         pass
 
 
-def without_internet(_submit: Callable[[Work], None], _status: ReadStatus) -> IInternetConnection:
+def without_internet(_node: RadioNode) -> IInternetConnection:
     """For a gateway that takes no orders."""
     return _NoInternet()
 

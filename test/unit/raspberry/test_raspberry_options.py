@@ -29,7 +29,7 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         node_id=3,
         hardware=Hardware((0, 0), ce_gpio=25, irq_gpio=None),
         radio=RadioSettings(),
-        timing=MeshTiming(),
+        timing=MeshTiming(report_period_s=30.0),
         routing="child_table_tree",
         repair="thesis",
         clearance_m=5.0,
@@ -39,15 +39,22 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         emulated=0,
         trace=None,
         log_level="info",
+        gateway=False,
         http=None,
     )
+
+
+def test_a_router_answers_over_http_only_if_it_is_asked_to():
+    asked = parse_router(["--id", "3", "--http", "--port", "9081"], {})
+    assert (asked.gateway, asked.http) == (False, HttpOptions("127.0.0.1", 9081, ""))
+    assert parse_gateway([], {}).gateway
 
 
 def test_each_option_reaches_what_it_is_for():
     line = (
         "--id 253 --spi 1.2 --spi-hz 1000000 --ce 22 --irq 24 --channel 76 --rate 2M --crc 8 "
         "--power -12 --broadcast shockburst "
-        "--check-period 5 --connection-lost-after 60 --latitude 10 --longitude -20.5 "
+        "--check-period 5 --connection-lost-after 60 --report-period 45 --latitude 10 --longitude -20.5 "
         "--height 3 --log-level debug --repair home --clearance 3 "
         "--routing drone_mesh.communication.child_table_tree:"
         "ChildTableTree "
@@ -65,7 +72,7 @@ def test_each_option_reaches_what_it_is_for():
             crc_bytes=1,
             broadcast_mode=BroadcastMode.SHOCKBURST,
         ),
-        timing=MeshTiming(check_period_s=5.0, connection_lost_after_s=60.0),
+        timing=MeshTiming(5.0, 60.0, report_period_s=45.0),
         routing="drone_mesh.communication.child_table_tree:ChildTableTree",
         repair="home",
         clearance_m=3.0,
@@ -80,6 +87,7 @@ def test_each_option_reaches_what_it_is_for():
         emulated=0,
         trace=None,
         log_level="debug",
+        gateway=False,
         http=None,
     )
 
@@ -139,7 +147,7 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
         ("--emulated 1", "invalid value '1': must be a whole number 2..17"),
         ("--id 3 --log-level loud", "invalid choice: 'loud'"),
-        ("--id 3 --port 9080", "unrecognized arguments: --port"),
+        ("--id 3 --port 9080", "--port needs --http"),
     ],
 )
 def test_a_wrong_option_ends_the_program_with_status_2_and_the_reason(capsys, line, reason):

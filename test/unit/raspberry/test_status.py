@@ -86,8 +86,8 @@ def free_port() -> int:
 def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
     port = free_port()
 
-    def internet(submit, status):
-        return http_internet(submit, port=port, status=status)
+    def internet(node):
+        return http_internet(node.submit, port=port, status=node.status, mesh=node.mesh)
 
     with field(3, make_internet=internet) as mesh:
         wait_for(
@@ -97,6 +97,17 @@ def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
         wait_for("it has neighbours", lambda: len(mesh.nodes[0].status()["neighbours"]) == 2)
         status = httpx.get(f"http://127.0.0.1:{port}/status", verify=False).json()
         assert main([f"http://127.0.0.1:{port}"]) == 0
+        whole = httpx.get(f"http://127.0.0.1:{port}/mesh?after=1", verify=False).json()
+    assert [(node["id"], node["role"]) for node in whole["nodes"]] == [
+        (0, "gateway"),
+        (1, "router"),
+        (2, "router"),
+    ]
+    assert all(node["connected"] for node in whole["nodes"])
+    assert whole["events"][0]["number"] == 2
+    assert {"node": 0, "kind": "neighbour found", "peers": [1]}.items() <= next(
+        event.items() for event in whole["events"] if event["peers"] == [1] and event["node"] == 0
+    )
     assert status["node"] == 0
     assert status["connected"] is True
     assert (status["gateway"], status["hops"]) == (0, 0)
