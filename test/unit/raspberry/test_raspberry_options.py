@@ -147,7 +147,7 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
         ("--emulated 1", "invalid value '1': must be a whole number 2..17"),
         ("--id 3 --log-level loud", "invalid choice: 'loud'"),
-        ("--id 3 --port 9080", "--port needs --http"),
+        ("--id 3 --port 9081", "--port needs --http"),
     ],
 )
 def test_a_wrong_option_ends_the_program_with_status_2_and_the_reason(capsys, line, reason):
