@@ -7,7 +7,7 @@ docs/protocol.md, "Lost connection" and "Flight".
 from __future__ import annotations
 
 import math
-from typing import Callable, Mapping
+from typing import Callable
 
 from drone_mesh.communication.connection import GatewayConnection
 from drone_mesh.communication.deadlines import Due
@@ -22,24 +22,18 @@ from drone_mesh.communication.messages import (
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair_flight import ASK_AGAIN_S, RepairFlight, ask_all_for_places
-from drone_mesh.communication.repair_interfaces import (
-    IRepairActions,
-    IRepairStrategy,
-    NeighbourView,
-    Step,
-)
+from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair_views import RepairViews
 from drone_mesh.communication.router_states import Repair, RouterEvent, RouterStates
 from drone_mesh.communication.spots import PITCH, beside, own_spot
-from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
-from drone_mesh.errors import GoalRefused
 
 ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
-class ConnectionRepair(IRepairActions):
+class ConnectionRepair(RepairViews):
     """The repair of one router. It moves the `Repair` of the router's states."""
 
     def __init__(
@@ -52,16 +46,12 @@ class ConnectionRepair(IRepairActions):
         options: RepairOptions,
     ) -> None:
         """`introduce` broadcasts a PRESENT."""
-        self._parts = parts
-        self._states = states
-        self._connection = connection
+        super().__init__(parts, states, connection, options)
         self._introduce = introduce
         self._strategy = strategy
-        self._options = options
         self._lost_since_s = math.inf  # valid from LOSS_NOTICED until the router is AT_REST
         self._checked_s: float | None = None  # the first check during an election was due then
         self._was_silent = False
-        self._in_vain: list[Location] = []  # where this drone flew since it was last connected
         self._flight: RepairFlight | None = None
         self._flies_to_place_of = NO_ROUTE
         strategy.start(self)
@@ -163,92 +153,10 @@ class ConnectionRepair(IRepairActions):
             silent=self.silent,
         )
 
-    # Views of the strategy -------------------------------------------------------------------
-
-    @property
-    def node_id(self) -> int:
-        """See IRepairActions, as for all that follows."""
-        return self._parts.node_id
-
-    @property
-    def now_s(self) -> float:  # noqa: D102
-        return self._parts.now_s
-
-    @property
-    def range_m(self) -> float:  # noqa: D102
-        return self._options.range_m
-
-    @property
-    def clearance_m(self) -> float:  # noqa: D102
-        return self._options.clearance_m
-
-    @property
-    def check_period_s(self) -> float:  # noqa: D102
-        return self._parts.timing.check_period_s
-
-    @property
-    def connection_lost_after_s(self) -> float:  # noqa: D102
-        return self._parts.timing.connection_lost_after_s
-
-    @property
-    def connected(self) -> bool:  # noqa: D102
-        return self._states.connected
-
-    @property
-    def state(self) -> Repair:  # noqa: D102
-        return self._states.repair
-
-    @property
-    def silent(self) -> bool:  # noqa: D102
-        return self._parts.neighbours.silent
-
-    def neighbours(self) -> Mapping[int, NeighbourView]:  # noqa: D102
-        return {node: self._view(node) for node in self._parts.routing.get_set_of_children()}
-
-    def reachable(self) -> Mapping[int, NeighbourView]:  # noqa: D102
-        places = self._parts.neighbours.places()
-        return {node: self._view(node) for node in places if self.reaches(node)}
-
-    def reaches(self, node: int) -> bool:  # noqa: D102
-        return self._parts.routing.get_direction_to_node(node) != NO_ROUTE
-
-    @property
-    def lost_next_hop(self) -> int:  # noqa: D102
-        return self._parts.places.good_id
-
-    @property
-    def steps(self) -> list[Step]:  # noqa: D102
-        places, gateway = self._parts.places, self._connection.gateway
-        candidates = ((places.good, places.good_id), (places.gateway, gateway))
-        return [
-            Step(place, owner, home=owner == gateway)
-            for place, owner in candidates
-            if place is not None and _may_be_flown_to(place)
-        ]
-
-    @property
-    def gateway_place(self) -> Location | None:  # noqa: D102
-        return self._parts.places.gateway
-
-    def own_place(self) -> Location | None:  # noqa: D102
-        return self._parts.pilot.location()
-
-    def why_not_fly(self) -> str:  # noqa: D102
-        return self._parts.pilot.why_not_fly()
-
-    def was_at(self, step: Step) -> bool:  # noqa: D102
-        radius_m = self.clearance_m * (2 * PITCH if step.home else 1.0)
-        return any(step.place.distance_m(place) < radius_m for place in self._in_vain)
-
-    def _view(self, node: int) -> NeighbourView:
-        heard, hops = self._parts.neighbours.place_of(node), self._parts.neighbours.hops_of(node)
-        if heard is None:
-            return NeighbourView(None, math.inf, hops)
-        return NeighbourView(heard.place, self.now_s - heard.heard_s, hops)
-
     # Actions of the strategy -----------------------------------------------------------------
 
-    def fly(self, step: Step, until_connected: bool = False) -> None:  # noqa: D102
+    def fly(self, step: Step, until_connected: bool = False) -> None:
+        """See IRepairActions, as for all that follows."""
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = RepairFlight(
             self._parts, self._introduce, step.owner, step.place, self._goal(step), self._options
@@ -389,12 +297,3 @@ class ConnectionRepair(IRepairActions):
     def _clear(self) -> None:
         self._checked_s = None
         self.wait_until(math.inf)
-
-
-def _may_be_flown_to(place: Location) -> bool:
-    """Whether a drone may go there: a LOCATION may hold any numbers."""
-    try:
-        check_goal(*place)
-    except GoalRefused:
-        return False
-    return True

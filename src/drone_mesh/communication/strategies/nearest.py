@@ -8,14 +8,12 @@ the drone leaves behind lose their gateway, and repeat the same: the cascade of 
 from __future__ import annotations
 
 from drone_mesh.communication.election import NO_BID
+from drone_mesh.communication.group_repair import GroupRepair
 from drone_mesh.communication.repair_interfaces import Step
-from drone_mesh.communication.strategies.thesis import Thesis
 
 
-class Nearest(Thesis):
-    """As Thesis, with another score."""
-
-    bid_unit = ""
+class Nearest(GroupRepair):
+    """The shortest flight wins."""
 
     def _score(self, step: Step) -> float:
         """Above 1 for a first choice, else up to 1; the shorter the flight the higher."""
