@@ -20,6 +20,8 @@ from drone_mesh.raspberry.event_history import EventHistory
 from drone_mesh.raspberry.mesh_report import mesh_report
 from drone_mesh.raspberry.node_status import node_status
 from drone_mesh.raspberry.options import Options
+from drone_mesh.users.desk import UsersDesk
+from drone_mesh.users.local_socket import local_socket
 
 ALIVE_WITHIN_S = 20.0  # our choice: two check periods; systemd's watchdog waits longer
 
@@ -54,6 +56,8 @@ class RadioNode:
         self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
         self._origin = options.flight.origin
         self._events = EventHistory() if events is None else events
+        self.users = UsersDesk(radio.node_id, self._seat.submit)
+        self._socket = local_socket(self.users)
         self._internet = None if make_internet is None else make_internet(self)
         self.component = assemble_component(
             radio.node_id,
@@ -67,6 +71,7 @@ class RadioNode:
             timing=options.timing,
             observer=self._events.observe,
         )
+        self.users.open(self.component.data)
         self._started = False
         self._started_s = self._beat_s = time.monotonic()
 
@@ -111,9 +116,13 @@ class RadioNode:
         self._started = True
         self._seat.submit(lambda _now_s: self._seat.take(self.component))
         self._executor.start()
+        if self._socket is not None:
+            self._socket.start()
 
     def stop(self) -> None:
         """Stop the software and its thread; power the radio down and release it."""
+        if self._socket is not None:
+            self._socket.stop()
         if self._started:
             self._started = False
             self._antenna.fall_silent()  # remaining sends fail at once

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import threading
-
 import rospy
 
-from drone_mesh.communication.data.ticket import Ticket, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage, Transport
 from drone_mesh.errors import MessageRefused
-from drone_mesh.execution import Seat
 from drone_mesh.msg import ReceivedData
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.srv import SendData, SendDataRequest, SendDataResponse
+from drone_mesh.users.desk import UsersDesk
 
 _QUEUE = 64  # messages that may wait for a slow subscriber
-_HANDOVER_S = 5.0  # our choice: a node takes a message within this wall time
 
 
 class UsersOfNode:
@@ -29,21 +25,19 @@ class UsersOfNode:
     is for that worker.
     """
 
-    def __init__(self, node_id: int, seat: Seat) -> None:
-        self._node_id = node_id
-        self._seat = seat
-        self._transport: Transport | None = None
+    def __init__(self, desk: UsersDesk) -> None:
+        self._desk = desk
         self._service: rospy.Service | None = None
         self._publisher: rospy.Publisher | None = None
 
     def start(self, transport: Transport) -> None:
         """Offer the service and the topic."""
-        self._transport = transport
+        node_id = self._desk.node_id
         self._publisher = rospy.Publisher(
-            names.received_topic(self._node_id), ReceivedData, queue_size=_QUEUE
+            names.received_topic(node_id), ReceivedData, queue_size=_QUEUE
         )
         transport.on_received(self._received)
-        self._service = rospy.Service(names.send_service(self._node_id), SendData, self._send)
+        self._service = rospy.Service(names.send_service(node_id), SendData, self._send)
 
     def stop(self) -> None:
         """Withdraw both. A second call changes nothing."""
@@ -66,50 +60,10 @@ class UsersOfNode:
         self._publisher.publish(data)
 
     def _send(self, request: SendDataRequest) -> SendDataResponse:
-        sending = _Sending(request)
-        transport = self._transport
-        assert transport is not None
-        self._seat.submit(lambda now_s: sending.hand_in(transport, now_s))
-        if not sending.handed_in.wait(_HANDOVER_S):
-            return SendDataResponse(
-                success=False, message=f"node {self._node_id} is too busy to take a message"
-            )
-        ticket = sending.ticket
-        if ticket is None:
-            return SendDataResponse(success=False, message=sending.why_not)
-        if request.wait > 0:
-            sending.ended.wait(request.wait)
-        good = ticket.state is not TicketState.GIVEN_UP
-        if request.wait > 0 and not ticket.final:
-            good = False
-        return SendDataResponse(success=good, message=str(ticket), ticket=ticket.number)
-
-
-class _Sending:
-    """One request, between a thread of rospy and the worker."""
-
-    def __init__(self, request: SendDataRequest) -> None:
-        self._request = request
-        self.handed_in = threading.Event()  # then the fields below are set
-        self.ended = threading.Event()
-        self.ticket: Ticket | None = None
-        self.why_not = ""
-
-    def hand_in(self, transport: Transport, now_s: float) -> None:
-        """On the worker's thread."""
-        request = self._request
+        sending = self._desk.send(request.to, request.payload, request.port, request.reliable)
         try:
-            ticket = transport.send(
-                request.to, request.payload, now_s, port=request.port, reliable=request.reliable
-            )
+            ticket = sending.ticket()
         except MessageRefused as error:
-            self.why_not = str(error)
-        else:
-            ticket.changed = self._changed
-            self._changed(ticket)
-            self.ticket = ticket
-        self.handed_in.set()
-
-    def _changed(self, ticket: Ticket) -> None:
-        if ticket.final:
-            self.ended.set()
+            return SendDataResponse(success=False, message=str(error))
+        arrived = sending.wait(request.wait)
+        return SendDataResponse(success=arrived, message=str(ticket), ticket=ticket.number)

@@ -15,6 +15,7 @@ from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.host.internet_mock import RosInternetMock
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.users_of_node import UsersOfNode
+from drone_mesh.users.desk import UsersDesk
 
 
 class VirtualRaspberryPi(abc.ABC):
@@ -32,7 +33,8 @@ class VirtualRaspberryPi(abc.ABC):
         self.engine = RosDroneEngineConnector(node_id)
         self.antenna = antenna
         self.seat = seat
-        self._users = UsersOfNode(node_id, seat)
+        self.users = UsersDesk(node_id, seat.submit)
+        self._users_of_node = UsersOfNode(self.users)
         self.component = assemble_component(
             node_id,
             antenna,
@@ -50,13 +52,14 @@ class VirtualRaspberryPi(abc.ABC):
     def start(self, now_s: float) -> None:
         """Switch on."""
         self.engine.connect()
-        self._users.start(self.component.data)
+        self.users.open(self.component.data)
+        self._users_of_node.start(self.component.data)
         self.component.start(now_s)
         self.seat.take(self.component)
 
     def stop(self, _now_s: float) -> None:
         """Switch off."""
-        self._users.stop()
+        self._users_of_node.stop()
         self.component.stop()
 
     @abc.abstractmethod

@@ -1,0 +1,85 @@
+"""What the commands mesh_send, mesh_listen, mesh_ping and mesh_trace have in common."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Callable
+
+from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.errors import MeshError
+from drone_mesh.users.local_client import LocalClient
+from drone_mesh.users.socket_path import existing_sockets, node_of, socket_folder, socket_path
+
+NODE_VARIABLE = "DRONE_MESH_NODE"
+_DESTINATIONS = {"all": TO_ALL, "gateway": TO_GATEWAY}
+
+
+def parser_for(command: str, description: str) -> argparse.ArgumentParser:
+    """A parser with the options that choose the node of this machine."""
+    parser = argparse.ArgumentParser(
+        command,
+        description=description,
+        epilog="Without --node: the only node that runs here, or the one of the environment "
+        f"variable {NODE_VARIABLE}.",
+    )
+    parser.add_argument("--node", type=node_id, help="id of the node of this machine to use")
+    parser.add_argument("--socket", type=Path, metavar="PATH", help="its socket, if elsewhere")
+    return parser
+
+
+def node_id(text: str) -> int:
+    """A node id, for argparse."""
+    if not text.isdigit() or int(text) > MAX_NODE_ID:
+        raise argparse.ArgumentTypeError(f"invalid node {text!r}: must be 0..{MAX_NODE_ID}")
+    return int(text)
+
+
+def destination(text: str) -> int:
+    """A node id, "all" or "gateway", for argparse."""
+    return _DESTINATIONS[text] if text in _DESTINATIONS else node_id(text)
+
+
+def port(text: str) -> int:
+    """A port, for argparse."""
+    if not text.isdigit() or int(text) > 255:
+        raise argparse.ArgumentTypeError(f"invalid port {text!r}: must be 0..255")
+    return int(text)
+
+
+def client(parsed: argparse.Namespace) -> LocalClient:
+    """The node that the options name. Raises MeshError."""
+    if parsed.socket is not None:
+        return LocalClient(parsed.socket)
+    chosen = parsed.node
+    if chosen is None and os.environ.get(NODE_VARIABLE):
+        chosen = int(os.environ[NODE_VARIABLE])
+    found = existing_sockets()
+    if chosen is not None:
+        of_chosen = [path for path in found if node_of(path) == str(chosen)]
+        return LocalClient(of_chosen[0] if of_chosen else socket_path(chosen))
+    if len(found) == 1:
+        return LocalClient(found[0])
+    if not found:
+        raise MeshError(
+            f"no node runs here (no socket in {socket_folder()}): start raspberry_router or "
+            "raspberry_gateway, for a try with --emulated 7"
+        )
+    ids = ", ".join(node_of(path) for path in found)
+    raise MeshError(f"several nodes run here ({ids}): choose one with --node")
+
+
+def run(command: str, work: Callable[[], int]) -> int:
+    """The exit status of `work`; errors are one line, Ctrl-C ends it quietly."""
+    try:
+        return work()
+    except MeshError as error:
+        print(f"{command}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        return 1

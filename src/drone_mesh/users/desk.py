@@ -1,0 +1,183 @@
+"""UsersDesk: a node's data for the other threads of its process."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from typing import Callable
+
+from drone_mesh.communication.data.echo import EchoAnswer
+from drone_mesh.communication.data.ticket import Ticket, TicketState
+from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, Transport
+from drone_mesh.errors import MessageRefused
+
+HANDOVER_S = 5.0  # our choice: a node takes a message within this time
+MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is dropped
+
+Submit = Callable[[Callable[[float], None]], None]
+"""Runs a function, with the time, on the thread that owns the node. Any thread may call it."""
+
+
+class Sending:
+    """One message that another thread hands in. Its fields are set by the node's thread."""
+
+    def __init__(self, to: int, payload: bytes, port: int, reliable: bool) -> None:
+        self._arguments = (to, payload, port, reliable)
+        self._handed_in = threading.Event()
+        self._ended = threading.Event()
+        self._ticket: Ticket | None = None
+        self._why_not = ""
+
+    def ticket(self) -> Ticket:
+        """The ticket; raises MessageRefused with the reason if there is none."""
+        if not self._handed_in.wait(HANDOVER_S):
+            raise MessageRefused("the node is too busy to take a message, or it has stopped")
+        if self._ticket is None:
+            raise MessageRefused(self._why_not)
+        return self._ticket
+
+    def wait(self, seconds: float) -> bool:
+        """Whether the message arrived within that time (without acknowledgement: was sent)."""
+        ticket = self.ticket()
+        if seconds > 0 and not self._ended.wait(seconds):
+            return False
+        return ticket.state is not TicketState.GIVEN_UP
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether the node has looked at it."""
+        return self._handed_in.is_set()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the message was refused, or its last state is known."""
+        return self._ended.is_set() or (self._handed_in.is_set() and self._ticket is None)
+
+    def hand_in(self, transport: Transport, now_s: float) -> None:
+        """On the node's thread."""
+        to, payload, port, reliable = self._arguments
+        try:
+            ticket = transport.send(to, payload, now_s, port=port, reliable=reliable)
+        except MessageRefused as error:
+            self._why_not = str(error)
+        else:
+            ticket.changed = self._changed
+            self._ticket = ticket
+            self._changed(ticket)
+        self._handed_in.set()
+
+    def _changed(self, ticket: Ticket) -> None:
+        if ticket.final:
+            self._ended.set()
+
+
+class Listener:
+    """The messages that arrive from now on, for one other thread."""
+
+    def __init__(self, port: int | None) -> None:
+        self._port = port
+        self.close: Callable[[], None] = lambda: None  # no more messages
+        self._messages: queue.Queue[ReceivedMessage] = queue.Queue(MOST_UNREAD)
+        self.dropped = 0  # because they were not read in time
+
+    def next(self, timeout_s: float) -> ReceivedMessage | None:
+        """The next message; None: none came in time."""
+        try:
+            return self._messages.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+
+    def put(self, message: ReceivedMessage) -> None:
+        """On the node's thread."""
+        if self._port not in (None, message.port):
+            return
+        while True:
+            try:
+                self._messages.put_nowait(message)
+                return
+            except queue.Full:
+                self.dropped += 1
+                try:
+                    self._messages.get_nowait()
+                except queue.Empty:
+                    continue
+
+
+class UsersDesk:
+    """Sends, listens and asks for echoes on behalf of other threads. Any thread may use it.
+
+    What it hands to the node runs there; a lock guards the receivers.
+    """
+
+    def __init__(self, node_id: int, submit: Submit) -> None:
+        """`open` follows when the node has its transport."""
+        self.node_id = node_id
+        self._submit = submit
+        self._transport: Transport | None = None
+        self._lock = threading.Lock()
+        self._receivers: list[Receiver] = []
+
+    def open(self, transport: Transport) -> None:
+        """Begin to serve; before the node starts, or on its thread."""
+        self._transport = transport
+        transport.on_received(self._received)
+
+    def send(self, to: int, payload: bytes, port: int = 0, reliable: bool = True) -> Sending:
+        """Hand a message to the node. What it refuses shows in the result."""
+        sending = Sending(to, payload, port, reliable)
+        transport = self._require()
+        self._submit(lambda now_s: sending.hand_in(transport, now_s))
+        return sending
+
+    def subscribe(self, receiver: Receiver) -> Callable[[], None]:
+        """Have `receiver` called on the node's thread; returns a function that ends it."""
+        with self._lock:
+            self._receivers.append(receiver)
+
+        def end() -> None:
+            with self._lock:
+                if receiver in self._receivers:
+                    self._receivers.remove(receiver)
+
+        return end
+
+    def listen(self, port: int | None = None) -> Listener:
+        """Receive the messages for a port, or for all of them; to be closed."""
+        listener = Listener(port)
+        listener.close = self.subscribe(listener.put)
+        return listener
+
+    def echo(self, to: int, timeout_s: float) -> EchoAnswer | None:
+        """Ask a node for an echo, and wait; None: no answer came.
+
+        Raises MessageRefused if there is no route to it.
+        """
+        transport = self._require()
+        answers: queue.Queue[EchoAnswer | str] = queue.Queue()
+
+        def ask(now_s: float) -> None:
+            try:
+                if transport.echo(to, answers.put, now_s) is None:
+                    answers.put(f"no route to node {to}")
+            except MessageRefused as error:
+                answers.put(str(error))
+
+        self._submit(ask)
+        try:
+            answer = answers.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+        if isinstance(answer, str):
+            raise MessageRefused(answer)
+        return answer
+
+    def _require(self) -> Transport:
+        if self._transport is None:
+            raise MessageRefused(f"node {self.node_id} has not started yet")
+        return self._transport
+
+    def _received(self, message: ReceivedMessage) -> None:
+        with self._lock:
+            receivers = list(self._receivers)
+        for receiver in receivers:
+            receiver(message)

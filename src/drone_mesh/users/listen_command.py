@@ -1,0 +1,45 @@
+"""The program mesh_listen."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any, Sequence
+
+from drone_mesh.users import command_line
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the messages that arrive, one line each, until Ctrl-C."""
+    parser = command_line.parser_for("mesh_listen", "Prints the messages that a node receives.")
+    parser.add_argument("--port", type=command_line.port, help="only those for this port")
+    parser.add_argument("--count", type=int, default=0, help="end after so many messages")
+    parser.add_argument(
+        "--json", action="store_true", help="one JSON object per line, the payload in hex"
+    )
+    parsed = parser.parse_args(arguments)
+
+    def work() -> int:
+        messages = command_line.client(parsed).listen(parsed.port)
+        for number, message in enumerate(messages, start=1):
+            print(_as_json(message) if parsed.json else _as_text(message), flush=True)
+            if number == parsed.count:
+                return 0
+        print("mesh_listen: the node has stopped", file=sys.stderr)
+        return 1
+
+    return command_line.run("mesh_listen", work)
+
+
+def _as_json(message: dict[str, Any]) -> str:
+    return json.dumps({**message, "payload": message["payload"].hex()})
+
+
+def _as_text(message: dict[str, Any]) -> str:
+    payload: bytes = message["payload"]
+    try:
+        text = payload.decode()
+        shown = text if text.isprintable() else repr(text)
+    except UnicodeDecodeError:
+        shown = payload.hex(" ")
+    return f"node {message['sender']} port {message['port']}: {shown}"

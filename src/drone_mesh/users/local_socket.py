@@ -1,0 +1,208 @@
+"""LocalSocket: a node's data for other programs of this machine, over a UNIX socket.
+
+One request per connection, a line of JSON; the answer is one line, or many:
+
+    {"do": "send", "to": 5, "port": 0, "reliable": true, "payload": BASE64, "wait": SECONDS}
+    {"do": "listen", "port": 0 or null}       one line per message, until the client goes
+    {"do": "echo", "to": 5, "wait": SECONDS}
+
+A refusal is {"error": reason}. Only the user that runs the node can open the socket.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import logging
+import os
+import select
+import socket
+import socketserver
+import stat
+import threading
+from pathlib import Path
+from typing import Any
+
+from drone_mesh.errors import ConfigurationError, MessageRefused
+from drone_mesh.users.desk import UsersDesk
+from drone_mesh.users.socket_path import socket_path
+
+MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
+MOST_CLIENTS = 32  # our choice
+REQUEST_WITHIN_S = 5.0  # our choice
+_LOOK_S = 0.1  # how soon a listener's thread notices the end
+
+_log = logging.getLogger(__name__)
+
+
+class LocalSocket:
+    """Serves one node's desk. `start` and `stop` are for the thread that owns this object.
+
+    Threads: one that accepts, and one per client, all ended by `stop`.
+    """
+
+    def __init__(self, desk: UsersDesk, path: Path) -> None:
+        """Make the socket. Raises ConfigurationError if that is not possible."""
+        _prepare(path)
+        self.path = path
+        try:
+            self._server = _Server(str(path), desk)
+        except OSError as error:
+            raise ConfigurationError(f"socket {path}: {error.strerror or error}") from error
+        path.chmod(0o600)
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(_LOOK_S,), name=f"users of {desk.node_id}"
+        )
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Close all connections; returns when the threads have ended."""
+        self._server.stopping = True
+        if self._thread.is_alive():
+            self._server.shutdown()
+            self._thread.join()
+        self._server.server_close()
+        with contextlib.suppress(FileNotFoundError):
+            self.path.unlink()
+
+
+def local_socket(desk: UsersDesk) -> LocalSocket | None:
+    """The socket of a node, where the commands look for it; None, and a warning, without one.
+
+    The commands are a convenience: a node works without them.
+    """
+    try:
+        return LocalSocket(desk, socket_path(desk.node_id))
+    except ConfigurationError as error:
+        _log.warning("node %d: no mesh_ping and the like: %s", desk.node_id, error)
+        return None
+
+
+class _Server(socketserver.ThreadingUnixStreamServer):
+    daemon_threads = False
+    block_on_close = True
+    request_queue_size = MOST_CLIENTS
+
+    def __init__(self, path: str, desk: UsersDesk) -> None:
+        self.desk = desk
+        self.stopping = False
+        self.clients = threading.BoundedSemaphore(MOST_CLIENTS)
+        super().__init__(path, _Client)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A client that goes away in the middle is normal."""
+
+
+class _Client(socketserver.StreamRequestHandler):
+    server: _Server
+    timeout = REQUEST_WITHIN_S
+
+    def handle(self) -> None:
+        """One request."""
+        if not self.server.clients.acquire(blocking=False):
+            self._say({"error": f"{MOST_CLIENTS} programs use this node already"})
+            return
+        try:
+            self._answer(json.loads(self.rfile.readline(MOST_REQUEST_BYTES)))
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            self._say({"error": f"invalid request: {error}"})
+        except MessageRefused as error:
+            self._say({"error": str(error)})
+        except OSError:
+            pass  # the client went away
+        finally:
+            self.server.clients.release()
+
+    def _answer(self, request: dict[str, Any]) -> None:
+        what, desk = request["do"], self.server.desk
+        if what == "send":
+            payload = base64.b64decode(request["payload"], validate=True)
+            sending = desk.send(
+                int(request["to"]),
+                payload,
+                int(request.get("port", 0)),
+                bool(request.get("reliable", True)),
+            )
+            arrived = self._wait(sending.wait, float(request.get("wait", 0.0)))
+            self._say({"arrived": arrived, "ticket": str(sending.ticket())})
+        elif what == "echo":
+            answer = desk.echo(int(request["to"]), float(request.get("wait", 5.0)))
+            if answer is None:
+                self._say({"answered": False})
+            else:
+                self._say(
+                    {
+                        "answered": True,
+                        "round_trip_s": answer.round_trip_s,
+                        "hops": answer.hops,
+                        "route": list(answer.route),
+                    }
+                )
+        elif what == "listen":
+            self._listen(request.get("port"))
+        else:
+            raise ValueError(f"unknown: {what}")
+
+    def _wait(self, wait: Any, seconds: float) -> bool:
+        """Wait in steps, so that the end of the node ends it."""
+        if seconds <= 0:
+            return bool(wait(0.0))
+        while seconds > 0 and not self.server.stopping:
+            if wait(min(seconds, _LOOK_S)):
+                return True
+            seconds -= _LOOK_S
+        return False
+
+    def _listen(self, port: int | None) -> None:
+        listener = self.server.desk.listen(port)
+        try:
+            self._say({"listening": self.server.desk.node_id})
+            while not (self.server.stopping or self._is_gone()):
+                message = listener.next(_LOOK_S)
+                if message is not None:
+                    self._say(
+                        {
+                            "sender": message.sender,
+                            "port": message.port,
+                            "to_all": message.to_all,
+                            "reliable": message.reliable,
+                            "payload": base64.b64encode(message.payload).decode(),
+                        }
+                    )
+        finally:
+            listener.close()
+
+    def _is_gone(self) -> bool:
+        """Whether the client has closed the connection."""
+        readable, _, _ = select.select([self.request], [], [], 0.0)
+        return bool(readable) and not self.request.recv(1, socket.MSG_PEEK)
+
+    def _say(self, answer: dict[str, Any]) -> None:
+        with contextlib.suppress(OSError):
+            self.wfile.write(json.dumps(answer).encode() + b"\n")
+
+
+def _prepare(path: Path) -> None:
+    """Have the folder, for this user alone; remove a socket that no program serves any more."""
+    folder = path.parent
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigurationError(f"socket {path}: {error.strerror}: {folder}") from error
+    if folder.stat().st_uid != os.getuid():
+        raise ConfigurationError(f"socket {path}: {folder} belongs to another user")
+    if not path.exists():
+        return
+    if not stat.S_ISSOCK(path.stat().st_mode):
+        raise ConfigurationError(f"socket {path}: a file of that name is in the way")
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(str(path))
+        except OSError:
+            path.unlink()
+            return
+    raise ConfigurationError(f"socket {path}: another program runs a node of this id")

@@ -1,0 +1,82 @@
+"""The program mesh_ping."""
+
+from __future__ import annotations
+
+import time
+from typing import Sequence
+
+from drone_mesh.users import command_line
+from drone_mesh.users.local_client import LocalClient, Refused
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Ask a node for echoes; the exit status is 1 if none came."""
+    parser = command_line.parser_for(
+        "mesh_ping", "Asks a node for echoes: round trip, hops and loss."
+    )
+    parser.add_argument("id", type=command_line.node_id, help="the node to ask")
+    parser.add_argument(
+        "-c", "--count", type=int, default=0, help="so many times; else until Ctrl-C"
+    )
+    parser.add_argument(
+        "-i",
+        "--interval",
+        type=float,
+        default=1.0,
+        metavar="SECONDS",
+        help="(default: %(default)g)",
+    )
+    parser.add_argument(
+        "-W",
+        "--timeout",
+        type=float,
+        default=5.0,
+        metavar="SECONDS",
+        help="for an answer (default: %(default)g)",
+    )
+    parsed = parser.parse_args(arguments)
+    round_trips_s: list[float] = []
+    asked = 0
+
+    def work() -> int:
+        nonlocal asked
+        node = command_line.client(parsed)
+        while parsed.count == 0 or asked < parsed.count:
+            if asked:
+                time.sleep(parsed.interval)
+            asked += 1
+            _ask(node, parsed.id, asked, parsed.timeout, round_trips_s)
+        return 0 if round_trips_s else 1
+
+    status = command_line.run("mesh_ping", work)
+    if asked:
+        print(_summary(asked, round_trips_s))
+        status = 0 if round_trips_s else 1
+    return status
+
+
+def _ask(
+    node: LocalClient, to: int, number: int, timeout_s: float, round_trips_s: list[float]
+) -> None:
+    try:
+        answer = node.echo(to, timeout_s)
+    except Refused as error:
+        print(f"node {to}: number {number}: {error}", flush=True)
+        return
+    if not answer["answered"]:
+        print(f"node {to}: number {number}: no answer within {timeout_s:g} s", flush=True)
+        return
+    round_trips_s.append(answer["round_trip_s"])
+    milliseconds, hops = 1e3 * answer["round_trip_s"], answer["hops"]
+    links = "1 hop" if hops == 1 else f"{hops} hops"
+    print(f"node {to}: number {number}, {links}, {milliseconds:.1f} ms", flush=True)
+
+
+def _summary(asked: int, round_trips_s: list[float]) -> str:
+    lost = 100 * (asked - len(round_trips_s)) / asked
+    words = f"{asked} sent, {len(round_trips_s)} answered, {lost:.0f} % lost"
+    if round_trips_s:
+        mean = sum(round_trips_s) / len(round_trips_s)
+        figures = "/".join(f"{1e3 * s:.1f}" for s in (min(round_trips_s), mean, max(round_trips_s)))
+        words += f"; round trip min/mean/max {figures} ms"
+    return words

@@ -1,0 +1,46 @@
+"""The program mesh_send."""
+
+from __future__ import annotations
+
+import sys
+from typing import Sequence
+
+from drone_mesh.users import command_line
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Send one message; the exit status is 1 if it did not arrive."""
+    parser = command_line.parser_for(
+        "mesh_send", "Sends a message of up to 1024 bytes through the mesh."
+    )
+    parser.add_argument(
+        "to", type=command_line.destination, metavar="TO", help='node id, "gateway" or "all"'
+    )
+    parser.add_argument(
+        "text", nargs="?", help="the message; without it, what comes on standard input"
+    )
+    parser.add_argument(
+        "--port", type=command_line.port, default=0, help="0..255 (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--no-ack", action="store_true", help="send it once, and wait for no acknowledgement"
+    )
+    parser.add_argument(
+        "--wait",
+        type=float,
+        default=30.0,
+        metavar="SECONDS",
+        help="for the delivery; 0: not at all. The node goes on trying (default: %(default)g)",
+    )
+    parsed = parser.parse_args(arguments)
+
+    def work() -> int:
+        text = parsed.text
+        payload = sys.stdin.buffer.read() if text is None else text.encode()
+        arrived, ticket = command_line.client(parsed).send(
+            parsed.to, payload, port=parsed.port, reliable=not parsed.no_ack, wait_s=parsed.wait
+        )
+        print(ticket)
+        return 0 if arrived else 1
+
+    return command_line.run("mesh_send", work)

@@ -1,0 +1,38 @@
+"""Where the local sockets of nodes are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Mapping
+
+SYSTEM_FOLDER = Path("/run/drone_mesh")  # of the services: RuntimeDirectory=drone_mesh
+
+
+def socket_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """The folder of the sockets of nodes that this user starts."""
+    if environment.get("RUNTIME_DIRECTORY"):  # set by systemd
+        return Path(environment["RUNTIME_DIRECTORY"])
+    if environment.get("XDG_RUNTIME_DIR"):
+        return Path(environment["XDG_RUNTIME_DIR"]) / "drone_mesh"
+    return Path(f"/tmp/drone_mesh-{os.getuid()}")
+
+
+def socket_path(node_id: int) -> Path:
+    """The socket of a node that this user starts."""
+    return socket_folder() / _name(node_id)
+
+
+def existing_sockets() -> list[Path]:
+    """The sockets of nodes of this user and of the services, by name."""
+    folders = (socket_folder(), SYSTEM_FOLDER)
+    return sorted({path for folder in folders for path in folder.glob(_name("*"))})
+
+
+def node_of(path: Path) -> str:
+    """The id of the node that has this socket."""
+    return path.stem[len("node-") :]
+
+
+def _name(node_id: int | str) -> str:
+    return f"node-{node_id}.sock"

@@ -1,0 +1,35 @@
+"""The program mesh_trace."""
+
+from __future__ import annotations
+
+import sys
+from typing import Sequence
+
+from drone_mesh.users import command_line
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the path to a node; the exit status is 1 if it does not answer."""
+    parser = command_line.parser_for("mesh_trace", "Prints the path of packets to a node.")
+    parser.add_argument("id", type=command_line.node_id, help="the node to ask")
+    parser.add_argument(
+        "-W",
+        "--timeout",
+        type=float,
+        default=5.0,
+        metavar="SECONDS",
+        help="for the answer (default: %(default)g)",
+    )
+    parsed = parser.parse_args(arguments)
+
+    def work() -> int:
+        answer = command_line.client(parsed).echo(parsed.id, parsed.timeout)
+        if not answer["answered"]:
+            print(f"mesh_trace: node {parsed.id} does not answer", file=sys.stderr)
+            return 1
+        for number, hop in enumerate([*answer["route"], parsed.id], start=1):
+            print(f"{number:3}  node {hop}")
+        print(f"there and back in {1e3 * answer['round_trip_s']:.1f} ms")
+        return 0
+
+    return command_line.run("mesh_trace", work)

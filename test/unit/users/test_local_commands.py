@@ -1,0 +1,143 @@
+"""The commands, as programs of the same machine use a node."""
+
+from __future__ import annotations
+
+import io
+import json
+import socket
+import sys
+import threading
+
+import pytest
+from users_rig import UsersRig
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.users import listen_command, ping_command, send_command, trace_command
+from drone_mesh.users.local_client import LocalClient
+from drone_mesh.users.local_socket import LocalSocket, local_socket
+from drone_mesh.users.socket_path import socket_path
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.delenv("RUNTIME_DIRECTORY", raising=False)
+    monkeypatch.delenv("DRONE_MESH_NODE", raising=False)
+
+
+@pytest.fixture
+def rig():
+    rig = UsersRig()
+    served = [LocalSocket(desk, socket_path(desk.node_id)) for desk in rig.desks.values()]
+    for one in served:
+        one.start()
+    yield rig
+    for one in served:
+        one.stop()
+
+
+def test_ping_says_hops_time_and_loss(rig, capsys):
+    assert ping_command.main(["--node", "0", "-c", "2", "-i", "0", "2"]) == 0
+    assert capsys.readouterr().out == (
+        "node 2: number 1, 2 hops, 8.0 ms\n"
+        "node 2: number 2, 2 hops, 8.0 ms\n"
+        "2 sent, 2 answered, 0 % lost; round trip min/mean/max 8.0/8.0/8.0 ms\n"
+    )
+
+
+def test_ping_of_a_node_without_a_route_says_so(rig, capsys):
+    assert ping_command.main(["--node", "0", "-c", "1", "77"]) == 1
+    assert capsys.readouterr().out == (
+        "node 77: number 1: no route to node 77\n1 sent, 0 answered, 100 % lost\n"
+    )
+
+
+def test_trace_names_the_nodes_on_the_way(rig, capsys):
+    assert trace_command.main(["--node", "0", "2"]) == 0
+    assert capsys.readouterr().out == ("  1  node 1\n  2  node 2\nthere and back in 8.0 ms\n")
+
+
+@pytest.mark.parametrize("to", ["gateway", "0"])
+def test_send_says_that_the_message_arrived(rig, capsys, to):
+    assert send_command.main(["--node", "2", to, "21.5 degrees"]) == 0
+    assert "delivered" in capsys.readouterr().out
+    assert [message.payload for message in rig.network.received[0]] == [b"21.5 degrees"]
+
+
+def test_send_takes_any_bytes_from_standard_input(rig, monkeypatch):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\x00\xff")))
+    assert send_command.main(["--node", "2", "--no-ack", "--port", "9", "1"]) == 0
+    (message,) = rig.network.received[1]
+    assert (message.payload, message.port, message.reliable) == (b"\x00\xff", 9, False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--node", "2", "0", "x" * 1025], "too large: 1025 bytes"),
+        (["--node", "2", "--wait", "0.01", "--no-ack", "77", "x"], "no route to node 77"),
+        (["0", "x"], "several nodes run here (0, 1, 2): choose one with --node"),
+        (["--node", "9", "0", "x"], "no node answers at"),
+    ],
+)
+def test_what_is_wrong_with_a_message_is_one_line(rig, capsys, arguments, reason):
+    assert send_command.main(arguments) == 1
+    said = capsys.readouterr()
+    assert reason in said.out + said.err
+    assert (said.out + said.err).count("\n") == 1
+
+
+def test_listen_prints_what_arrives_as_text_or_as_json(rig, capsys):
+    lines = []
+    for options in ([], ["--json"]):
+        listening = threading.Thread(
+            target=listen_command.main, args=([*options, "--node", "0", "--count", "1"],)
+        )
+        listening.start()
+        while not rig.desks[0]._receivers:
+            listening.join(0.01)
+        rig.desks[1].send(0, b"one", port=3)
+        listening.join(10.0)
+        assert not listening.is_alive()
+        lines.append(capsys.readouterr().out)
+        while rig.desks[0]._receivers:
+            listening.join(0.01)
+    assert lines[0] == "node 1 port 3: one\n"
+    assert json.loads(lines[1])["payload"] == b"one".hex()
+
+
+def test_without_a_node_the_command_says_what_to_start(capsys):
+    assert trace_command.main(["3"]) == 1
+    assert "no node runs here" in capsys.readouterr().err
+
+
+def test_only_the_user_of_the_node_may_open_its_socket(rig):
+    assert socket_path(0).stat().st_mode & 0o777 == 0o600
+    assert socket_path(0).parent.stat().st_mode & 0o777 == 0o700
+
+
+def test_two_programs_cannot_serve_the_same_node_and_the_second_goes_on_without(rig, caplog):
+    with pytest.raises(ConfigurationError, match="another program runs a node of this id"):
+        LocalSocket(rig.desks[0], socket_path(0))
+    assert local_socket(rig.desks[0]) is None
+    assert "node 0: no mesh_ping and the like" in caplog.text
+
+
+def test_a_socket_that_a_dead_program_left_is_replaced(rig, tmp_path):
+    path = tmp_path / "left.sock"
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(path))
+    again = LocalSocket(rig.desks[0], path)
+    again.start()
+    assert LocalClient(path).echo(1, 1.0)["hops"] == 1
+    again.stop()
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("request_line", [b"\n", b"{}\n", b"[1]\n", b'{"do": "fly"}\n', b"\xff\n"])
+def test_a_request_that_makes_no_sense_is_answered(rig, request_line):
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(socket_path(0)))
+        client.sendall(request_line)
+        with client.makefile() as lines:
+            assert "invalid request" in json.loads(lines.readline())["error"]
