@@ -47,6 +47,7 @@ class FactoryConfiguration:
     flight: Literal["kinematic", "dynamic"] = Field("kinematic")  # dynamic: physics moves drones
     wind_x: float = Field(0.0, ge=-20, le=20, description="metres per second")
     wind_y: float = Field(0.0, ge=-20, le=20, description="metres per second")
+    shape: Literal["quadrocopter", "box"] = Field("quadrocopter")  # what drones are drawn as
     real_time_factor: float = Field(
         1.0,
         description=(

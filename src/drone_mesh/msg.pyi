@@ -78,6 +78,7 @@ class MeshState(Message):
     routing: str
     repair_strategy: str
     nodes: list[NodeState]
+    shape: str
     obstacles: list[Obstacle]
     def __init__(
         self,
@@ -89,6 +90,7 @@ class MeshState(Message):
         routing: str = ...,
         repair_strategy: str = ...,
         nodes: Sequence[NodeState] = ...,
+        shape: str = ...,
         obstacles: Sequence[Obstacle] = ...,
     ) -> None: ...
 

@@ -55,21 +55,29 @@ class MeshMarkersTest(unittest.TestCase):
         marker = self.markers.get((name, 0))
         return 0 if marker is None else len(marker.points)
 
+    def meshes(self, name: str) -> list[str]:
+        """The files of the markers with this name, in the order of their ids."""
+        shown = sorted((key, marker) for key, marker in self.markers.items() if key[0] == name)
+        return [marker.mesh_resource.rpartition("/")[2] for _, marker in shown]
+
     def names(self) -> list[str]:
         return sorted(m.text for (name, _), m in self.markers.items() if name == "ids")
 
     def router_2_is_grey(self) -> bool:
-        shares = [getattr(self.markers["routers", 0].colors[1], c) for c in "rgb"]
+        shares = [getattr(self.markers["lamps", 2].color, c) for c in "rgb"]
         return max(shares) - min(shares) < 0.1
 
-    def test_1_each_drone_has_a_frame_a_box_a_name_and_the_links_that_are_there(self) -> None:
+    def test_1_each_drone_has_a_frame_a_mesh_a_name_and_the_links_that_are_there(self) -> None:
         wait_for("frames", WALL_LIMIT_S, lambda: len(self.frames) == 3)
         self.assertEqual(self.frames["drone_2"], (6.0, 0.0, 0.0))
         wait_for(
-            "boxes",
+            "a standing frame and a lamp for each",
             WALL_LIMIT_S,
-            lambda: (self.points("routers"), self.points("gateways")) == (2, 1),
+            lambda: (self.meshes("frames"), self.meshes("lamps"))
+            == (["standing.obj"] * 3, ["gateway_lamp.obj"] + ["router_lamp.obj"] * 2),
         )
+        legend = [m.text for (name, _), m in self.markers.items() if name == "legend"]
+        self.assertIn("disconnected", legend)
         wait_for("names", WALL_LIMIT_S, lambda: self.names() == ["0", "1", "2"])
         # 0 and 1 are 1 m apart, 0 and 2 are 7 m, 1 and 2 are 6 m: three links, two of them routes.
         wait_for("routes", WALL_LIMIT_S, lambda: self.points("links: route") == 4)

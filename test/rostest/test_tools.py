@@ -49,7 +49,7 @@ def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedP
 
 
 def record_in_an_older_definition(path: Path) -> None:
-    """A bag with one state, of a MeshState without the fields of channel, repair and obstacles."""
+    """A bag with one state, of a MeshState without its newer fields."""
     newer = (
         r"(float32 (airtime|tries)|uint16 queue|uint32 given_up|string \w+|Obstacle\[\] \w+) .*\n"
     )

@@ -47,7 +47,7 @@ def test_each_program_in_nodes_is_installed() -> None:
 def test_each_folder_that_ros_reads_is_installed() -> None:
     cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
     (folders,) = re.findall(r"^install\(DIRECTORY ([\w ]+)$", cmake, flags=re.MULTILINE)
-    read_by_ros = {"config", "launch", "rviz"} & {path.name for path in ROOT.iterdir()}
+    read_by_ros = {"config", "launch", "meshes", "rviz"} & {path.name for path in ROOT.iterdir()}
     assert set(folders.split()) >= read_by_ros
 
 

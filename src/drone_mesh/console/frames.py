@@ -33,6 +33,7 @@ from drone_mesh.state.outages import MeshSample, take_sample
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 from drone_mesh.view.fan import fan_out
 from drone_mesh.view.palette import node_colour_name
+from drone_mesh.view.picture import shape_named
 
 EVENTS_KEPT = 1000  # our choice: more than a person scrolls back
 EVENTS_PER_FRAME = 300  # of a burst of thousands only the newest are read
@@ -80,6 +81,7 @@ class FrameStore:
             "severity": int(summary.severity),
             "routing": mesh.routing,
             "repair": mesh.repair_strategy,
+            "shape": shape_named(mesh.shape).value,
         }
         for gone in self._nodes.keys() - {node.id for node in mesh.nodes}:
             del self._nodes[gone]

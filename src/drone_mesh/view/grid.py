@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence
 
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.view.palette import AXIS, GRID, LIGHT, SHADOW
-from drone_mesh.view.picture import DronePicture
+from drone_mesh.view.picture import Scene, Shape
 from drone_mesh.view.sketch import OVERSAMPLING, Sketch
+from drone_mesh.view.solids import polygon
 
+SHADOW_SHARE = 0.42  # radius of a round shadow, as a share of the width
 GRID_LINES = 12  # about as many as should be visible across
 
 
-def draw_ground(sketch: Sketch, drones: Sequence[DronePicture], scale: float) -> None:
+def draw_ground(sketch: Sketch, scene: Scene, scale: float) -> None:
     """Grid lines, axes, their numbers, and each drone's shadow with a line up to the drone."""
     width, height = sketch.camera.size
     corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)]
@@ -24,23 +26,19 @@ def draw_ground(sketch: Sketch, drones: Sequence[DronePicture], scale: float) ->
         sketch.line([(x, south, 0.0), (x, north, 0.0)], AXIS if x == 0 else GRID, 1)
     for y in _multiples(south, north, step_m):
         sketch.line([(west, y, 0.0), (east, y, 0.0)], AXIS if y == 0 else GRID, 1)
-    for drone in drones:
+    for drone in scene.drones:
         x, y, _ = drone.centre(scale)
-        half_x, half_y = (edge_m / 2 for edge_m in drone.size_m(scale)[:2])
-        sketch.area(
-            [
-                (x + east_m, y + north_m, 0.0)
-                for east_m, north_m in (
-                    (-half_x, -half_y),
-                    (half_x, -half_y),
-                    (half_x, half_y),
-                    (-half_x, half_y),
-                )
-            ],
-            SHADOW,
-        )
+        outline = _shadow(drone.size_m(scale), scene.shape)
+        sketch.area([(x + east_m, y + north_m, 0.0) for east_m, north_m in outline], SHADOW)
         sketch.line([(x, y, 0.0), drone.centre(scale)], SHADOW, 1.5)
     _number_grid(sketch, step_m, (west, south, east, north))
+
+
+def _shadow(size: Vector, shape: Shape) -> list[tuple[float, float]]:
+    if shape is Shape.QUADROCOPTER:
+        return polygon((0.0, 0.0), SHADOW_SHARE * max(size), 24)
+    half_x, half_y = size[0] / 2, size[1] / 2
+    return [(-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y)]
 
 
 def _number_grid(sketch: Sketch, step_m: float, ground: tuple[float, float, float, float]) -> None:

@@ -64,7 +64,7 @@ LIGHT = Palette(
 )  # fmt: skip
 DARK = Palette(
     gateway="#b193ff", connected="#3ecf95", flying="#ffb14a", disconnected="#ff7b72",
-    off="#939aa5", silent="#d9bf6b", known="#3c4859", obstacle="#5c5345",
+    off="#939aa5", silent="#d9bf6b", known="#3c4859", obstacle="#8a7f6d",
     page="#0d1116", card="#161b22", hover="#1e2630", line="#2a323d", grid="#1d242e",
     ink="#e4e9f0", muted="#97a2b2", accent="#6b9bff", accent_ink="#0d1116",
 )  # fmt: skip
@@ -74,6 +74,8 @@ GROUND: Colour = "#f4f5f1"
 GRID: Colour = "#d6dbd6"
 AXIS: Colour = "#a8b2ad"
 SHADOW: Colour = "#ccd1cc"
+FRAME: Colour = "#3a424d"  # of a drone
+ROTOR: Colour = "#aab3bd"  # of a drone in flight
 SKY: Colour = "#d9e6f2"
 
 _LINK_COLOUR_NAMES: Mapping[LinkUse, str] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from dataclasses import dataclass
 from typing import Sequence
@@ -19,6 +20,18 @@ from drone_mesh.view.palette import LIGHT, Colour
 DRONE_WIDTH_M = max(Role.ROUTER.size_m)
 HALF_DIAGONAL_M = DRONE_WIDTH_M / math.sqrt(2)
 WIDEST_OF_CROWDING = 0.3  # a drone is drawn at most so wide, as a share of the drones' distance
+
+
+class Shape(enum.Enum):
+    """What drones look like. The value is the word of launch arguments and options."""
+
+    QUADROCOPTER = "quadrocopter"
+    BOX = "box"
+
+
+def shape_named(word: str) -> Shape:
+    """The shape with this value; the default for any other word."""
+    return Shape.BOX if word == Shape.BOX.value else Shape.QUADROCOPTER
 
 
 @dataclass(frozen=True)
@@ -41,6 +54,16 @@ class DronePicture:
         """Edges of its box, along x, y, z."""
         x, y, z = self.role.size_m
         return (x * scale, y * scale, z * scale)
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether it is on a flight."""
+        return bool(self.path)
+
+    def underside(self, scale: float = 1.0) -> Vector:
+        """As `centre`, of the middle of its underside."""
+        x, y, z = self.centre(scale)
+        return (x, y, z - self.size_m(scale)[2] / 2)
 
     def centre(self, scale: float = 1.0) -> Vector:
         """Where the centre of its box is drawn, `scale` times as large and on the same ground.
@@ -69,6 +92,7 @@ class Scene:
     links: Sequence[LinkPicture] = ()
     title: str = ""
     obstacles: Sequence[ObstacleStatus] = ()
+    shape: Shape = Shape.QUADROCOPTER
 
     def points(self) -> list[Vector]:
         """Every point that has to be inside the picture."""

@@ -12,7 +12,7 @@ from drone_mesh.state.model import MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.roster import DroneView
 from drone_mesh.state.trouble import find_trouble, summarise
 from drone_mesh.view.fan import Slot, fan_out
-from drone_mesh.view.picture import DronePicture, LinkPicture, Scene
+from drone_mesh.view.picture import DronePicture, LinkPicture, Scene, shape_named
 
 MOST_LINKS = 600  # our choice, per use: more are one blot
 
@@ -35,6 +35,7 @@ def scene_of(mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneV
         ],
         title=f"{mesh.stamp_s:.1f} s: {summary.text}",
         obstacles=mesh.obstacles,
+        shape=shape_named(mesh.shape),
     )
 
 

@@ -1,6 +1,6 @@
 """A picture of a world, drawn without a screen.
 
-pybullet's software renderer draws the boxes; Pillow draws lines, dashes and text.
+pybullet's software renderer draws drones and obstacles; Pillow draws lines, dashes and text.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Sequence
 from PIL import Image
 
 from drone_mesh.state.links import LinkUse
-from drone_mesh.view.boxes import paste_boxes
+from drone_mesh.view.bodies import paste_bodies
 from drone_mesh.view.camera import Camera, Margins, frame
 from drone_mesh.view.grid import draw_ground
 from drone_mesh.view.legend import legend_of
@@ -28,7 +28,7 @@ from drone_mesh.view.sketch import OVERSAMPLING, Sketch
 DEFAULT_SIZE = (1280, 800)  # pixels
 LEGEND_WIDTH = 168  # pixels
 NARROWEST_WITH_LEGEND = 500  # pixels; a narrower picture is all map
-DRONE_PIXELS = 24  # about as wide as a drone should be
+DRONE_PIXELS = 36  # about as wide as a drone should be
 SMALLEST_ID, LARGEST_ID = 9.0, 15.0  # pixels: height of the text
 MARGINS = Margins(left=64, top=56, right=24, bottom=56)  # pixels
 
@@ -47,10 +47,10 @@ def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE)
 
     image = Image.new("RGB", canvas_size, GROUND)
     sketch = Sketch(image, camera)
-    draw_ground(sketch, scene.drones, scale)
+    draw_ground(sketch, scene, scale)
     _draw_links(sketch, scene, scale)
     _draw_paths(sketch, scene.drones, scale)
-    paste_boxes(image, camera, scene.drones, scale, scene.obstacles)
+    paste_bodies(image, camera, scene, scale)
     _draw_ids(sketch, scene.drones, scale)
     if _has_legend(size):
         _draw_legend(sketch, scene)

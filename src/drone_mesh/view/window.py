@@ -22,7 +22,7 @@ HELP = (
 )
 LINK_PIXELS = {LinkUse.KNOWN: 1.0, LinkUse.LOST: 1.0, LinkUse.ROUTE: 3.0}
 PATH_PIXELS = 2.0
-DRONE_PIXELS = 20  # about as wide as a drone should be
+DRONE_PIXELS = 30  # about as wide as a drone should be
 RESCALE_AT = 1.25  # drones get a new size when theirs is wrong by this factor
 TURN_DEG = 2.0  # per check of the keys
 ZOOM = 1.03  # per check of the keys
@@ -110,6 +110,7 @@ class WorldWindow:
         rescaled = not 1 / RESCALE_AT < scale / self._scale < RESCALE_AT
         if rescaled:
             self._scale = scale
+        self._items.use_shape(self._scene.shape)
         self._items.show_obstacles(self._scene.obstacles)
         self._items.show(
             self._scene.drones, self._lines(), self._scale, rescaled, self._shows["ids"]

@@ -1,4 +1,4 @@
-"""What stands in the world's window: boxes, ids, lines and text, changed as little as possible."""
+"""What stands in the world's window: drones, ids, lines and text, changed as little as possible."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import pybullet
 
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.state.model import ObstacleStatus
-from drone_mesh.view.boxes import add_box, add_obstacle
+from drone_mesh.view.bodies import Bodies
 from drone_mesh.view.camera import Camera
 from drone_mesh.view.palette import LIGHT, Colour, rgb
-from drone_mesh.view.picture import DronePicture
+from drone_mesh.view.picture import DronePicture, Shape
 
 LINE_HEIGHT = 22  # pixels
 TEXT_DEPTH_M = 1.0  # how far in front of the camera text hangs
+ID_ABOVE = 1.6  # heights of a drone, above its underside
 TEXT_SIZE = 1.2  # in units of pybullet
 INK = rgb(LIGHT.ink)
 
@@ -30,35 +31,49 @@ class WindowItems:
 
     def __init__(self, client: int) -> None:
         self._client = client
-        self._boxes: dict[int, tuple[int, DronePicture]] = {}
+        self._shape = Shape.QUADROCOPTER
+        self._bodies = Bodies(client, self._shape)
+        self._drones: dict[int, tuple[int, DronePicture]] = {}
         self._ids: dict[int, _Item] = {}
         self._obstacles: list[tuple[int, ObstacleStatus]] = []
         self._lines: dict[Line, _Item] = {}
         self._texts: list[_Item] = []
         self._written: object = None
 
+    def use_shape(self, shape: Shape) -> None:
+        """What drones look like that are shown from now on; to be called before the first ones."""
+        if shape is not self._shape:
+            self._shape, self._bodies = shape, Bodies(self._client, shape)
+
     def show(
         self, drones: Sequence[DronePicture], lines: set[Line], scale: float, rescaled: bool,
         with_ids: bool,
     ) -> None:  # fmt: skip
         """Show these drones and lines and nothing else; `rescaled`: `scale` is a new one."""
-        shown = {drone.node_id for drone in drones}
-        busy = rescaled or shown != set(self._boxes) or lines != set(self._lines)
+        busy = rescaled or self._looks_changed(drones) or lines != set(self._lines)
         if busy:
             self._render(False)  # or each new item waits for a frame
-        self._show_boxes(drones, scale, rescaled)
+        self._show_drones(drones, scale, rescaled)
         self._show_ids(scale, with_ids)
         self._show_lines(lines)
         if busy:
             self._render(True)
 
+    def _looks_changed(self, drones: Sequence[DronePicture]) -> bool:
+        looks = {drone.node_id: (drone.colour, drone.is_flying) for drone in drones}
+        return looks != {
+            node_id: (drone.colour, drone.is_flying) for node_id, (_, drone) in self._drones.items()
+        }
+
     def show_obstacles(self, boxes: Sequence[ObstacleStatus]) -> None:
         """Show these boxes and no others."""
         if [box for _, box in self._obstacles] == list(boxes):
             return
+        self._render(False)
         for body, _ in self._obstacles:
             pybullet.removeBody(body, physicsClientId=self._client)
-        self._obstacles = [(add_obstacle(self._client, box), box) for box in boxes]
+        self._obstacles = [(self._bodies.add_obstacle(box), box) for box in boxes]
+        self._render(True)
 
     def write(self, words: Sequence[str], camera: Camera) -> None:
         """Lines of text in the upper left corner; they hang before the camera and move with it."""
@@ -80,40 +95,38 @@ class WindowItems:
             pybullet.COV_ENABLE_RENDERING, int(on), physicsClientId=self._client
         )
 
-    def _show_boxes(self, drones: Sequence[DronePicture], scale: float, rescaled: bool) -> None:
-        shown = {drone.node_id for drone in drones}
-        for node_id in [n for n in self._boxes if rescaled or n not in shown]:
-            if node_id in self._ids:
-                self._remove(self._ids.pop(node_id))
-            pybullet.removeBody(self._boxes.pop(node_id)[0], physicsClientId=self._client)
+    def _show_drones(self, drones: Sequence[DronePicture], scale: float, rescaled: bool) -> None:
+        shown = {drone.node_id: drone for drone in drones}
+        for node_id, (body, before) in list(self._drones.items()):
+            now = shown.get(node_id)
+            if rescaled or now is None or now.is_flying is not before.is_flying:
+                if node_id in self._ids:
+                    self._remove(self._ids.pop(node_id))
+                pybullet.removeBody(body, physicsClientId=self._client)
+                del self._drones[node_id]
         for drone in drones:
-            if drone.node_id not in self._boxes:
-                box = add_box(self._client, drone, scale)
+            if drone.node_id not in self._drones:
+                body = self._bodies.add_drone(drone, scale)
             else:
-                box, before = self._boxes[drone.node_id]
-                centre = drone.centre(scale)
-                if before.centre(scale) != centre:
-                    pybullet.resetBasePositionAndOrientation(
-                        box, centre, (0, 0, 0, 1), physicsClientId=self._client
-                    )
+                body, before = self._drones[drone.node_id]
+                if before.centre(scale) != drone.centre(scale):
+                    self._bodies.move_drone(body, drone, scale)
                 if before.colour != drone.colour:
-                    pybullet.changeVisualShape(
-                        box, -1, rgbaColor=(*rgb(drone.colour), 1.0), physicsClientId=self._client
-                    )
-            self._boxes[drone.node_id] = (box, drone)
+                    self._bodies.colour_drone(body, drone)
+            self._drones[drone.node_id] = (body, drone)
 
     def _show_ids(self, scale: float, with_ids: bool) -> None:
-        for node_id, (box, drone) in self._boxes.items():
+        for node_id, (body, drone) in self._drones.items():
             if not with_ids:
                 if node_id in self._ids:
                     self._remove(self._ids.pop(node_id))
             elif node_id not in self._ids:
                 self._ids[node_id] = pybullet.addUserDebugText(
                     str(node_id),
-                    (0.0, 0.0, drone.size_m(scale)[2]),
+                    (0.0, 0.0, ID_ABOVE * drone.size_m(scale)[2]),
                     INK,
                     TEXT_SIZE,
-                    parentObjectUniqueId=box,
+                    parentObjectUniqueId=body,
                     physicsClientId=self._client,
                 )
 

@@ -20,6 +20,7 @@ from drone_mesh.view.picture import (
     DronePicture,
     LinkPicture,
     Scene,
+    Shape,
     drawing_scale,
 )
 from drone_mesh.view.snapshot import margins_of, render
@@ -67,6 +68,18 @@ def share_of_colour(pixels, colour, place, radius):
     strength = np.linalg.norm(hues, axis=1)
     likeness = hues @ wanted / (np.maximum(strength, 1) * np.linalg.norm(wanted))
     return float(np.mean((likeness > 0.95) & (strength > 8)))
+
+
+def test_a_flying_drone_has_other_rotors_and_a_box_stays_a_box(shoot):
+    standing, flying = (shoot([replace(ROUTER, path=path)]) for path in ((), [ROUTER.position]))
+    box = shoot([ROUTER], shape=Shape.BOX)
+    place = camera_of([ROUTER]).project([ROUTER.centre()])[0]
+    for pixels in (standing, flying, box):
+        assert share_of_colour(pixels, ROUTER.colour, place, 2) > 0.5
+    assert np.abs(standing - flying).mean() > 0.05
+    assert share_of_colour(box, ROUTER.colour, place, 9) > share_of_colour(
+        standing, ROUTER.colour, place, 9
+    )
 
 
 def test_an_obstacle_is_shown_and_dims_the_drone_behind_it(shoot):

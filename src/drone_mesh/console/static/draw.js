@@ -2,6 +2,17 @@
 
 const DIGIT_WIDTH = 0.7; // of a bold digit, as a share of its height
 const SMALLEST_ID_PX = 6;
+const LEAST_ARMS_PX = 7; // the radius of a drone whose arms and rotors can be told apart
+const MOTORS = [
+  [0.7, 0.7],
+  [-0.7, 0.7],
+  [-0.7, -0.7],
+  [0.7, -0.7],
+];
+const MOTOR_AT = 1.2; // in radii of a drone, as the next two
+const ROTOR = 0.45;
+const HULL = 0.85;
+const ROTOR_RAD_PER_S = 9; // our choice: a real one is a blur
 const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and only the selected node's are drawn
 
 /** The palette's colours in the present theme, by name. */
@@ -40,6 +51,11 @@ export function droneRadius(camera, mesh) {
     Math.max(...positions.map((at) => at[axis])) - Math.min(...positions.map((at) => at[axis])) + 1;
   const apart = Math.sqrt((span(0) * span(1)) / positions.length) * camera.scale;
   return Math.min(13, Math.max(4.5, apart * 0.3));
+}
+
+/** Whether a drone of this radius, px, is drawn with its arms and rotors. */
+export function hasArms(shape, radius) {
+  return shape !== "box" && radius >= LEAST_ARMS_PX;
 }
 
 /** Where a node is drawn, px: nodes at one position are fanned out around it. */
@@ -131,7 +147,15 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
   }
   for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours, radius);
   for (const node of drawingOrder(mesh))
-    drawn.drones += drawDrone(context, camera, node, mesh.selected, colours, radius);
+    drawn.drones += drawDrone(
+      context,
+      camera,
+      node,
+      mesh.selected,
+      colours,
+      radius,
+      mesh.clock.shape,
+    );
   if (drag) drawDrag(context, camera, mesh.nodes.get(drag.id), drag, colours, radius);
   return drawn;
 }
@@ -247,16 +271,53 @@ function drawPath(context, camera, node, colours, radius) {
   context.stroke();
 }
 
-function drawDrone(context, camera, node, selected, colours, r) {
+/** Arms and rotors, around a drone's middle; the rotors of one that flies turn. */
+function drawArms(context, px, py, node, colours, r) {
+  context.strokeStyle = colours.muted;
+  context.lineWidth = Math.max(1.5, 0.18 * r);
+  context.beginPath();
+  for (const [east, north] of MOTORS) {
+    context.moveTo(px, py);
+    context.lineTo(px + east * MOTOR_AT * r, py + north * MOTOR_AT * r);
+  }
+  context.stroke();
+  const flying = node.path.length > 0;
+  const turned = flying ? (performance.now() / 1000) * ROTOR_RAD_PER_S : 0.6;
+  for (const [number, [east, north]] of MOTORS.entries()) {
+    const [x, y] = [px + east * MOTOR_AT * r, py + north * MOTOR_AT * r];
+    const angle = number % 2 ? turned : -turned;
+    const [reachX, reachY] = [ROTOR * r * Math.cos(angle), ROTOR * r * Math.sin(angle)];
+    context.lineWidth = 1;
+    context.beginPath();
+    context.arc(x, y, ROTOR * r, 0, 2 * Math.PI);
+    if (flying) {
+      context.globalAlpha = 0.3;
+      context.fillStyle = colours.muted;
+      context.fill();
+      context.globalAlpha = 1;
+    }
+    context.stroke();
+    context.lineWidth = Math.max(1.5, 0.14 * r);
+    context.beginPath();
+    context.moveTo(x - reachX, y - reachY);
+    context.lineTo(x + reachX, y + reachY);
+    context.stroke();
+  }
+}
+
+function drawDrone(context, camera, node, selected, colours, radius, shape) {
   if (!node.position) return 0;
-  const [px, py] = onScreen(camera, node, r);
+  const [px, py] = onScreen(camera, node, radius);
   const colour = colours[node.colour];
   const hollow = !node.on;
+  const arms = hasArms(shape, radius);
+  const r = arms ? HULL * radius : radius;
+  if (arms) drawArms(context, px, py, node, colours, radius);
   if (node.id === selected) {
     context.strokeStyle = colours.accent;
     context.lineWidth = 2.5;
     context.beginPath();
-    context.arc(px, py, r + 5, 0, 2 * Math.PI);
+    context.arc(px, py, (arms ? 1.5 : 1) * radius + 5, 0, 2 * Math.PI);
     context.stroke();
   }
   context.beginPath();

@@ -1,12 +1,13 @@
 // The map: pan, zoom, select, drag. Drawing itself is in draw.js.
 
 import { Camera } from "./camera.js";
-import { drawMesh, drawingOrder, droneRadius, onScreen, readColours } from "./draw.js";
+import { drawMesh, drawingOrder, droneRadius, hasArms, onScreen, readColours } from "./draw.js";
 
 const DRAG_AFTER_PX = 6;
 const NEAR_PX = 8; // a click this close to a drone selects it
 const KEY_STEP_PX = 60;
 const ZOOM_STEP = 1.3;
+const TURN_PERIOD_MS = 50; // between two pictures of turning rotors
 const IN_VIEW_PX = 24; // a node closer to the edge is not in view
 
 export class MapView {
@@ -27,6 +28,7 @@ export class MapView {
     this.moved = false; // by a person, since it was fitted
     this.pointers = new Map();
     this.pending = false;
+    this.still = matchMedia("(prefers-reduced-motion: reduce)");
     const canvas = this.canvas;
     new ResizeObserver(() => this.#resize()).observe(canvas);
     for (const what of ["frame", "select"]) mesh.addEventListener(what, () => this.redraw());
@@ -106,6 +108,15 @@ export class MapView {
     const options = { ...this.options, covered: this.#covered() };
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.drag);
     this.#describe(drawn);
+    this.#keepTurning(drawn);
+  }
+
+  /** Draws again in a moment while a rotor is to be seen turning. */
+  #keepTurning({ radius }) {
+    clearTimeout(this.turning);
+    if (this.still.matches || !hasArms(this.mesh.clock.shape, radius)) return;
+    const flying = [...this.mesh.nodes.values()].some((node) => node.path.length);
+    if (flying) this.turning = setTimeout(() => this.redraw(), TURN_PERIOD_MS);
   }
 
   #describe(drawn) {

@@ -12,14 +12,18 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drone_mesh.drone.roles import Role
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.views.marker_legend import legend_rows
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use, shortest
 from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known
 from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
+from drone_mesh.view.picture import Shape, shape_named
 
 MOST_LINKS = 1500  # our choice, per use: 254 drones on 1 m have 18,000, which are one blot
-TIMES_LARGER = 2.5  # than life: the size of the boxes
+TIMES_LARGER = 4.0  # than life: the size of the drones
+MESHES = "package://drone_mesh/meshes/"  # written by scripts/meshes
+FRAME_COLOUR = DARK.muted
 BOX_RADIUS_M = TIMES_LARGER * Role.ROUTER.size_m[0] / math.sqrt(2)
 LABEL_M = 0.5
 LINK_WIDTH_M = {LinkUse.ROUTE: 0.08, LinkUse.KNOWN: 0.03, LinkUse.LOST: 0.05}
@@ -48,8 +52,12 @@ class MarkerMaker:
         lost = self._lost.update(known_links(nodes), wall_s)
         array = MarkerArray()
         self._add_obstacles(array, state.obstacles)
-        for role in Role:
-            self._add_boxes(array, [node for node in nodes if node.role == role], role, positions)
+        if shape_named(state.shape) is Shape.BOX:
+            for role in Role:
+                of_role = [node for node in nodes if node.role == role]
+                self._add_boxes(array, of_role, role, positions)
+        else:
+            self._add_drones(array, nodes, positions)
         for use, links in links_by_use(nodes, lost).items():
             lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
             colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
@@ -58,6 +66,7 @@ class MarkerMaker:
             array, "flight paths", _path_lines(nodes, positions), _colour(DARK.path), PATH_WIDTH_M
         )
         self._add_ids(array, nodes, positions)
+        self._add_legend(array, positions)
         for marker in array.markers:
             marker.header.stamp, marker.header.frame_id = state.header.stamp, names.MAP_FRAME
         return array
@@ -74,6 +83,27 @@ class MarkerMaker:
             marker.scale.x, marker.scale.y, marker.scale.z = x_m, y_m, z_m
             marker.points = [_point(positions[node.id], up=z_m / 2) for node in nodes]
             marker.colors = [_colour(colour) for colour in colours]
+
+    def _add_drones(
+        self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions
+    ) -> None:
+        """Two markers for each drone, since a mesh in rviz has one colour: frame, and lamp."""
+        for node in nodes:
+            colour = DARK.of_node(node.role, condition_of(node))
+            flying = len(node.path) > 0
+            frame = MESHES + ("flying.obj" if flying else "standing.obj")
+            lamp = f"{MESHES}{Role(node.role).word}_lamp.obj"
+            looks = (("frames", frame, FRAME_COLOUR), ("lamps", lamp, colour))
+            for name, mesh, tint in looks:
+                content = [positions[node.id], mesh, tint]
+                marker = self._changed(array, name, node.id, content)
+                if marker:
+                    marker.type = Marker.MESH_RESOURCE
+                    marker.mesh_resource = mesh
+                    marker.scale.x = marker.scale.y = marker.scale.z = TIMES_LARGER
+                    marker.color = _colour(tint)
+                    marker.pose.position = _point(positions[node.id], up=0.0)
+        self._delete_gone(array, ("frames", "lamps"), nodes)
 
     def _add_obstacles(self, array: MarkerArray, boxes: Sequence[ObstacleStatus]) -> None:
         for number, box in enumerate(boxes):
@@ -109,9 +139,32 @@ class MarkerMaker:
                 marker.text = str(node.id)
                 height_m = TIMES_LARGER * Role(node.role).size_m[2]
                 marker.pose.position = _point(positions[node.id], up=height_m + 1.2 * LABEL_M)
+        self._delete_gone(array, ("ids",), nodes)
+
+    def _add_legend(self, array: MarkerArray, positions: _Positions) -> None:
+        rows = legend_rows(positions.values()) if positions else []
+        for number, row in enumerate(rows):
+            swatch = self._changed(array, "legend colours", number, [row])
+            if swatch:
+                swatch.type = Marker.CUBE
+                swatch.scale.x, swatch.scale.y = row.height_m, row.height_m * row.thickness
+                swatch.scale.z = 0.02
+                swatch.color = _colour(row.colour)
+                swatch.pose.position = _point(row.place, up=0.0)
+            text = self._changed(array, "legend", number, [row])
+            if text:
+                text.type = Marker.TEXT_VIEW_FACING
+                text.scale.z = row.height_m
+                text.color = _colour(DARK.ink)
+                text.text = row.text
+                text.pose.position = _point(row.text_place, up=0.0)
+
+    def _delete_gone(
+        self, array: MarkerArray, names: Sequence[str], nodes: Sequence[NodeStatus]
+    ) -> None:
         present = {node.id for node in nodes}
-        for name, number in [key for key in self._shown if key[0] == "ids"]:
-            if number not in present:
+        for name, number in list(self._shown):
+            if name in names and number not in present:
                 self._changed(array, name, number, [])
 
     def _changed(

@@ -53,6 +53,7 @@ class MeshStatePublisher:
         routing: str,
         repair_strategy: str,
         obstacles: Sequence[ObstacleStatus] = (),
+        shape: str = "",
     ) -> None:
         """`look` is called in the thread of this object, and must not wait for the world.
 
@@ -61,7 +62,7 @@ class MeshStatePublisher:
         self._look = look
         self._max_distance_m = max_distance_m
         self._routing, self._repair_strategy = routing, repair_strategy
-        self._obstacles = obstacles
+        self._obstacles, self._shape = obstacles, shape
         self._roster = MeshRoster()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
         self._last_look: tuple[float, float] | None = None  # wall, simulated
@@ -128,6 +129,7 @@ class MeshStatePublisher:
             self._routing,
             self._repair_strategy,
             self._obstacles,
+            self._shape,
         )
         self._latest = mesh
         self._state.publish(state_msg(mesh))

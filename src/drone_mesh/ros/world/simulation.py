@@ -109,6 +109,7 @@ class Simulation:
             configuration.routing,
             configuration.repair,
             describe_obstacles(obstacles.boxes if obstacles else ()),
+            configuration.shape,
         )
         state.start()
         window = window_of(world, drones, state) if configuration.gui else None

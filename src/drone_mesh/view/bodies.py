@@ -1,0 +1,175 @@
+"""Drones and obstacles as bodies of a pybullet client, and a picture of them without a screen."""
+
+from __future__ import annotations
+
+import functools
+from typing import Sequence, Tuple
+
+import numpy as np
+import pybullet
+from PIL import Image
+
+from drone_mesh.drone.flight_path import Vector
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import ObstacleStatus
+from drone_mesh.view.camera import Camera
+from drone_mesh.view.palette import FRAME, LIGHT, ROTOR, Colour, rgb
+from drone_mesh.view.picture import DronePicture, Scene, Shape
+from drone_mesh.view.quadrocopter import Part, solid_of
+from drone_mesh.view.solids import normal
+
+LIGHT_FROM = (-3.0, -6.0, 12.0)
+OBSTACLE_OPACITY = 0.7
+NOTHING = -1  # pybullet's body number of a pixel that shows no body
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+BASE = -1  # pybullet's number for a body without its links
+
+_Triangles = Tuple[Sequence[Vector], Sequence[Vector]]  # corners, and the normal at each
+
+
+class Bodies:
+    """Makes bodies in one pybullet client; belongs to the thread of that client.
+
+    A quadrocopter is one body: the frame is its base, and each part with another colour a link.
+    """
+
+    def __init__(self, client: int, shape: Shape) -> None:
+        self._client = client
+        self._shape = shape
+        self._shapes: dict[object, int] = {}  # drones that look the same share theirs
+
+    def add_drone(self, drone: DronePicture, scale: float) -> int:
+        """A drone, `scale` times as large as life; returns its body."""
+        if self._shape is Shape.BOX:
+            box = self._box_shape(drone.size_m(scale), drone.colour)
+            return self._add(box, (), drone.centre(scale))
+        frame = self._part_shape(Part.FRAME, drone, FRAME, scale)
+        links = [self._part_shape(Part.LAMP, drone, drone.colour, scale)]
+        if drone.is_flying:
+            links.append(self._part_shape(Part.DISCS, drone, ROTOR, scale))
+        else:
+            links.append(self._part_shape(Part.BLADES, drone, FRAME, scale))
+        return self._add(frame, links, drone.underside(scale))
+
+    def move_drone(self, body: int, drone: DronePicture, scale: float) -> None:
+        """Put a drone where it is now."""
+        place = drone.centre(scale) if self._shape is Shape.BOX else drone.underside(scale)
+        pybullet.resetBasePositionAndOrientation(body, place, UPRIGHT, physicsClientId=self._client)
+
+    def colour_drone(self, body: int, drone: DronePicture) -> None:
+        """Give a drone the colour that it has now."""
+        pybullet.changeVisualShape(
+            body,
+            BASE if self._shape is Shape.BOX else 0,
+            rgbaColor=(*rgb(drone.colour), 1.0),
+            physicsClientId=self._client,
+        )
+
+    def add_obstacle(self, box: ObstacleStatus) -> int:
+        """An obstacle; returns its body."""
+        shape = self._box_shape(box.size, LIGHT.obstacle, OBSTACLE_OPACITY)
+        turned = pybullet.getQuaternionFromEuler((0.0, 0.0, box.yaw))
+        return self._add(shape, (), box.center, turned)
+
+    def _add(
+        self,
+        shape: int,
+        links: Sequence[int],
+        place: Sequence[float],
+        orientation: Sequence[float] = UPRIGHT,
+    ) -> int:
+        count = len(links)
+        return int(
+            pybullet.createMultiBody(
+                0.0,
+                -1,
+                shape,
+                list(place),
+                list(orientation),
+                linkMasses=[0.0] * count,
+                linkCollisionShapeIndices=[-1] * count,
+                linkVisualShapeIndices=list(links),
+                linkPositions=[(0.0, 0.0, 0.0)] * count,
+                linkOrientations=[UPRIGHT] * count,
+                linkInertialFramePositions=[(0.0, 0.0, 0.0)] * count,
+                linkInertialFrameOrientations=[UPRIGHT] * count,
+                linkParentIndices=[0] * count,
+                linkJointTypes=[pybullet.JOINT_FIXED] * count,
+                linkJointAxis=[(0.0, 0.0, 1.0)] * count,
+                physicsClientId=self._client,
+            )
+        )
+
+    def _box_shape(self, size: Sequence[float], colour: Colour, opacity: float = 1.0) -> int:
+        return int(
+            pybullet.createVisualShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[edge_m / 2 for edge_m in size],
+                rgbaColor=(*rgb(colour), opacity),
+                specularColor=(0, 0, 0),
+                physicsClientId=self._client,
+            )
+        )
+
+    def _part_shape(self, part: Part, drone: DronePicture, colour: Colour, scale: float) -> int:
+        key = (part, drone.role, colour, scale)
+        if key not in self._shapes:
+            corners, normals = _triangles(drone.role, part)
+            self._shapes[key] = int(
+                pybullet.createVisualShape(
+                    pybullet.GEOM_MESH,
+                    vertices=(np.array(corners) * scale).tolist(),
+                    indices=list(range(len(corners))),
+                    normals=normals,
+                    rgbaColor=(*rgb(colour), 1.0),
+                    specularColor=(0, 0, 0),
+                    physicsClientId=self._client,
+                )
+            )
+        return self._shapes[key]
+
+
+@functools.lru_cache(maxsize=None)
+def _triangles(role: Role, part: Part) -> _Triangles:
+    solid = solid_of(role, part)
+    corners = [corner for triangle in solid for corner in triangle]
+    return corners, [normal(triangle) for triangle in solid for _ in triangle]
+
+
+def paste_bodies(image: Image.Image, camera: Camera, scene: Scene, scale: float) -> None:
+    """Draw a scene's drones, `scale` times as large as life, over what is in the image.
+
+    Obstacles dim what is behind them.
+    """
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        bodies = Bodies(client, scene.shape)
+        for drone in scene.drones:
+            bodies.add_drone(drone, scale)
+        colours, seen = _shoot(client, camera)
+        image.paste(colours, (0, 0), _mask(seen != NOTHING, 1.0))
+        if scene.obstacles:
+            added = [bodies.add_obstacle(box) for box in scene.obstacles]
+            colours, seen = _shoot(client, camera)
+            image.paste(colours, (0, 0), _mask(np.isin(seen, added), OBSTACLE_OPACITY))
+    finally:
+        pybullet.disconnect(physicsClientId=client)
+
+
+def _shoot(client: int, camera: Camera) -> tuple[Image.Image, np.ndarray]:
+    """What the camera sees of this pybullet client, and (height, width) which body is where."""
+    width, height, pixels, _, bodies = pybullet.getCameraImage(
+        *camera.size,
+        camera.view_matrix(),
+        camera.projection_matrix(),
+        lightDirection=LIGHT_FROM,
+        shadow=0,
+        renderer=pybullet.ER_TINY_RENDERER,
+        physicsClientId=client,
+    )
+    colours = np.reshape(pixels, (height, width, 4))[:, :, :3].astype(np.uint8)
+    return Image.fromarray(colours), np.reshape(bodies, (height, width))
+
+
+def _mask(where: np.ndarray, opacity: float) -> Image.Image:
+    return Image.fromarray(np.where(where, round(255 * opacity), 0).astype(np.uint8))

@@ -1,0 +1,87 @@
+"""What a drone looks like: a small quadrocopter, in parts that have colours of their own.
+
+Metres, at the true size; the origin is the middle of the underside. A router's parts fit into its
+box; a gateway's are as high as its box, and 0.2 m wide.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from drone_mesh.drone.roles import Role
+from drone_mesh.view.solids import Solid, bar, dome, normal, polygon, prism
+
+MOTORS = ((0.063, 0.063), (-0.063, 0.063), (-0.063, -0.063), (0.063, -0.063))  # x, y
+ROTOR_RADIUS_M = 0.037
+ROTOR_LOW_M, ROTOR_HIGH_M = 0.070, 0.074
+
+
+class Part(enum.Enum):
+    """What has a colour of its own."""
+
+    FRAME = "frame"  # hull, arms, motors and legs
+    LAMP = "lamp"  # in the colour of the drone's condition
+    BLADES = "blades"  # of the rotors, at rest
+    DISCS = "discs"  # the rotors as one sees them in flight
+
+
+def solid_of(role: Role, part: Part) -> Solid:
+    """The triangles of a part of a drone."""
+    if part is Part.FRAME:
+        return _frame()
+    if part is Part.LAMP:
+        return _gateway_lamp() if role is Role.GATEWAY else _router_lamp()
+    if part is Part.BLADES:
+        return [triangle for motor in range(4) for triangle in rotor(motor, 0.6 + 0.9 * motor)]
+    discs = (polygon(motor, ROTOR_RADIUS_M, 12) for motor in MOTORS)
+    return [t for disc in discs for t in prism(disc, ROTOR_LOW_M, ROTOR_HIGH_M)]
+
+
+def rotor(motor: int, turned_rad: float) -> Solid:
+    """The two blades on one motor."""
+    x, y = MOTORS[motor]
+    reach_x, reach_y = (ROTOR_RADIUS_M * f(turned_rad) for f in (math.cos, math.sin))
+    blades = bar((x - reach_x, y - reach_y), (x + reach_x, y + reach_y), 0.012)
+    return prism(blades, ROTOR_LOW_M, ROTOR_HIGH_M)
+
+
+def _frame() -> Solid:
+    solid = prism(polygon((0.0, 0.0), 0.05, 8), 0.028, 0.056)
+    for x, y in MOTORS:
+        solid += prism(bar((0.0, 0.0), (x, y), 0.014), 0.04, 0.052)
+        solid += prism(polygon((x, y), 0.012, 6), 0.038, 0.07)
+        solid += prism(polygon((0.8 * x, 0.8 * y), 0.006, 4), 0.0, 0.042)
+    return solid
+
+
+def _router_lamp() -> Solid:
+    return dome(0.056, 0.056, 0.1, corners=12, rings=4)
+
+
+def _gateway_lamp() -> Solid:
+    """A square hull and a mast with its aerial."""
+    hull = prism(polygon((0.0, 0.0), 0.075, 4, math.pi / 4), 0.056, 0.1)
+    mast = prism(polygon((0.0, 0.0), 0.012, 6), 0.1, 0.17)
+    return hull + mast + prism(polygon((0.0, 0.0), 0.034, 8), 0.17, 0.2)
+
+
+def obj(solid: Solid) -> str:
+    """A solid as a Wavefront OBJ file, with a normal for each triangle."""
+    lines = ["# written by scripts/meshes"]
+    lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for triangle in solid for x, y, z in triangle]
+    lines += ["vn {:.4f} {:.4f} {:.4f}".format(*normal(triangle)) for triangle in solid]
+    for i in range(len(solid)):
+        lines.append("f " + " ".join(f"{3 * i + corner}//{i + 1}" for corner in (1, 2, 3)))
+    return "\n".join(lines) + "\n"
+
+
+def mesh_files() -> dict[str, str]:
+    """The files of meshes/: what has one colour in rviz, by name."""
+    frame = solid_of(Role.ROUTER, Part.FRAME)
+    solids = {
+        "standing": frame + solid_of(Role.ROUTER, Part.BLADES),
+        "flying": frame + solid_of(Role.ROUTER, Part.DISCS),
+        **{f"{role.word}_lamp": solid_of(role, Part.LAMP) for role in Role},
+    }
+    return {f"{name}.obj": obj(solid) for name, solid in solids.items()}
