@@ -19,9 +19,11 @@ from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.internet.asking import GatewayDesk
+from drone_mesh.internet.data import add_data_requests
 from drone_mesh.internet.guarded_app import REFUSALS, Refusal, Responses, guarded_app
 from drone_mesh.internet.orders import add_order_requests
 from drone_mesh.internet.status import ReadStatus, add_status_request
+from drone_mesh.users.desk import UsersDesk
 from drone_mesh.web.access import Access
 
 _log = logging.getLogger(__name__)
@@ -112,12 +114,13 @@ def make_api(
     origin: Optional[Origin] = None,
     status: Optional[ReadStatus] = None,
     mesh: Optional[Callable[[int], Dict[str, Any]]] = None,
+    users: Optional[UsersDesk] = None,
 ) -> FastAPI:
     """The application. Its page /docs loads nothing from the internet.
 
     With the origin of the common frame, goals may be given in degrees. `status` is what the node
     says of itself, from any thread; `mesh`, on the gateway's, what it knows of all nodes, with the
-    events after a number.
+    events after a number. `users` sends and receives messages.
     """
     app, guards = guarded_app(
         "drone_mesh gateway",
@@ -211,6 +214,9 @@ def make_api(
     }
     add_order_requests(app, desk, guards, refusals, {**refusals, **not_found})
 
+    if users is not None:
+        bad_message = {422: {"model": Refusal, "description": "Invalid node, port or message"}}
+        add_data_requests(app, users, guards, {**refusals, **bad_message})
     if status is not None:
         add_status_request(app, guards, status)
     if mesh is not None:

@@ -11,6 +11,7 @@ from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk, Submit
 from drone_mesh.internet.status import MOST_CONNECTIONS, ReadStatus
+from drone_mesh.users.desk import UsersDesk
 from drone_mesh.web.access import access_for, own_names
 from drone_mesh.web.server_thread import ServerThread
 from drone_mesh.web.tls import Certificate
@@ -38,18 +39,20 @@ class HttpInternet(IInternetConnection):
         origin: Origin | None = None,
         status: ReadStatus | None = None,
         mesh: Callable[[int], dict[str, Any]] | None = None,
+        users: UsersDesk | None = None,
     ) -> None:
         """Take the port (0: any free one).
 
         `submit` runs a function on the thread that owns the gateway. Without a token only this
         machine may send requests; with one, `names` are those of this machine that may be asked
-        for. With an `origin` goals may be given in degrees. Raises ConfigurationError for an
+        for. With an `origin` goals may be given in degrees; the desk of its
+        node's `users` sends and receives messages. Raises ConfigurationError for an
         address that is not available, or that other machines can reach while there is no token.
         """
         access = access_for(bind_address, token, own_names(*names) if token else ())
         self._desk = GatewayDesk(submit, answer_within_s)
         self._server = ServerThread(
-            make_api(self._desk, access, origin, status, mesh),
+            make_api(self._desk, access, origin, status, mesh, users),
             bind_address,
             port,
             name="http",

@@ -181,6 +181,7 @@ def _internet(options: Options) -> MakeInternet | None:
         http.token,
         status=node.status,
         mesh=node.mesh,
+        users=node.users,
         **settings,
     )
 

@@ -81,5 +81,5 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
         mock = RosInternetMock(self.node_id, self.seat)
         if self.settings.internet == "mock":
             return mock
-        http = http_internet(self.seat.submit, port=DEFAULT_PORT + self.node_id)
+        http = http_internet(self.seat.submit, port=DEFAULT_PORT + self.node_id, users=self.users)
         return SeveralInternets(mock, http)

@@ -1,0 +1,141 @@
+"""The requests about users' messages: `POST /nodes/{id}/data` and `GET /data`.
+
+No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
+Python 3.8.
+"""
+
+import asyncio
+import base64
+import json
+import time
+from typing import Any, AsyncIterator, Dict, Optional, Sequence
+
+from fastapi import FastAPI, Path, Query, Request, Response
+from fastapi.params import Depends
+from fastapi.responses import StreamingResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+from typing_extensions import Annotated
+
+from drone_mesh.communication.data.ticket import TO_ALL, TicketState
+from drone_mesh.communication.data.transport import ReceivedMessage
+from drone_mesh.errors import MessageRefused, QueueFull
+from drone_mesh.internet.guarded_app import Responses
+from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk
+
+LONGEST_WAIT_S = 60.0  # our choice
+SIGN_OF_LIFE_S = 15.0  # our choice: a comment to a client for which nothing came
+MOST_UNREAD = 256  # messages that may wait for a slow client; then its connection ends
+_LOOK_S = 0.02
+
+Destination = Annotated[
+    int, Path(ge=0, le=TO_ALL, description=f"Node id; {TO_ALL}: all nodes, best effort.")
+]
+Port = Annotated[int, Query(ge=0, le=255)]
+
+
+class DataSent(BaseModel):
+    """A message that the gateway's node took."""
+
+    ticket: int = Field(description="Counts the messages of the gateway's node.")
+    state: TicketState
+
+
+def add_data_requests(
+    app: FastAPI, users: UsersDesk, guards: Sequence[Depends], refusals: Responses
+) -> None:
+    """`users` is the desk of the gateway's own node."""
+
+    @app.post(
+        "/nodes/{id}/data",
+        dependencies=guards,
+        responses=refusals,
+        openapi_extra={
+            "requestBody": {
+                "content": {
+                    "application/octet-stream": {"schema": {"type": "string", "format": "binary"}}
+                }
+            }
+        },
+    )
+    async def send_data(
+        id: Destination,
+        request: Request,
+        port: Port = 0,
+        reliable: bool = True,
+        wait: Annotated[
+            float, Query(ge=0, le=LONGEST_WAIT_S, description="Seconds, for the delivery.")
+        ] = 0.0,
+    ) -> DataSent:
+        """Send the body, up to 1024 bytes, to a node. 504: it did not arrive within `wait`."""
+        try:
+            sending = users.send(id, await request.body(), port, reliable)
+            await _over(sending, wait)
+            ticket = sending.ticket()
+        except QueueFull as error:
+            raise HTTPException(503, str(error)) from error
+        except MessageRefused as error:
+            raise HTTPException(422, str(error)) from error
+        if ticket.state is TicketState.GIVEN_UP:
+            raise HTTPException(503, str(ticket))
+        if wait > 0 and not ticket.final:
+            raise HTTPException(504, f"{ticket}; not delivered within {wait:g} s")
+        return DataSent(ticket=ticket.number, state=ticket.state)
+
+    @app.get(
+        "/data",
+        dependencies=guards,
+        responses={**refusals, 200: {"content": {"text/event-stream": {}}}},
+        response_class=Response,
+    )
+    async def data(
+        port: Annotated[Optional[int], Query(ge=0, le=255, description="Only this one.")] = None,
+    ) -> Response:
+        """The messages that the gateway receives from now on, as server-sent events.
+
+        Each event is a JSON object: sender, port, to_all, reliable, payload (base64).
+        """
+        return StreamingResponse(_events(users, port), media_type="text/event-stream")
+
+
+async def _over(sending: Sending, wait_s: float) -> None:
+    """Let the node take the message, and then wait for its last state."""
+    until_s = time.monotonic() + wait_s
+    give_up_s = time.monotonic() + HANDOVER_S  # then `ticket` raises
+    while not sending.is_over:
+        now_s = time.monotonic()
+        if now_s >= (until_s if sending.is_taken else give_up_s):
+            return
+        await asyncio.sleep(_LOOK_S)
+
+
+async def _events(users: UsersDesk, port: Optional[int]) -> AsyncIterator[str]:
+    loop = asyncio.get_running_loop()
+    messages: asyncio.Queue[ReceivedMessage] = asyncio.Queue()
+
+    def receive(message: ReceivedMessage) -> None:
+        if port in (None, message.port):
+            loop.call_soon_threadsafe(messages.put_nowait, message)
+
+    end = users.subscribe(receive)
+    try:
+        yield ": messages of users\n\n"
+        while messages.qsize() < MOST_UNREAD:
+            try:
+                message = await asyncio.wait_for(messages.get(), SIGN_OF_LIFE_S)
+            except asyncio.TimeoutError:
+                yield ": nothing came\n\n"
+            else:
+                yield f"data: {json.dumps(_as_json(message))}\n\n"
+    finally:
+        end()
+
+
+def _as_json(message: ReceivedMessage) -> Dict[str, Any]:
+    return {
+        "sender": message.sender,
+        "port": message.port,
+        "to_all": message.to_all,
+        "reliable": message.reliable,
+        "payload": base64.b64encode(message.payload).decode(),
+    }

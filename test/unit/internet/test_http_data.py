@@ -1,0 +1,94 @@
+"""Messages of users through a gateway, over HTTP."""
+
+from __future__ import annotations
+
+import base64
+import json
+
+import pytest
+from conftest import TOKEN, MeshWithHttp
+
+from drone_mesh.users.desk import UsersDesk
+
+
+class MeshWithUsers(MeshWithHttp):
+    """What is handed to the gateway is followed by a second of the mesh."""
+
+    def __init__(self, token=""):
+        self.desk = UsersDesk(0, self._submit)
+        super().__init__(token=token, users=self.desk)
+        self.desk.open(self.gateway.data)
+
+    def _submit(self, work):
+        def then_run(now_s):
+            work(now_s)
+            self.network.nodes[0].plan()
+            self.network.run_for(1.0)
+
+        self.executor.submit(then_run)
+
+    def from_node(self, node, payload, port=0):
+        """Have a node send a message to the gateway."""
+        self.executor.submit(lambda _now_s: self.network.send(node, 0, payload, port))
+        self.executor.submit(lambda _now_s: self.network.run_for(1.0))
+
+
+@pytest.fixture(scope="module")
+def users_mesh():
+    mesh = MeshWithUsers()
+    yield mesh
+    mesh.close()
+
+
+def test_the_body_of_a_post_arrives_at_the_node(users_mesh):
+    payload = bytes(range(256)) * 4
+    answer = users_mesh.client.post("/nodes/3/data?port=7&wait=10", content=payload)
+    assert answer.status_code == 200
+    assert answer.json()["state"] == "delivered"
+    message = users_mesh.network.received[3][-1]
+    assert (message.port, message.payload) == (7, payload)
+
+
+def test_without_waiting_the_state_is_that_of_the_moment(users_mesh):
+    answer = users_mesh.client.post("/nodes/3/data", content=b"soon")
+    assert answer.status_code == 200
+    assert answer.json()["state"] in ("queued", "sent", "delivered")
+
+
+@pytest.mark.parametrize(
+    ("path", "payload", "status", "reason"),
+    [
+        ("/nodes/255/data", b"", 422, "less than or equal to 254"),
+        ("/nodes/3/data?port=256", b"", 422, "less than or equal to 255"),
+        ("/nodes/3/data?wait=61", b"", 422, "less than or equal to 60"),
+        ("/nodes/3/data", bytes(1025), 413, "larger than 1024 bytes"),
+        ("/nodes/99/data?reliable=false", b"x", 503, "no route to node 99"),
+        ("/nodes/99/data?wait=0.1", b"x", 504, "not delivered within 0.1 s"),
+    ],
+)
+def test_what_cannot_be_sent_is_refused_with_the_reason(users_mesh, path, payload, status, reason):
+    answer = users_mesh.client.post(path, content=payload)
+    assert (answer.status_code, reason in answer.json()["detail"]) == (status, True)
+
+
+def test_messages_for_the_gateway_come_as_events(users_mesh):
+    with users_mesh.client.stream("GET", "/data?port=5") as stream:
+        lines = (line for line in stream.iter_lines() if line)
+        assert next(lines) == ": messages of users"
+        users_mesh.from_node(2, b"other port", port=4)
+        users_mesh.from_node(2, b"21.5", port=5)
+        line = next(lines)
+    event = json.loads(line[len("data: ") :])
+    assert line.startswith("data: ")
+    assert base64.b64decode(event.pop("payload")) == b"21.5"
+    assert event == {"sender": 2, "port": 5, "to_all": False, "reliable": True}
+
+
+def test_without_the_token_nothing_is_sent_or_shown():
+    mesh = MeshWithUsers(token=TOKEN)
+    try:
+        for operation in (("POST", "/nodes/3/data"), ("GET", "/data")):
+            answer = mesh.client.request(*operation, headers={"Authorization": "Bearer wrong"})
+            assert answer.status_code == 401
+    finally:
+        mesh.close()
