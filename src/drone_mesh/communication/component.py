@@ -392,6 +392,9 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     ) -> None:
         """`node` says where it is, and perhaps where a gateway was."""
 
+    def _on_gateway_place(self, gateway: messages.GatewayPlace) -> None:
+        """A node says where a gateway was."""
+
     def _on_neighbour_found(self, node: int) -> None:
         """A packet arrived from a node that was not a neighbour."""
 
@@ -404,6 +407,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if kind == MessageType.LOCATION:
             location = messages.LocationMessage.from_payload(payload).location
             self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
+        elif kind == MessageType.GATEWAY_PLACE:
+            gateway = messages.GatewayPlace.from_payload(payload)
+            if gateway is not None:
+                self._on_gateway_place(gateway)
         elif kind == MessageType.REQUESTLOCATION:
             self._send_location(creator)
         elif kind == MessageType.MISSING:
@@ -451,7 +458,11 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
             answer = messages.LocationMessage.of(location, now_s, me, me, asker, asker).to_payload()
             if places.gateway is not None:
                 gateway, age_s = self.get_preferred_gateway(), now_s - places.gateway_seen_s
-                answer = messages.GatewayPlace(gateway, places.gateway, age_s).behind(answer)
+                extension = messages.GatewayPlace(gateway, places.gateway, age_s)
+                if self._antenna.reserved_bytes(MessageType.LOCATION):
+                    self._delivery.send_own(extension.to_payload(me, me, asker, asker))
+                else:
+                    answer = extension.behind(answer)
             self._delivery.send_own(answer)
 
     # Flight ----------------------------------------------------------------------------------

@@ -11,7 +11,15 @@ from drone_mesh.communication.messages import MessageType, frame_digest
 
 NO_FRAME = 0  # the digest of a node without an origin, and of nodes that know nothing of origins
 TYPES_WITH_PLACES = frozenset(
-    map(int, (MessageType.LOCATION, MessageType.MOVE_TO_LOCATION, MessageType.NODE_REPORT))
+    map(
+        int,
+        (
+            MessageType.LOCATION,
+            MessageType.MOVE_TO_LOCATION,
+            MessageType.NODE_REPORT,
+            MessageType.GATEWAY_PLACE,
+        ),
+    )
 )
 
 

@@ -126,6 +126,10 @@ class IWirelessCommunication(abc.ABC):
         """What this node does on a shared channel. Any thread."""
         return ChannelUse()
 
+    def reserved_bytes(self, kind: int) -> int:
+        """How many of the 27 bytes behind the header of a packet the antenna itself needs."""
+        return 0
+
     def patience(self) -> float:
         """For how many check periods the mesh should not probe again what is known to work.
 

@@ -48,6 +48,7 @@ class Introduction:
         me = parts.node_id
         payload = IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
         room = messages.EXTENSION_ROOM[MessageType.PRESENT]
+        room -= parts.antenna.reserved_bytes(MessageType.PRESENT)
         extension = parts.routing.extension(MessageType.PRESENT, room)
         if extension:
             payload = messages.extended(payload, extension)

@@ -48,6 +48,9 @@ class MessageType(enum.IntEnum):
     ORDER_QUERY = 65  # asks for an ORDER_REPLY
     NODE_REPORT = 66  # the state of its creator, for the gateway; see node_report
     NODE_WORDS = 67  # why its creator cannot fly
+    GATEWAY_PLACE = 125  # where a gateway was, in a mesh with a key
+    SEAL_CHALLENGE = 126  # asks a neighbour to prove that it has the key
+    SEAL_ANSWER = 127
 
 
 @dataclass(frozen=True)
@@ -270,6 +273,7 @@ _GATEWAY_PLACE = struct.Struct("<HBffh")  # age + 1 in seconds, id, latitude, lo
 _GATEWAY_PLACE_AT = {
     int(MessageType.LOCATION): HEADER_BYTES + LocationMessage.BODY.size,
     int(MessageType.MOVEMENT_NEGOTIATION): HEADER_BYTES + MovementNegotiationMessage.BODY.size,
+    int(MessageType.GATEWAY_PLACE): HEADER_BYTES,
 }
 _OLDEST_AGE_S = 2**16 - 2
 _ORDER_NUMBER = struct.Struct("<H")
@@ -290,7 +294,10 @@ TYPES_WITH_NUMBERS: Mapping[int, struct.Struct] = {  # the floats at the start o
 
 
 class GatewayPlace(NamedTuple):
-    """Where a gateway was: an extension of a LOCATION or a MOVEMENT_NEGOTIATION."""
+    """Where a gateway was: an extension of a LOCATION or a MOVEMENT_NEGOTIATION.
+
+    In a mesh with a key a LOCATION has no room for it: it is the body of a GATEWAY_PLACE.
+    """
 
     gateway: int  # its id
     place: Location
@@ -298,11 +305,18 @@ class GatewayPlace(NamedTuple):
 
     def behind(self, payload: bytes) -> bytes:
         """The same packet with this extension behind its body."""
-        age = 1 + max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
-        latitude, longitude, height = self.place
-        body = _GATEWAY_PLACE.pack(age, self.gateway, latitude, longitude, round(height))
+        body = self._body()
         at = _GATEWAY_PLACE_AT[payload[_TYPE]]
         return payload[:at] + body + payload[at + len(body) :]
+
+    def to_payload(self, creator: int, from_: int, to: int, forward: int) -> bytes:
+        """A packet of its own."""
+        return packet(MessageType.GATEWAY_PLACE, creator, from_, to, forward, self._body())
+
+    def _body(self) -> bytes:
+        age = 1 + max(0, min(_OLDEST_AGE_S, math.ceil(self.age_s)))
+        latitude, longitude, height = self.place
+        return _GATEWAY_PLACE.pack(age, self.gateway, latitude, longitude, round(height))
 
     @classmethod
     def from_payload(cls, payload: bytes) -> GatewayPlace | None:

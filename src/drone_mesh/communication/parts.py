@@ -37,6 +37,7 @@ class NodeParts:
         me = self.node_id
         payload = HeartbeatMessage(me, me, to, forward, connected, gateway, 0).to_payload()
         room = messages.EXTENSION_ROOM[MessageType.HEARTBEAT]
+        room -= self.antenna.reserved_bytes(MessageType.HEARTBEAT)
         extension = self.routing.extension(MessageType.HEARTBEAT, room)
         return messages.extended(payload, extension) if extension else payload
 

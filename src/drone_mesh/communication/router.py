@@ -185,8 +185,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
         connection = self._connection
         if node == connection.gateway:
             self.places.gateway_is_at(location, now_s)
-        elif gateway is not None and connection.may_use(gateway.gateway):
-            self.places.gateway_is_at(gateway.place, now_s - gateway.age_s)
+        elif gateway is not None:
+            self._on_gateway_place(gateway)
         if node == connection.next_hop():
             self.places.next_hop_is_at(node, location)
         self._repair.on_place(node, location)
@@ -194,6 +194,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
         super()._on_missing(creator, missing, told_by)
         self._connection.on_route_lost()
+
+    def _on_gateway_place(self, gateway: GatewayPlace) -> None:
+        if self._connection.may_use(gateway.gateway):
+            seen_s = self._deadlines.now_s - gateway.age_s
+            self.places.gateway_is_at(gateway.place, seen_s)
 
     def _on_neighbour_found(self, node: int) -> None:
         self._repair.on_neighbour_found(node)

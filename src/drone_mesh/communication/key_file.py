@@ -1,0 +1,40 @@
+"""Key files: read and written so that other users of the machine cannot."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from drone_mesh.communication.keys import MeshKey, NodeKeys, keys_from_text
+from drone_mesh.errors import ConfigurationError
+
+_FOR_OTHERS = stat.S_IRWXG | stat.S_IRWXO
+
+
+def read_key_file(path: Path) -> MeshKey | NodeKeys:
+    """The keys in a file. Raises ConfigurationError if others may read it or it holds no keys."""
+    try:
+        with open(path, encoding="ascii") as file:
+            mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
+            if mode & _FOR_OTHERS:
+                raise ConfigurationError(
+                    f"key file {path}: other users can access it (mode {mode:04o}); "
+                    f"run: chmod 600 {path}"
+                )
+            text = file.read()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"key file {path}: {error}") from error
+    try:
+        return keys_from_text(text)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"key file {path}: {error}") from None
+
+
+def write_key_file(path: Path, keys: MeshKey | NodeKeys) -> None:
+    """A new file, mode 600. Raises ConfigurationError if it exists: a key is never overwritten."""
+    try:
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(keys.to_text())
+    except OSError as error:
+        raise ConfigurationError(f"key file {path}: {error}") from error

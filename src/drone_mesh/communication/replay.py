@@ -1,0 +1,37 @@
+"""ReplayWindow: which counter values were used already (as RFC 4303, 3.4.3, and RFC 6479)."""
+
+from __future__ import annotations
+
+WIDTH = 512  # our choice: packets of a busy sender that may overtake each other in its queue
+
+
+class ReplayWindow:
+    """Takes every counter value once; values far behind the highest one not at all."""
+
+    __slots__ = ("_seen", "highest")
+
+    def __init__(self, highest: int) -> None:
+        """`highest` and all values below it count as used."""
+        self.highest = highest
+        self._seen = (1 << WIDTH) - 1  # bit n: highest - n was used
+
+    def expand(self, low: int, modulus: int) -> int:
+        """The value nearest to the highest one whose remainder is `low`."""
+        ahead = (low - self.highest) % modulus
+        return self.highest + (ahead if ahead < modulus // 2 else ahead - modulus)
+
+    def use(self, value: int) -> bool:
+        """Take a value whose packet is authentic. False: it was used, or is too old."""
+        ahead = value - self.highest
+        if ahead > 0:
+            self._seen = (self._seen << ahead | 1) & _MASK if ahead < WIDTH else 1
+            self.highest = value
+            return True
+        bit = 1 << -ahead
+        if -ahead >= WIDTH or self._seen & bit:
+            return False
+        self._seen |= bit
+        return True
+
+
+_MASK = (1 << WIDTH) - 1

@@ -1,0 +1,184 @@
+"""HopSeal: proves that a packet comes from a node of this mesh, now (docs/security.md, "Hop seal").
+
+The last 7 bytes of each packet: the low 2 bytes of a counter of its sender, and a tag of 5 bytes
+over everything before them, the counter and the sender's epoch. An epoch is 8 random bytes that a
+node draws at each start; a receiver learns it by a challenge that only a node with the key can
+answer. So there is nothing to store that could be lost, and no packet of an earlier epoch counts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import random
+import struct
+from collections import OrderedDict
+from typing import NamedTuple
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.replay import ReplayWindow
+
+TAG_BYTES = 5
+SEAL_BYTES = 2 + TAG_BYTES
+SEAL_AT = PAYLOAD_BYTES - SEAL_BYTES
+TAG_AT = PAYLOAD_BYTES - TAG_BYTES
+LAST_COUNT = 2**32 - 1  # of an epoch; an answer carries 4 bytes
+WAITING_CHALLENGES = 16  # our choice: to as many nodes at once
+CHALLENGE_AGAIN_S = 2.0  # our choice: to the same node
+CHALLENGE_OUT_S = 0.5  # our choice: after that another node may have its place
+
+_COUNT_BYTES = 2**16
+_EPOCH_BITS, _NONCE_BITS = 64, 64
+_COUNT = struct.Struct("<I")
+_LOW = struct.Struct("<H")
+_CHALLENGE = struct.Struct("<Q")  # nonce
+_ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
+_NO_SEAL = bytes(SEAL_BYTES)
+_TO_ALL = bytes((BROADCAST,))
+_FORWARD = 4
+
+
+class _Peer:
+    """A neighbour whose epoch is known."""
+
+    __slots__ = ("epoch", "heard_s", "state", "window")
+
+    def __init__(self, network_key: bytes, epoch: int, count: int, now_s: float) -> None:
+        self.epoch = epoch
+        self.state = _epoch_state(network_key, epoch)
+        self.window = ReplayWindow(count)
+        self.heard_s = now_s
+
+
+class _Challenge(NamedTuple):
+    nonce: int
+    sent_s: float
+
+
+class HopSeal:
+    """Seals and opens the packets of one node. Belongs to the thread of its component."""
+
+    def __init__(
+        self, node_id: int, network_key: bytes, rng: random.Random, fresh_s: float
+    ) -> None:
+        """`rng` draws epochs and nonces: a cryptographic one on real nodes.
+
+        `fresh_s`: a neighbour that was silent for longer is challenged again, so that a packet
+        which an attacker kept from its receiver is worthless after that time.
+        """
+        self._node_id = node_id
+        self._key = network_key
+        self._sync_key = hashlib.blake2s(b"sync", key=network_key, digest_size=16).digest()
+        self._rng = rng
+        self._fresh_s = fresh_s
+        self._peers: dict[int, _Peer] = {}
+        self._challenges: OrderedDict[int, _Challenge] = OrderedDict()  # oldest first
+        self._epoch, self._state, self._count = self._new_epoch()
+
+    # Packets of the mesh ---------------------------------------------------------------------
+
+    def seal(self, payload: bytes) -> bytes:
+        """The same packet with a seal in its last 7 bytes. What was there is lost."""
+        if self._count == LAST_COUNT:
+            self._epoch, self._state, self._count = self._new_epoch()
+        self._count = count = self._count + 1
+        head = payload[:SEAL_AT]
+        covered = head
+        if payload[_FORWARD] == BROADCAST:  # `to` differs for each receiver
+            covered = head[:3] + _TO_ALL + head[4:]
+        state = self._state.copy()
+        state.update(_COUNT.pack(count) + covered)
+        return head + _LOW.pack(count % _COUNT_BYTES) + state.digest()
+
+    def open(self, payload: bytes, now_s: float) -> bytes | None:
+        """The packet with zeros in place of its seal; None unless it is authentic and new."""
+        peer = self._peers.get(payload[1])
+        if peer is None or now_s - peer.heard_s > self._fresh_s:
+            return None
+        head = payload[:SEAL_AT]
+        window = peer.window
+        count = window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8, _COUNT_BYTES)
+        if not 0 <= count <= LAST_COUNT:
+            return None
+        covered = head
+        if payload[_FORWARD] == BROADCAST:
+            covered = head[:3] + _TO_ALL + head[4:]
+        state = peer.state.copy()
+        state.update(_COUNT.pack(count) + covered)
+        if not hmac.compare_digest(state.digest(), payload[TAG_AT:]):
+            return None
+        if not window.use(count):
+            return None
+        peer.heard_s = now_s
+        return head + _NO_SEAL
+
+    def knows(self, node: int, now_s: float) -> bool:
+        """Whether the epoch of this neighbour is known, and it was heard a while ago at most."""
+        peer = self._peers.get(node)
+        return peer is not None and now_s - peer.heard_s <= self._fresh_s
+
+    # Epochs ----------------------------------------------------------------------------------
+
+    def challenge(self, node: int, now_s: float) -> bytes | None:
+        """A packet that asks a neighbour for its epoch; None: not again so soon.
+
+        The number of challenges under way is bounded, and an answered one no longer counts.
+        """
+        waiting = self._challenges.get(node)
+        if waiting is not None and now_s - waiting.sent_s < CHALLENGE_AGAIN_S:
+            return None
+        if waiting is None and len(self._challenges) >= WAITING_CHALLENGES:
+            if now_s - next(iter(self._challenges.values())).sent_s < CHALLENGE_OUT_S:
+                return None
+            self._challenges.popitem(last=False)
+        nonce = self._rng.getrandbits(_NONCE_BITS)
+        self._challenges[node] = _Challenge(nonce, now_s)
+        self._challenges.move_to_end(node)
+        return self._proven(MessageType.SEAL_CHALLENGE, node, _CHALLENGE.pack(nonce))
+
+    def answer(self, challenge: bytes) -> bytes | None:
+        """The answer to a challenge; None if that is not from a node with the key."""
+        if not self._is_proven(challenge):
+            return None
+        (nonce,) = _CHALLENGE.unpack_from(challenge, messages.HEADER_BYTES)
+        body = _ANSWER.pack(nonce, self._epoch, self._count)
+        return self._proven(MessageType.SEAL_ANSWER, messages.sender(challenge), body)
+
+    def answered(self, answer: bytes, now_s: float) -> bool:
+        """Take a neighbour's epoch from its answer. False: it answers no challenge of this node."""
+        node = messages.sender(answer)
+        waiting = self._challenges.get(node)
+        if waiting is None or not self._is_proven(answer):
+            return False
+        nonce, epoch, count = _ANSWER.unpack_from(answer, messages.HEADER_BYTES)
+        if nonce != waiting.nonce:
+            return False
+        del self._challenges[node]
+        known = self._peers.get(node)
+        if known is not None and known.epoch == epoch:
+            count = max(count, known.window.highest)
+        self._peers[node] = _Peer(self._key, epoch, count, now_s)
+        return True
+
+    def _new_epoch(self) -> tuple[int, hashlib.blake2s, int]:
+        epoch = self._rng.getrandbits(_EPOCH_BITS)
+        return epoch, _epoch_state(self._key, epoch), 0
+
+    def _proven(self, kind: MessageType, to: int, body: bytes) -> bytes:
+        packet = messages.packet(kind, self._node_id, self._node_id, to, to, body)[:TAG_AT]
+        return packet + self._sync_tag(packet)
+
+    def _is_proven(self, payload: bytes) -> bool:
+        return hmac.compare_digest(self._sync_tag(payload[:TAG_AT]), payload[TAG_AT:])
+
+    def _sync_tag(self, packet: bytes) -> bytes:
+        return hashlib.blake2s(packet, key=self._sync_key, digest_size=TAG_BYTES).digest()
+
+
+def _epoch_state(network_key: bytes, epoch: int) -> hashlib.blake2s:
+    """The tag of an epoch's packets up to where they differ; to be copied for each."""
+    state = hashlib.blake2s(key=network_key, digest_size=TAG_BYTES)
+    state.update(struct.pack("<Q", epoch))
+    return state

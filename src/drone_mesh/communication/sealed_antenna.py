@@ -1,0 +1,227 @@
+"""SealedAntenna: an antenna of a mesh with a key (docs/security.md).
+
+It stands between an antenna and a mesh component, and looks like either to the other one. Neither
+knows of seals, except that the component puts less into a packet (`reserved_bytes`).
+"""
+
+from __future__ import annotations
+
+import random
+from typing import Callable, Sequence
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.end_to_end import EndToEnd, NotProven, reserved_bytes
+from drone_mesh.communication.interfaces import (
+    BROADCAST,
+    MAX_NODE_ID,
+    PAYLOAD_BYTES,
+    IMeshDebugInfo,
+    IMeshNetwork,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.keys import Keys
+from drone_mesh.communication.medium import ChannelUse, Medium
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.seal import SEAL_AT, SEAL_BYTES, HopSeal
+from drone_mesh.communication.timing import MeshTiming
+
+FRESH_PERIODS = 3.0  # our choice: a neighbour speaks once per check period
+FOREIGN_AFTER_S = 5.0  # our choice: until then a neighbour may have been restarted
+FOREIGN_PACKETS = 3
+
+_CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
+_PRESENT = int(MessageType.PRESENT)
+_NO_SEAL = bytes(SEAL_BYTES)
+_DIGEST_BYTES = 2
+_DIGEST_AT = SEAL_AT - _DIGEST_BYTES  # of a sealed PRESENT
+
+
+class _Unopened:
+    """The packets of one node that could not be opened."""
+
+    def __init__(self, since_s: float) -> None:
+        self.since_s = since_s
+        self.count = 0
+
+
+class SealedAntenna(IWirelessCommunication, IMeshNetwork):
+    """Seals what the component sends, and hands it only what is authentic.
+
+    All calls come from the thread of the component, as for every antenna; `on` and `channel_use`
+    may be called by any other.
+    """
+
+    def __init__(
+        self,
+        antenna: IWirelessCommunication,
+        node_id: int,
+        keys: Keys,
+        rng: random.Random,
+        clock: Callable[[], float],
+        timing: MeshTiming | None = None,
+    ) -> None:
+        """`rng` draws epochs and nonces: random.SystemRandom, except in simulations.
+
+        `clock` gives the time of the component, in seconds.
+        """
+        self._antenna = antenna
+        self._node_id = node_id
+        fresh_s = FRESH_PERIODS * (timing or MeshTiming()).check_period_s
+        self._seal = HopSeal(node_id, keys.network, rng, fresh_s)
+        self._end_to_end = EndToEnd(node_id, keys, rng)
+        self._mesh: IMeshNetwork | None = None
+        self._present = b""  # the last one, for neighbours that could not open it
+        self._unopened: dict[int, _Unopened] = {}
+        self._clock = clock
+        self.complaints = Complaints(node_id)
+
+    # For the component -----------------------------------------------------------------------
+
+    @property
+    def medium(self) -> Medium:
+        return self._antenna.medium
+
+    def reserved_bytes(self, kind: int) -> int:
+        return reserved_bytes(kind)
+
+    def channel_use(self) -> ChannelUse:
+        return self._antenna.channel_use()
+
+    def patience(self) -> float:
+        return self._antenna.patience()
+
+    def start_antenna(self, mesh: IMeshNetwork) -> None:
+        self._mesh = mesh
+        self._antenna.start_antenna(self)
+
+    def stop_antenna(self) -> None:
+        self._antenna.stop_antenna()
+        self._mesh = None
+
+    def send_message_to(self, payload: bytes) -> bool:
+        """As every antenna; True also for a packet that its addressee could not believe yet."""
+        sealed = self._sealed(payload)
+        return sealed is None or self._antenna.send_message_to(sealed)
+
+    def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
+        sealed = [self._sealed(payload) for payload in payloads]
+        taken = iter(self._antenna.send_messages([s for s in sealed if s is not None]))
+        return [s is None or next(taken) for s in sealed]
+
+    def transmissions_of_last_send(self) -> int:
+        return self._antenna.transmissions_of_last_send()
+
+    def broadcast_message(self, payload: bytes) -> None:
+        payload = self._end_to_end.seal(payload, self._clock()) or payload
+        if payload[2] == _PRESENT:
+            payload = payload[:_DIGEST_AT] + payload[-_DIGEST_BYTES:] + _NO_SEAL
+            self._present = payload
+        self._antenna.broadcast_message(self._seal.seal(payload))
+
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        self._antenna.debugging_mode(info, on)
+
+    def on(self) -> bool:
+        return self._antenna.on()
+
+    def _sealed(self, payload: bytes) -> bytes | None:
+        if payload[0] == self._node_id and payload[SEAL_AT - 2 : SEAL_AT] == b"\0\0":
+            now_s = self._clock()
+            made = self._end_to_end.seal(payload, now_s)
+            if made is None:
+                detail = f"node {payload[4]} has not been heard by this node"
+                self.complaints.add("not sent, without a nonce", detail, now_s)
+                return None
+            payload = made
+        return self._seal.seal(payload)
+
+    # For the antenna -------------------------------------------------------------------------
+
+    def get_node_id(self) -> int:
+        return self._node_id
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        """Open a packet and hand it on; one that is not authentic ends here."""
+        mesh = self._mesh
+        if mesh is None:
+            return
+        if len(payload) != PAYLOAD_BYTES:
+            mesh.on_msg(payload, now_s)  # complains
+            return
+        opened = self._seal.open(payload, now_s)
+        if opened is None:
+            self._not_opened(payload, now_s)
+            return
+        forward = opened[4]
+        if forward == self._node_id or forward == BROADCAST:
+            try:
+                opened = self._end_to_end.open(opened)
+            except NotProven as error:
+                self.complaints.dropped(str(error), payload, now_s)
+                return
+            if opened[2] == _PRESENT:
+                opened = opened[:_DIGEST_AT] + _NO_SEAL + opened[_DIGEST_AT:SEAL_AT]
+        mesh.on_msg(opened, now_s)
+
+    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+        kind = payload[2]
+        if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, _PRESENT):
+            self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, now_s)
+
+    def on_antenna_power(self, on: bool, now_s: float) -> None:
+        if self._mesh is not None:
+            self._mesh.on_antenna_power(on, now_s)
+
+    def on_antenna_registered(self, now_s: float) -> None:
+        if self._mesh is not None:
+            self._mesh.on_antenna_registered(now_s)
+
+    # Packets that do not open ----------------------------------------------------------------
+
+    def _not_opened(self, payload: bytes, now_s: float) -> None:
+        from_, kind = messages.sender(payload), messages.type_of(payload)
+        if from_ > MAX_NODE_ID or from_ == self._node_id:
+            self.complaints.dropped("bad ids", payload, now_s)
+        elif kind == _CHALLENGE:
+            self._on_challenge(payload, from_, now_s)
+        elif kind == _ANSWER:
+            if self._seal.answered(payload, now_s):
+                self._unopened.pop(from_, None)
+        else:
+            self._complain(payload, from_, now_s)
+            self._challenge(from_, now_s)
+
+    def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
+        answer = self._seal.answer(challenge)
+        if answer is None or messages.receiver(challenge) != self._node_id:
+            self._complain(challenge, from_, now_s)
+            return
+        self._antenna.send_message_to(answer)
+        if self._present:
+            present = messages.readdressed(self._present, from_)
+            self._antenna.send_message_to(self._seal.seal(present))
+        if not self._seal.knows(from_, now_s):
+            self._challenge(from_, now_s)
+
+    def _challenge(self, node: int, now_s: float) -> None:
+        challenge = self._seal.challenge(node, now_s)
+        if challenge is not None:
+            self._antenna.send_message_to(challenge)
+
+    def _complain(self, payload: bytes, from_: int, now_s: float) -> None:
+        """A restarted neighbour is normal; one that never answers a challenge is not."""
+        unopened = self._unopened.setdefault(from_, _Unopened(now_s))
+        unopened.count += 1
+        if unopened.count < FOREIGN_PACKETS or now_s - unopened.since_s < FOREIGN_AFTER_S:
+            return
+        if self._seal.knows(from_, now_s):
+            reason = f"packets that node {from_} did not send now: replayed or forged"
+        elif payload[SEAL_AT:] == _NO_SEAL:
+            reason = f"a neighbour, node {from_}, sends packets without a seal: it has no key"
+        else:
+            reason = (
+                f"a neighbour, node {from_}, sends packets that this key does not open: "
+                "other mesh or other key?"
+            )
+        self.complaints.add(reason, payload.hex(), now_s)
