@@ -19,13 +19,17 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IGatewayCommands,
     IInternetConnection,
+    IMeshNetwork,
+    IWirelessCommunication,
 )
+from drone_mesh.communication.keys import Keys
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.repair_strategies import create_repair_strategy
 from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.interfaces import Location
@@ -80,6 +84,7 @@ class Node:
         else:
             self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
         self.component: MeshnetworkComponent
+        self.receiver: IMeshNetwork  # what takes the packets: the component, or its sealed antenna
         self._planned_s = math.inf
 
     @property
@@ -94,9 +99,8 @@ class Node:
 
     def hear(self, payload: bytes) -> None:
         """A packet arrives."""
-        component = self.component
-        component.on_msg(payload, self._clock.now_s)
-        if component.next_tick_s != self._planned_s:
+        self.receiver.on_msg(payload, self._clock.now_s)
+        if self.component.next_tick_s != self._planned_s:
             self.plan()
 
     def submit(self, work: Callable[[float], None]) -> None:
@@ -140,6 +144,7 @@ class Network:
         links: LinkModel | None = None,
         repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
         repair_options: RepairOptions | None = None,
+        key: Keys | Callable[[int], Keys] | None = None,
     ) -> None:
         """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique.
@@ -149,6 +154,9 @@ class Network:
         `radio`: "disc", on which packets never meet, or "shared", the channel of nRF24L01+ radios
         at `rate` (250k, 1M or 2M) with the space between them as `links` says (default: an ideal
         disc). `loss`, `delay_s` and `jitter_s` are for the disc. Raises ConfigurationError.
+
+        `key`: the key of the mesh, which every node then has, or a function that says what each
+        node has; without one nothing is sealed.
         """
         self._seed = seed
         self._rng = random.Random(seed)
@@ -158,6 +166,7 @@ class Network:
         if isinstance(repair, str) and repair != ORACLE:
             create_repair_strategy(repair)  # an unknown name is an error now, not per node
         self._repair_options = repair_options
+        self._key = key
         self.clock = VirtualClock()
         self.air: InProcessAir | SharedAir
         if radio == "shared":
@@ -226,9 +235,12 @@ class Network:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
         node = Node(self.clock, self.air, node_id, Location(y, x, 0.0), radio_rng, why_not_fly)
+        antenna: InProcessAntenna | SharedAntenna | SealedAntenna = node.antenna
+        if self._key is not None:
+            antenna = self._sealed(node.antenna, node_id, self._key)
         node.component = assemble_component(
             node_id,
-            node.antenna,
+            antenna,
             node.drone,
             random.Random(self._rng.random()),
             internet=NoInternet() if gateway else None,
@@ -239,8 +251,19 @@ class Network:
             repair_options=self._repair_options,
         )
         node.component.data.on_received(functools.partial(self._receive, node_id))
+        node.receiver = antenna if isinstance(antenna, SealedAntenna) else node.component
         self.nodes[node_id] = node
         self.clock.call_at(start_s, Node.start, node)
+
+    def _sealed(
+        self,
+        antenna: IWirelessCommunication,
+        node_id: int,
+        key: Keys | Callable[[int], Keys],
+    ) -> SealedAntenna:
+        keys = key if isinstance(key, Keys) else key(node_id)
+        rng = random.Random(f"{self._seed} seal {node_id}")
+        return SealedAntenna(antenna, node_id, keys, rng, self.now_s, self._timing)
 
     def _technique(self, node_id: int) -> str | IRoutingTechnique:
         if self._routing == SHORTEST_PATH:
