@@ -62,6 +62,7 @@ class FactoryConfiguration:
     radio: Literal["virtual", "nrf24"] = Field("virtual")  # nrf24: the driver on emulated chips
     data_rate: Literal["250k", "1M", "2M"] = Field("250k")  # of the channel, with radio nrf24
     internet: Literal["mock", "http"] = Field("mock")  # http: gateways also take HTTP orders
+    key: str = Field("", description="the name of a key file")  # empty: nothing is sealed
     routing: str = Field(
         "child_table_tree", min_length=1, description="the name of a routing technique"
     )

@@ -27,11 +27,12 @@ from drone_mesh.communication.seal import SEAL_AT, SEAL_BYTES, HopSeal
 from drone_mesh.communication.timing import MeshTiming
 
 FRESH_PERIODS = 3.0  # our choice: a neighbour speaks once per check period
-FOREIGN_AFTER_S = 5.0  # our choice: until then a neighbour may have been restarted
+FOREIGN_AFTER_S = 20.0  # our choice: two check periods; a restarted neighbour answers by then
 FOREIGN_PACKETS = 3
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
 _PRESENT = int(MessageType.PRESENT)
+_ORDER = int(MessageType.MOVE_TO_LOCATION)
 _NO_SEAL = bytes(SEAL_BYTES)
 _DIGEST_BYTES = 2
 _DIGEST_AT = SEAL_AT - _DIGEST_BYTES  # of a sealed PRESENT
@@ -158,7 +159,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
             try:
                 opened = self._end_to_end.open(opened)
             except NotProven as error:
-                self.complaints.dropped(str(error), payload, now_s)
+                self._not_proven(str(error), payload, now_s)
                 return
             if opened[2] == _PRESENT:
                 opened = opened[:_DIGEST_AT] + _NO_SEAL + opened[_DIGEST_AT:SEAL_AT]
@@ -208,6 +209,13 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         challenge = self._seal.challenge(node, now_s)
         if challenge is not None:
             self._antenna.send_message_to(challenge)
+
+    def _not_proven(self, reason: str, payload: bytes, now_s: float) -> None:
+        """Copies, and packets for a nonce of the past, are normal; false orders are not."""
+        if payload[2] == _ORDER:
+            self.complaints.dropped(reason, payload, now_s)
+        else:
+            self.complaints.counts[f"dropped {reason}"] += 1
 
     def _complain(self, payload: bytes, from_: int, now_s: float) -> None:
         """A restarted neighbour is normal; one that never answers a challenge is not."""

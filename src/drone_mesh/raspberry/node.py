@@ -10,8 +10,9 @@ from typing import Any, Callable
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.gateway import MeshnetworkGateway
-from drone_mesh.communication.interfaces import IInternetConnection
+from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
@@ -59,9 +60,19 @@ class RadioNode:
         self.users = UsersDesk(radio.node_id, self._seat.submit)
         self._socket = local_socket(self.users)
         self._internet = None if make_internet is None else make_internet(self)
+        antenna: IWirelessCommunication = self._antenna
+        if options.keys is not None:
+            antenna = SealedAntenna(
+                antenna,
+                radio.node_id,
+                options.keys,
+                random.SystemRandom(),
+                time.monotonic,
+                options.timing,
+            )
         self.component = assemble_component(
             radio.node_id,
-            self._antenna,
+            antenna,
             engine,
             random.Random(),
             internet=self._internet,

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Mapping, Sequence
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.key_file import read_key_file
+from drone_mesh.communication.keys import MeshKey, NodeKeys
 from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.repair_strategies import (
     REPAIR_STRATEGIES,
@@ -79,6 +81,7 @@ class Options:
     log_level: str
     gateway: bool
     http: HttpOptions | None  # a router has it only if asked for
+    keys: MeshKey | NodeKeys | None = None  # None: nothing is sealed
 
 
 def parse_router(
@@ -236,6 +239,13 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         help="minimum distance in metres between drones at rest after a repair "
         "(default: %(default)g)",
     )
+    mesh.add_argument(
+        "--key-file",
+        type=Path,
+        metavar="FILE",
+        help="file with the keys of this node, which only its owner may read; raspberry_key makes "
+        "one. Without it any radio in range can take part and give orders",
+    )
     place = parser.add_argument_group(
         "place",
         "Position of a node on the ground, in metres, in the common frame of the drones. Without "
@@ -317,9 +327,28 @@ def _options(
             log_level=parsed.log_level,
             gateway=parsed.gateway,
             http=_http_options(parsed, environment) if parsed.http else None,
+            keys=_keys(parsed),
         )
     except MeshError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")
+
+
+def _keys(parsed: argparse.Namespace) -> MeshKey | NodeKeys | None:
+    if parsed.key_file is None:
+        return None
+    keys = read_key_file(parsed.key_file)
+    if isinstance(keys, MeshKey):
+        return keys
+    if parsed.emulated or parsed.gateway:
+        what = "emulated nodes need" if parsed.emulated else "a gateway needs"
+        raise ConfigurationError(
+            f"--key-file {parsed.key_file}: {what} the mesh key, not that of a node"
+        )
+    if keys.node != parsed.id:
+        raise ConfigurationError(
+            f"--key-file {parsed.key_file}: the keys are those of node {keys.node}, not {parsed.id}"
+        )
+    return keys
 
 
 def _http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> HttpOptions:

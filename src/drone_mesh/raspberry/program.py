@@ -74,6 +74,11 @@ def _signals() -> Iterator[StopRequest]:
 
 
 def _run(options: Options, request: StopRequest) -> None:
+    if options.keys is None:
+        _log.warning(
+            "no key: every radio in range can take part in this mesh and order its drones to fly; "
+            "raspberry_key new makes a key, --key-file uses it"
+        )
     with contextlib.ExitStack() as stack:
         fleet = None
         if options.emulated:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
+from drone_mesh.communication.key_file import read_key_file
+from drone_mesh.communication.keys import MeshKey
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.repair_strategies import create_repair_strategy
 from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.errors import ConfigurationError
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,7 @@ class MeshSettings:
     debug: bool
     observer: MeshObserver
     internet: str  # "mock" or "http"
+    key: MeshKey | None  # None: nothing is sealed
 
     @classmethod
     def of(cls, configuration: FactoryConfiguration) -> MeshSettings:
@@ -45,4 +50,14 @@ class MeshSettings:
             debug=configuration.debug,
             observer=ignore_events,
             internet=configuration.internet,
+            key=_mesh_key(configuration.key),
         )
+
+
+def _mesh_key(file: str) -> MeshKey | None:
+    if not file:
+        return None
+    keys = read_key_file(Path(file))
+    if not isinstance(keys, MeshKey):
+        raise ConfigurationError(f"key {file}: holds the keys of one node; expected a mesh key")
+    return keys

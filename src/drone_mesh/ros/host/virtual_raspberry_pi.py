@@ -7,6 +7,7 @@ import random
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.execution import Seat
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.on_demand import http_internet
@@ -35,6 +36,15 @@ class VirtualRaspberryPi(abc.ABC):
         self.seat = seat
         self.users = UsersDesk(node_id, seat.submit)
         self._users_of_node = UsersOfNode(self.users)
+        if settings.key is not None:
+            antenna = SealedAntenna(
+                antenna,
+                node_id,
+                settings.key,
+                random.SystemRandom(),
+                lambda: self.component.now_s(),
+                settings.timing,
+            )
         self.component = assemble_component(
             node_id,
             antenna,

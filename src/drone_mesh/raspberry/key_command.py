@@ -1,0 +1,51 @@
+"""The program raspberry_key: makes the key files of a mesh (docs/security.md, "Keys")."""
+
+from __future__ import annotations
+
+import argparse
+import secrets
+import sys
+from pathlib import Path
+from typing import Sequence
+
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.key_file import read_key_file, write_key_file
+from drone_mesh.communication.keys import KEY_BYTES, MeshKey
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.raspberry.wiring_options import whole
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Make a file; the exit status is 1 if that is not possible."""
+    parser = argparse.ArgumentParser(
+        "raspberry_key",
+        description="Makes the key files of a mesh. A key is never printed.",
+        epilog="Start each node with --key-file FILE. Copy key files over an encrypted connection "
+        "only, such as scp.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    new = commands.add_parser(
+        "new", help="make a new mesh key: for all gateways, and for routers that are never captured"
+    )
+    new.add_argument("file", type=Path, help="file to make; it must not exist")
+    node = commands.add_parser(
+        "node", help="make the keys of one router, with which it cannot give orders to others"
+    )
+    node.add_argument("mesh_key", type=Path, help="file with the mesh key")
+    node.add_argument("id", type=whole(0, MAX_NODE_ID), help="node id of the router, 0..253")
+    node.add_argument("file", type=Path, help="file to make; it must not exist")
+    parsed = parser.parse_args(arguments)
+    try:
+        if parsed.command == "new":
+            write_key_file(parsed.file, MeshKey(secrets.token_bytes(KEY_BYTES)))
+            print(f"raspberry_key: new mesh key in {parsed.file}")
+        else:
+            keys = read_key_file(parsed.mesh_key)
+            if not isinstance(keys, MeshKey):
+                raise ConfigurationError(f"key file {parsed.mesh_key}: holds no mesh key")
+            write_key_file(parsed.file, keys.for_node(parsed.id))
+            print(f"raspberry_key: keys of node {parsed.id} in {parsed.file}")
+    except ConfigurationError as error:
+        print(f"raspberry_key: {error}", file=sys.stderr)
+        return 1
+    return 0
