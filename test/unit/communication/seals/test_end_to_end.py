@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+import random
+
+import pytest
+from seal_rig import KEY, packet
+
+from drone_mesh.communication.end_to_end import EndToEnd, NotProven
+
+ORDER = packet("00 00 06 01 05 00 00 80 3f 00 00 00 40 03 00 2a 00")  # numbered 42, to drone 5
+PRESENT = packet("05 05 03 fe fe ff 00")
+REQUEST = packet("05 05 02 01 00")
+LOCATION = packet("00 00 01 01 05 00 00 80 3f 00 00 00 40 03 00 00 00 00 01")
+ANSWER = packet("00 00 04 01 05 01 00 00")  # heartbeat of gateway 0
+
+
+def end(node_id, keys=KEY, seed=0):
+    return EndToEnd(node_id, keys, random.Random(f"{node_id} {seed}"))
+
+
+@pytest.fixture
+def pair():
+    """Gateway 0 and drone 5, whose PRESENT the gateway heard."""
+    gateway, drone = end(0), end(5, KEY.for_node(5))
+    gateway.open(drone.seal(PRESENT, 0.0))
+    return gateway, drone
+
+
+def relayed(payload, from_=3, to=5):
+    return payload[:1] + bytes((from_,)) + payload[2:3] + bytes((to,)) + payload[4:]
+
+
+@pytest.mark.parametrize("made", [ORDER, LOCATION, ANSWER], ids=["order", "place", "heartbeat"])
+def test_what_a_gateway_makes_is_believed_once(pair, made):
+    gateway, drone = pair
+    sealed = relayed(gateway.seal(made, 0.0))
+    assert drone.open(sealed) == relayed(made)
+    with pytest.raises(NotProven, match="came before"):
+        drone.open(sealed)
+
+
+def test_a_proof_stands_before_the_hop_seal(pair):
+    gateway, _ = pair
+    sealed = gateway.seal(ORDER, 0.0)
+    assert sealed[:17] == ORDER[:17]
+    assert sealed[17:25] != bytes(8)
+    assert sealed[25:] == bytes(7)
+    assert gateway.seal(LOCATION, 0.0)[:19] == LOCATION[:19]
+
+
+@pytest.mark.parametrize("byte", [0, 2, 4, *range(5, 25)])
+def test_no_changed_byte_of_an_order_goes_unnoticed(pair, byte):
+    gateway, drone = pair
+    changed = bytearray(gateway.seal(ORDER, 0.0))
+    changed[byte] ^= 1
+    assert drone.open(gateway.seal(ORDER, 0.0))
+    if changed[4] == 5 and changed[2] == 6:
+        with pytest.raises(NotProven, match="an order without proof"):
+            drone.open(bytes(changed))
+    elif changed[4] == 5:
+        assert drone.open(bytes(changed))[2] != 6
+
+
+def test_a_captured_router_cannot_order_others(pair):
+    _, drone = pair
+    captured = end(7, KEY.for_node(7))
+    captured.open(drone.seal(PRESENT, 0.0))
+    order = packet("07 07 06 05 05 00 00 80 3f 00 00 00 40 03 00")
+    with pytest.raises(NotProven, match="an order without proof"):
+        drone.open(captured.seal(order, 0.0))
+    as_gateway = packet("00 07 06 05 05 00 00 80 3f 00 00 00 40 03 00")
+    with pytest.raises(NotProven, match="an order without proof"):
+        drone.open(captured.seal(as_gateway, 0.0))
+
+
+def test_a_captured_router_is_no_gateway(pair):
+    _, drone = pair
+    captured = end(7, KEY.for_node(7))
+    captured.open(drone.seal(PRESENT, 0.0))
+    with pytest.raises(NotProven, match="without the proof of a gateway"):
+        drone.open(captured.seal(packet("07 07 04 05 05 01 07 00"), 0.0))
+
+
+def test_an_order_outlives_no_restart_of_its_drone(pair):
+    gateway, _ = pair
+    recorded = gateway.seal(ORDER, 0.0)
+    restarted = end(5, KEY.for_node(5), seed=1)
+    with pytest.raises(NotProven):
+        restarted.open(recorded)
+
+
+def test_an_order_outlives_only_the_next_two_nonces(pair):
+    gateway, drone = pair
+    kept = [gateway.seal(ORDER, now_s) for now_s in (0.0, 1.0, 2.0)]
+    heartbeat = packet("05 05 04 00 00 01 00 00")
+    for now_s in (10.0, 20.0):
+        drone.seal(heartbeat, now_s)
+    assert drone.open(kept[0])
+    drone.seal(heartbeat, 30.0)
+    with pytest.raises(NotProven):
+        drone.open(kept[1])
+
+
+def test_the_tries_and_copies_of_a_packet_are_one(pair):
+    gateway, drone = pair
+    copies = [gateway.seal(relayed(ORDER, 0, to), 0.01 * to) for to in (1, 2, 3)]
+    assert len({copy[4:] for copy in copies}) == 1
+    assert drone.open(copies[0])
+    again = gateway.seal(ORDER, 5.0)
+    assert again[4:] != copies[0][4:]
+    assert drone.open(again)
+
+
+def test_an_order_waits_until_its_drone_was_heard():
+    gateway = end(0)
+    assert gateway.seal(ORDER, 0.0) is None
+    assert gateway.seal(ANSWER, 0.0)[19:] == bytes(13)  # finds the drone, and proves nothing
+
+
+def test_a_request_for_a_place_carries_the_nonce_that_the_answer_needs():
+    asker, answerer = end(5, KEY.for_node(5)), end(0, KEY.for_node(0))
+    request = asker.seal(REQUEST, 0.0)
+    assert answerer.open(request) == REQUEST
+    assert asker.open(answerer.seal(LOCATION, 0.0)) == LOCATION
+
+
+def test_a_broadcast_place_of_a_gateway_is_not_believed(pair):
+    gateway, drone = pair
+    broadcast = packet("00 00 01 05 fe 00 00 80 3f 00 00 00 40 03 00")
+    assert drone.open(broadcast) == broadcast  # node 0 might be a router
+    drone.open(gateway.seal(ANSWER, 0.0))
+    with pytest.raises(NotProven, match="a gateway's place"):
+        drone.open(broadcast)
+
+
+def test_users_data_and_bids_are_left_as_they_are(pair):
+    gateway, drone = pair
+    for made in (
+        packet("00 00 80 05 05")[:5] + bytes(20) + bytes(7),
+        packet("00 00 07 05 05 00 00 80 3f"),
+    ):
+        assert drone.open(gateway.seal(made, 0.0)) == made

@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+import pytest
+from seal_rig import FRESH_S, OTHER_KEY, introduce, node, packet
+
+HEARTBEAT = packet("05 05 04 01 01 01 00 00")  # of node 5 for node 1
+PRESENT = packet("05 05 03 fe fe 01 01")
+
+
+@pytest.fixture
+def link():
+    """Node 1, which knows the epoch of node 5, and node 5."""
+    receiver, sender = node(1), node(5)
+    introduce(receiver, sender, 5)
+    return receiver, sender
+
+
+def test_a_sealed_packet_has_these_bytes_on_the_air():
+    sealed = node(5).seal(HEARTBEAT)
+    assert sealed[:25] == HEARTBEAT[:25]
+    assert sealed[25:27] == b"\x01\x00"  # the first packet of this start
+    assert sealed[27:] == bytes.fromhex("17b6eb669b")
+
+
+def test_an_authentic_packet_opens_once(link):
+    receiver, sender = link
+    sealed = sender.seal(HEARTBEAT)
+    assert receiver.open(sealed, 1.0) == HEARTBEAT
+    assert receiver.open(sealed, 1.0) is None
+
+
+@pytest.mark.parametrize("byte", range(32))
+def test_no_changed_byte_goes_unnoticed(link, byte):
+    receiver, sender = link
+    sealed = bytearray(sender.seal(HEARTBEAT))
+    sealed[byte] ^= 1
+    assert receiver.open(bytes(sealed), 1.0) is None
+
+
+def test_each_receiver_of_a_broadcast_finds_its_own_id_in_it(link):
+    receiver, sender = link
+    sealed = sender.seal(PRESENT)
+    arrived = sealed[:3] + b"\x01" + sealed[4:]
+    assert receiver.open(arrived, 1.0) == PRESENT[:3] + b"\x01" + PRESENT[4:]
+
+
+def test_packets_may_overtake_each_other_but_not_come_twice(link):
+    receiver, sender = link
+    sealed = [sender.seal(HEARTBEAT) for _ in range(500)]
+    assert receiver.open(sealed[-1], 1.0) is not None
+    assert all(receiver.open(s, 1.0) for s in sealed[:-1])
+    assert not any(receiver.open(s, 1.0) for s in sealed)
+
+
+def test_a_packet_far_behind_the_newest_is_too_old(link):
+    receiver, sender = link
+    first = sender.seal(HEARTBEAT)
+    for _ in range(512):
+        newest = sender.seal(HEARTBEAT)
+    assert receiver.open(newest, 1.0) is not None
+    assert receiver.open(first, 1.0) is None
+
+
+def test_the_counter_goes_on_after_its_low_bytes_have_wrapped(link):
+    receiver, sender = link
+    first = sender.seal(HEARTBEAT)
+    for round_ in range(5):
+        for _ in range(2**14):
+            sealed = sender.seal(HEARTBEAT)
+        assert receiver.open(sealed, 1.0) is not None, round_
+    assert receiver.open(first, 1.0) is None
+
+
+def test_nothing_of_a_stranger_opens():
+    receiver, sender = node(1), node(5)
+    assert receiver.open(sender.seal(HEARTBEAT), 0.0) is None
+
+
+def test_after_a_restart_of_the_sender_old_packets_never_open_again(link):
+    receiver, sender = link
+    recorded = [sender.seal(HEARTBEAT) for _ in range(100)]
+    restarted = node(5, seed=1)
+    assert receiver.open(restarted.seal(HEARTBEAT), 1.0) is None
+    introduce(receiver, restarted, 5, 3.0)
+    assert receiver.open(restarted.seal(HEARTBEAT), 3.0) is not None
+    assert not any(receiver.open(r, 3.0) for r in recorded)
+
+
+def test_a_receiver_that_lost_its_memory_opens_no_old_packet(link):
+    _, sender = link
+    recorded = [sender.seal(HEARTBEAT) for _ in range(100)]
+    receiver = node(1, seed=1)
+    introduce(receiver, sender, 5)
+    assert not any(receiver.open(r, 0.0) for r in recorded)
+    assert receiver.open(sender.seal(HEARTBEAT), 0.0) is not None
+
+
+def test_a_recorded_answer_to_a_challenge_is_worthless(link):
+    receiver, sender = link
+    old = sender.answer(receiver.challenge(5, 5.0))
+    assert receiver.answered(old, 5.0)
+    restarted = node(1, seed=1)
+    assert restarted.challenge(5, 6.0) is not None
+    assert not restarted.answered(old, 6.0)
+    assert not restarted.knows(5, 6.0)
+
+
+def test_an_answer_without_a_challenge_is_not_taken(link):
+    receiver, sender = link
+    challenge = receiver.challenge(5, 5.0)
+    answer = sender.answer(challenge)
+    assert receiver.answered(answer, 5.0)
+    assert not receiver.answered(answer, 5.0)
+
+
+def test_a_node_with_another_key_neither_answers_nor_is_answered():
+    receiver, stranger = node(1), node(5, key=OTHER_KEY)
+    assert stranger.answer(receiver.challenge(5, 0.0)) is None
+    assert receiver.answer(stranger.challenge(1, 0.0)) is None
+
+
+def test_what_was_kept_from_its_receiver_is_worthless_after_a_silence(link):
+    receiver, sender = link
+    kept = sender.seal(HEARTBEAT)
+    assert receiver.open(kept, FRESH_S + 0.1) is None
+    introduce(receiver, sender, 5, FRESH_S + 0.1)
+    assert receiver.open(kept, FRESH_S + 0.1) is None
+
+
+def test_a_node_is_not_challenged_again_at_once():
+    receiver = node(1)
+    assert receiver.challenge(5, 0.0) is not None
+    assert receiver.challenge(5, 1.9) is None
+    assert receiver.challenge(5, 2.0) is not None
+
+
+def test_invented_ids_get_a_limited_number_of_challenges():
+    receiver = node(1)
+    sent = [receiver.challenge(n % 250 + 2, n * 0.001) for n in range(10_000)]  # 1,000 a second
+    assert 16 <= sum(c is not None for c in sent) <= 16 * (10 / 0.5 + 1)
+
+
+def test_a_challenge_that_is_answered_makes_room_for_the_next():
+    receiver = node(1)
+    for other in range(2, 202):
+        introduce(receiver, node(other), other)
+
+
+def test_counters_end_with_a_new_epoch(link):
+    receiver, sender = link
+    sender._count = 2**32 - 2
+    introduce(receiver, sender, 5, 4.0)
+    last, next_ = sender.seal(HEARTBEAT), sender.seal(HEARTBEAT)
+    assert receiver.open(last, 4.0) is not None
+    assert receiver.open(next_, 4.0) is None
+    introduce(receiver, sender, 5, 7.0)
+    assert receiver.open(sender.seal(HEARTBEAT), 7.0) is not None
+    assert receiver.open(last, 7.0) is None
