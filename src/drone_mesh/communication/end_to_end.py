@@ -38,6 +38,7 @@ _PRESENT_NONCE_AT = SEAL_AT - 2 - _NONCE.size  # before the digest of its frame
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
+_MISSING = int(MessageType.MISSING)
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
 _WITH_NONCE = {
     _HEARTBEAT: _NONCE_AT,
@@ -92,6 +93,7 @@ class EndToEnd:
         self._heard: dict[int, int] = {}  # the nonces of others
         self._sequences: dict[int, int] = {}  # by addressee: the number used last
         self._gateways: set[int] = set()  # that proved to be one
+        self._is_gateway = False
         self._last: _Sealed | None = None
 
     # Own packets -----------------------------------------------------------------------------
@@ -105,6 +107,8 @@ class EndToEnd:
         key = self._key(payload, self._node_id, forward)
         if key is None:
             return payload
+        if kind == _HEARTBEAT:
+            self._is_gateway = True
         nonce = self._heard.get(forward)
         if nonce is None:
             # Heartbeats find neighbours even before they can prove anything.
@@ -146,6 +150,8 @@ class EndToEnd:
             at = at or SEAL_AT - proof_bytes
         elif kind in _PLACES and creator in self._gateways:
             raise NotProven("a gateway's place that any node could have broadcast")
+        elif kind == _MISSING and creator != payload[1] and not self._is_gateway:
+            raise NotProven("a relayed MISSING")  # nodes tell only gateways so, about orders
         if at is None:
             return payload
         if kind in _WITH_NONCE:
@@ -189,7 +195,9 @@ class EndToEnd:
         size = ORDER_TAG_BYTES if payload[2] == _ORDER else TAG_BYTES
         number = _SEQUENCE.pack(sequence)
         what = messages.identity(payload[: _SEQUENCE_AT - size])
-        tag = hashlib.blake2s(_NONCE.pack(nonce) + number + what, key=key, digest_size=size)
+        tag = hashlib.blake2s(
+            _NONCE.pack(nonce) + number + what, key=key, digest_size=size, person=b"end2end"
+        )
         return tag.digest() + number
 
 

@@ -1,9 +1,11 @@
 """HopSeal: proves that a packet comes from a node of this mesh, now (docs/security.md, "Hop seal").
 
 The last 7 bytes of each packet: the low 2 bytes of a counter of its sender, and a tag of 5 bytes
-over everything before them, the counter and the sender's epoch. An epoch is 8 random bytes that a
-node draws at each start; a receiver learns it by a challenge that only a node with the key can
-answer. So there is nothing to store that could be lost, and no packet of an earlier epoch counts.
+over everything before them, the counter and the sender's epoch. The key is that of the network for
+packets to all, otherwise that of the pair: a captured node cannot pose as another one to it. An
+epoch is 8 random bytes that a node draws at each start; a receiver learns it by a challenge that
+only this node can answer. So there is nothing to store that could be lost, and no packet of an
+earlier epoch counts.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
+from drone_mesh.communication.keys import Keys
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.replay import ReplayWindow
 
@@ -37,17 +40,20 @@ _CHALLENGE = struct.Struct("<Q")  # nonce
 _ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
 _NO_SEAL = bytes(SEAL_BYTES)
 _TO_ALL = bytes((BROADCAST,))
-_FORWARD = 4
+_TO, _FORWARD = 3, 4
 
 
 class _Peer:
     """A neighbour whose epoch is known."""
 
-    __slots__ = ("epoch", "heard_s", "state", "window")
+    __slots__ = ("epoch", "heard_s", "state", "state_to_all", "window")
 
-    def __init__(self, network_key: bytes, epoch: int, count: int, now_s: float) -> None:
+    def __init__(
+        self, network_key: bytes, pair_key: bytes, epoch: int, count: int, now_s: float
+    ) -> None:
         self.epoch = epoch
-        self.state = _epoch_state(network_key, epoch)
+        self.state_to_all = _epoch_state(network_key, epoch)
+        self.state = _epoch_state(pair_key, epoch)
         self.window = ReplayWindow(count)
         self.heard_s = now_s
 
@@ -60,35 +66,38 @@ class _Challenge(NamedTuple):
 class HopSeal:
     """Seals and opens the packets of one node. Belongs to the thread of its component."""
 
-    def __init__(
-        self, node_id: int, network_key: bytes, rng: random.Random, fresh_s: float
-    ) -> None:
+    def __init__(self, node_id: int, keys: Keys, rng: random.Random, fresh_s: float) -> None:
         """`rng` draws epochs and nonces: a cryptographic one on real nodes.
 
         `fresh_s`: a neighbour that was silent for longer is challenged again, so that a packet
         which an attacker kept from its receiver is worthless after that time.
         """
         self._node_id = node_id
-        self._key = network_key
-        self._sync_key = hashlib.blake2s(b"sync", key=network_key, digest_size=16).digest()
+        self._keys = keys
         self._rng = rng
         self._fresh_s = fresh_s
         self._peers: dict[int, _Peer] = {}
         self._challenges: OrderedDict[int, _Challenge] = OrderedDict()  # oldest first
-        self._epoch, self._state, self._count = self._new_epoch()
+        self._epoch = self._count = 0
+        self._state_to_all = _epoch_state(keys.network, 0)
+        self._states: dict[int, hashlib.blake2s] = {}  # by receiver
+        self._begin_epoch()
 
     # Packets of the mesh ---------------------------------------------------------------------
 
     def seal(self, payload: bytes) -> bytes:
         """The same packet with a seal in its last 7 bytes. What was there is lost."""
         if self._count == LAST_COUNT:
-            self._epoch, self._state, self._count = self._new_epoch()
+            self._begin_epoch()
         self._count = count = self._count + 1
         head = payload[:SEAL_AT]
         covered = head
         if payload[_FORWARD] == BROADCAST:  # `to` differs for each receiver
             covered = head[:3] + _TO_ALL + head[4:]
-        state = self._state.copy()
+            state = self._state_to_all.copy()
+        else:
+            known = self._states.get(payload[_TO])
+            state = (known or self._state_to(payload[_TO])).copy()
         state.update(_COUNT.pack(count) + covered)
         return head + _LOW.pack(count % _COUNT_BYTES) + state.digest()
 
@@ -105,7 +114,9 @@ class HopSeal:
         covered = head
         if payload[_FORWARD] == BROADCAST:
             covered = head[:3] + _TO_ALL + head[4:]
-        state = peer.state.copy()
+            state = peer.state_to_all.copy()
+        else:
+            state = peer.state.copy()
         state.update(_COUNT.pack(count) + covered)
         if not hmac.compare_digest(state.digest(), payload[TAG_AT:]):
             return None
@@ -159,26 +170,40 @@ class HopSeal:
         known = self._peers.get(node)
         if known is not None and known.epoch == epoch:
             count = max(count, known.window.highest)
-        self._peers[node] = _Peer(self._key, epoch, count, now_s)
+        self._peers[node] = _Peer(self._keys.network, self._pair_key(node), epoch, count, now_s)
         return True
 
-    def _new_epoch(self) -> tuple[int, hashlib.blake2s, int]:
-        epoch = self._rng.getrandbits(_EPOCH_BITS)
-        return epoch, _epoch_state(self._key, epoch), 0
+    def _begin_epoch(self) -> None:
+        self._epoch = self._rng.getrandbits(_EPOCH_BITS)
+        self._count = 0
+        self._state_to_all = _epoch_state(self._keys.network, self._epoch)
+        self._states.clear()
+
+    def _state_to(self, receiver: int) -> hashlib.blake2s:
+        self._states[receiver] = state = _epoch_state(self._pair_key(receiver), self._epoch)
+        return state
+
+    def _pair_key(self, other: int) -> bytes:
+        key = self._keys.pair(self._node_id, other)
+        assert key is not None, "a node has its own keys"
+        return key
 
     def _proven(self, kind: MessageType, to: int, body: bytes) -> bytes:
         packet = messages.packet(kind, self._node_id, self._node_id, to, to, body)[:TAG_AT]
-        return packet + self._sync_tag(packet)
+        return packet + self._proof(packet, to)
 
     def _is_proven(self, payload: bytes) -> bool:
-        return hmac.compare_digest(self._sync_tag(payload[:TAG_AT]), payload[TAG_AT:])
+        proof = self._proof(payload[:TAG_AT], messages.sender(payload))
+        return hmac.compare_digest(proof, payload[TAG_AT:])
 
-    def _sync_tag(self, packet: bytes) -> bytes:
-        return hashlib.blake2s(packet, key=self._sync_key, digest_size=TAG_BYTES).digest()
+    def _proof(self, packet: bytes, other: int) -> bytes:
+        key = self._pair_key(other)
+        tag = hashlib.blake2s(packet, key=key, digest_size=TAG_BYTES, person=b"epochs")
+        return tag.digest()
 
 
-def _epoch_state(network_key: bytes, epoch: int) -> hashlib.blake2s:
+def _epoch_state(key: bytes, epoch: int) -> hashlib.blake2s:
     """The tag of an epoch's packets up to where they differ; to be copied for each."""
-    state = hashlib.blake2s(key=network_key, digest_size=TAG_BYTES)
+    state = hashlib.blake2s(key=key, digest_size=TAG_BYTES, person=b"hop")
     state.update(struct.pack("<Q", epoch))
     return state

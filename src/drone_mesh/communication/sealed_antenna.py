@@ -69,7 +69,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         self._antenna = antenna
         self._node_id = node_id
         fresh_s = FRESH_PERIODS * (timing or MeshTiming()).check_period_s
-        self._seal = HopSeal(node_id, keys.network, rng, fresh_s)
+        self._seal = HopSeal(node_id, keys, rng, fresh_s)
         self._end_to_end = EndToEnd(node_id, keys, rng)
         self._mesh: IMeshNetwork | None = None
         self._present = b""  # the last one, for neighbours that could not open it

@@ -235,6 +235,12 @@ class Network:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
         node = Node(self.clock, self.air, node_id, Location(y, x, 0.0), radio_rng, why_not_fly)
+        self._install(node, node_id, gateway)
+        self.nodes[node_id] = node
+        self.clock.call_at(start_s, Node.start, node)
+
+    def _install(self, node: Node, node_id: int, gateway: bool) -> None:
+        """The mesh software of one node."""
         antenna: InProcessAntenna | SharedAntenna | SealedAntenna = node.antenna
         if self._key is not None:
             antenna = self._sealed(node.antenna, node_id, self._key)
@@ -252,8 +258,6 @@ class Network:
         )
         node.component.data.on_received(functools.partial(self._receive, node_id))
         node.receiver = antenna if isinstance(antenna, SealedAntenna) else node.component
-        self.nodes[node_id] = node
-        self.clock.call_at(start_s, Node.start, node)
 
     def _sealed(
         self,
@@ -262,7 +266,7 @@ class Network:
         key: Keys | Callable[[int], Keys],
     ) -> SealedAntenna:
         keys = key if isinstance(key, Keys) else key(node_id)
-        rng = random.Random(f"{self._seed} seal {node_id}")
+        rng = random.Random(f"{self._seed} seal {node_id} {self.now_s()}")  # new at each start
         return SealedAntenna(antenna, node_id, keys, rng, self.now_s, self._timing)
 
     def _technique(self, node_id: int) -> str | IRoutingTechnique:
@@ -271,6 +275,13 @@ class Network:
         return self._routing
 
     # Acting ----------------------------------------------------------------------------------
+
+    def restart(self, node_id: int) -> None:
+        """Start the mesh software of a node again; it has lost all that it knew."""
+        node = self.nodes[node_id]
+        node.component.stop()
+        self._install(node, node_id, node.is_gateway)
+        node.start()
 
     def power(self, node_id: int, on: bool) -> None:
         """Switch a node's antenna."""

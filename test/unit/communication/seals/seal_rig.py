@@ -14,7 +14,7 @@ FRESH_S = 30.0
 
 def node(node_id, seed=0, key=KEY):
     """The hop seal of one node; another seed is another start of the same node."""
-    return HopSeal(node_id, key.network, random.Random(f"{node_id} {seed}"), FRESH_S)
+    return HopSeal(node_id, key, random.Random(f"{node_id} {seed}"), FRESH_S)
 
 
 def introduce(receiver, sender, sender_id, now_s=0.0):

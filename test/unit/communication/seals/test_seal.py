@@ -1,7 +1,11 @@
 from __future__ import annotations
 
+from random import Random
+
 import pytest
-from seal_rig import FRESH_S, OTHER_KEY, introduce, node, packet
+from seal_rig import FRESH_S, KEY, OTHER_KEY, introduce, node, packet
+
+from drone_mesh.communication.seal import HopSeal
 
 HEARTBEAT = packet("05 05 04 01 01 01 00 00")  # of node 5 for node 1
 PRESENT = packet("05 05 03 fe fe 01 01")
@@ -19,7 +23,7 @@ def test_a_sealed_packet_has_these_bytes_on_the_air():
     sealed = node(5).seal(HEARTBEAT)
     assert sealed[:25] == HEARTBEAT[:25]
     assert sealed[25:27] == b"\x01\x00"  # the first packet of this start
-    assert sealed[27:] == bytes.fromhex("17b6eb669b")
+    assert sealed[27:] == bytes.fromhex("4e124fd2ae")
 
 
 def test_an_authentic_packet_opens_once(link):
@@ -156,3 +160,11 @@ def test_counters_end_with_a_new_epoch(link):
     introduce(receiver, sender, 5, 7.0)
     assert receiver.open(sender.seal(HEARTBEAT), 7.0) is not None
     assert receiver.open(last, 7.0) is None
+
+
+def test_a_captured_node_cannot_pose_as_another_one_to_a_neighbour():
+    receiver, sender = node(1), node(5)
+    captured = HopSeal(5, KEY.for_node(7), Random("5 0"), FRESH_S)  # poses as node 5
+    introduce(receiver, sender, 5)
+    with pytest.raises(AssertionError, match="a node has its own keys"):
+        captured.seal(HEARTBEAT)

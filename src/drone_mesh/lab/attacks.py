@@ -1,0 +1,179 @@
+"""Attacks on a mesh, as a stranger with one radio can make them (docs/security.md, "Attacks").
+
+Each function here is one attack. It is called when the mesh is connected, takes as much simulated
+time as it needs, and returns the places where the owner of the mesh wants drones to be that had
+orders meanwhile.
+"""
+
+from __future__ import annotations
+
+import random
+from typing import Callable, Dict, Mapping
+
+from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.messages import (
+    GoToLocationMessage,
+    LocationMessage,
+    MessageType,
+    MovementNegotiationMessage,
+    header,
+)
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.lab.stranger import Stranger
+
+ATTACK_S = 60.0
+OUTAGE_S = 90.0
+BIDDING_S = 300.0
+FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
+HERE, THERE = Location(-5.0, 2.0, 0.0), Location(-2.0, -4.0, 0.0)  # of two orders of the owner
+LARGEST_BID = 1e9
+
+Attack = Callable[[Stranger], Dict[int, Location]]
+
+
+def order_gateway_away(stranger: Stranger) -> dict[int, Location]:
+    """One order to fly, for the gateway's own drone."""
+    _order(stranger, 0, 0)
+    stranger.network.run_for(ATTACK_S)
+    return {}
+
+
+def order_all_away(stranger: Stranger) -> dict[int, Location]:
+    """One order to fly for each drone, the far ones first."""
+    near = stranger.in_range()
+    for node in sorted(stranger.network.nodes, reverse=True):
+        _order(stranger, node if node in near else near[-1], node)
+        stranger.network.run_for(0.1)
+    stranger.network.run_for(ATTACK_S)
+    return {}
+
+
+def false_gateway(stranger: Stranger) -> dict[int, Location]:
+    """A radio that says to be a gateway, and answers each heartbeat."""
+    me = stranger.node_id
+
+    def answer(payload: bytes) -> None:
+        creator, from_, kind, _to, forward = header(payload)
+        if kind == MessageType.HEARTBEAT and forward in (me, 0):
+            stranger.say(MessageType.HEARTBEAT, me, from_, creator, bytes((1, me, 0)))
+
+    stranger.on_packet = answer
+    for _ in stranger.every(1.0, ATTACK_S):
+        for node in stranger.in_range():
+            stranger.say(MessageType.HEARTBEAT, me, node, node, bytes((1, me, 0)))
+    return {}
+
+
+def black_hole(stranger: Stranger) -> dict[int, Location]:
+    """A radio that presents itself as the best way to the gateway, and forwards nothing."""
+    me = stranger.node_id
+    for _ in stranger.every(1.0, ATTACK_S):
+        for node in stranger.in_range():
+            stranger.say(MessageType.PRESENT, me, node, BROADCAST, bytes((0, 1)))
+    return {}
+
+
+def missing_storm(stranger: Stranger) -> dict[int, Location]:
+    """Once a second, under each id: the gateway is missing."""
+    for _ in stranger.every(1.0, ATTACK_S):
+        for node in stranger.in_range():
+            for creator in stranger.network.nodes:
+                if creator != node:
+                    stranger.say(MessageType.MISSING, creator, node, node, bytes((0,)))
+    return {}
+
+
+def invented_ids(stranger: Stranger) -> dict[int, Location]:
+    """Ten heartbeats a second, each of another node that does not exist."""
+    chance = random.Random(stranger.node_id)
+    for _ in stranger.every(0.1, ATTACK_S):
+        creator = chance.randrange(100, 250)
+        for node in stranger.in_range():
+            stranger.say(MessageType.HEARTBEAT, creator, node, node, bytes((0, 255, 0)))
+    return {}
+
+
+def far_place(stranger: Stranger) -> dict[int, Location]:
+    """Once: the gateway is far away. Then the gateway is off for a while."""
+    body = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
+    for node in stranger.in_range():
+        if node != 0:
+            stranger.say(MessageType.LOCATION, 0, node, node, body)
+    stranger.network.power(0, False)
+    stranger.network.run_for(OUTAGE_S)
+    stranger.network.power(0, True)
+    stranger.network.run_for(ATTACK_S)
+    return {}
+
+
+def highest_bid(stranger: Stranger) -> dict[int, Location]:
+    """The drones behind node 1 are cut off for good; a bid each 3 s is higher than theirs."""
+    stranger.network.power(1, False)
+    body = MovementNegotiationMessage.BODY.pack(LARGEST_BID)
+    for bid, _ in enumerate(stranger.every(3.0, BIDDING_S)):
+        for node in stranger.in_range():
+            nobody = 100 + bid % 100
+            stranger.say(MessageType.MOVEMENT_NEGOTIATION, nobody, node, node, body)
+    return {}
+
+
+def replayed_order(stranger: Stranger) -> dict[int, Location]:
+    """The owner sends drone 1 away and back; a second later its first order comes again."""
+    return _replay(stranger, lambda: None)
+
+
+def replay_after_restart(stranger: Stranger) -> dict[int, Location]:
+    """The same, and drone and gateway start again before the order comes again."""
+
+    def restart() -> None:
+        for node in (1, 0):
+            stranger.network.restart(node)
+        stranger.network.run_for(15.0)
+
+    return _replay(stranger, restart)
+
+
+def replay_on_another_path(stranger: Stranger) -> dict[int, Location]:
+    """The same; the order comes again through another neighbour of the drone."""
+    return _replay(stranger, lambda: None, through=2)
+
+
+OUTSIDE: Mapping[str, Attack] = {
+    "forged order to the gateway": order_gateway_away,
+    "forged orders to all": order_all_away,
+    "order replayed after 1 s": replayed_order,
+    "order replayed after a restart": replay_after_restart,
+    "order replayed on another path": replay_on_another_path,
+    "false gateway": false_gateway,
+    "MISSING storm": missing_storm,
+    "far place and an outage": far_place,
+    "bids of 1e9": highest_bid,
+    "black hole": black_hole,
+    "heartbeats of invented ids": invented_ids,
+}
+
+
+def _order(stranger: Stranger, to: int, forward: int) -> None:
+    body = GoToLocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0)
+    stranger.say(MessageType.MOVE_TO_LOCATION, stranger.node_id, to, forward, body)
+
+
+def _replay(
+    stranger: Stranger, meanwhile: Callable[[], None], through: int | None = None
+) -> dict[int, Location]:
+    network = stranger.network
+    stranger.listen()
+    for place in (HERE, THERE):
+        network.order(1, place.longitude, place.latitude)
+        network.run_until(lambda at=place: network.location(1) == at, within_s=120.0)  # type: ignore[misc]
+    network.run_for(15.0)
+    meanwhile()
+    orders = [r for r in stranger.record if r.payload[2] == MessageType.MOVE_TO_LOCATION]
+    first = orders[0].payload
+    network.run_for(1.0)
+    if through is None:
+        stranger.play(1, first)
+    else:
+        stranger.play(through, first[:3] + bytes((through,)) + first[4:])
+    network.run_for(ATTACK_S)
+    return {1: THERE}

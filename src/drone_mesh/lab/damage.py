@@ -1,0 +1,148 @@
+"""What an attack does to a mesh: nodes cut off, drones lured away."""
+
+from __future__ import annotations
+
+import statistics
+from typing import NamedTuple, Sequence
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.keys import Keys, MeshKey
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import MeshError
+from drone_mesh.inprocess.network import Network
+from drone_mesh.lab.attacks import OUTSIDE, highest_bid
+from drone_mesh.lab.stranger import Stranger
+
+NODES = 25
+SPACING_M = 6.0
+STRANGER = 200
+LURED_M = 50.0  # further than any repair flies here
+OFF_ORDER_M = 3.0  # of a drone that its owner ordered to a place
+KEY = MeshKey(b"the key of a lab")
+INSIDE, WITH_KEY, WITHOUT_KEY = "captured node", "with key", "without key"
+RECOVERY_S = 60.0
+
+
+class Damage(NamedTuple):
+    """Of one attack on one mesh."""
+
+    cut_off: float  # share of the routers without a working path to a gateway, mean over its time
+    later: float  # the same, at a moment a minute later
+    lured: int  # drones more than LURED_M from where they belong
+    metres: float  # the farthest of them
+
+
+def trial(name: str, case: str, seed: int) -> Damage:
+    """One attack, on a mesh without a key, with one, or by a captured node of one with a key."""
+    attack = OUTSIDE[name]
+    network = Network(seed, key=None if case == WITHOUT_KEY else _keys_of)
+    if attack is highest_bid:
+        network.add_gateway(0, 0.0, 0.0)
+        for node in (1, 2, 3):
+            network.add_router(node, SPACING_M * node, 0.0)
+        at = (2 * SPACING_M, 3.0)
+    else:
+        network.add_fleet(1, NODES - 1, 5, SPACING_M)
+        at = (2.0, 3.0)
+    if not network.run_until(network.all_connected, within_s=60.0):
+        raise MeshError(f"seed {seed}: the mesh does not connect without an attack")
+    network.run_for(20.0)
+    places = {node: network.location(node) for node in network.nodes}
+    stranger = Stranger(network, STRANGER, *at)
+    if case == INSIDE:
+        stranger.join_with(KEY.for_node(STRANGER))
+    stranger.switch_on()
+    if case == INSIDE:
+        _get_acquainted(stranger)
+    shares = _Sampler(network)
+    ordered = attack(stranger)
+    cut_off = shares.mean()
+    lured = _away(network, places, ordered)
+    stranger.antenna.stop_antenna()
+    network.run_for(RECOVERY_S)
+    return Damage(cut_off, share_cut_off(network), len(lured), max(lured, default=0.0))
+
+
+def share_cut_off(network: Network) -> float:
+    """The share of the powered routers from which no packet would arrive at a gateway."""
+    routers = [n for n, node in network.nodes.items() if not node.is_gateway]
+    powered = [n for n in routers if network.nodes[n].antenna.powered]
+    return sum(not _arrives(network, n) for n in powered) / len(powered)
+
+
+def table(names: Sequence[str], cases: Sequence[str], runs: int) -> list[str]:
+    """The lines of a Markdown table: means over the runs, the farthest of all drones."""
+    lines = ["| attack | case | cut off | a minute later | drones lured | farthest |"]
+    lines.append("|---|---|---|---|---|---|")
+    for name in names:
+        for case in cases:
+            damage = [trial(name, case, seed) for seed in range(runs)]
+            cut_off, later, lured, _ = (statistics.fmean(column) for column in zip(*damage))
+            farthest = max(d.metres for d in damage)
+            lines.append(
+                f"| {name} | {case} | {100 * cut_off:.0f} % | {100 * later:.0f} % "
+                f"| {lured:.1f} | {farthest:.0f} m |"
+            )
+    return lines
+
+
+def _keys_of(node_id: int) -> Keys:
+    return KEY if node_id == 0 else KEY.for_node(node_id)
+
+
+def _get_acquainted(stranger: Stranger) -> None:
+    """A captured node is a neighbour of the others before it does any harm."""
+    me = stranger.node_id
+    stranger.antenna.broadcast_message(bytes((me, me, 3, 254, 254, 255, 0)).ljust(32, b"\0"))
+    stranger.network.run_for(12.0)
+
+
+def _arrives(network: Network, node: int) -> bool:
+    """Whether a packet for the node's gateway would get there, over living links."""
+    component = network.nodes[node].component
+    gateway = component.get_preferred_gateway()
+    if not component.get_connected_to_gateway() or gateway not in network.nodes:
+        return False
+    path = [node]
+    while path[-1] != gateway:
+        step = network.nodes[path[-1]].component.get_direction_to(gateway)
+        if step == NO_ROUTE or step in path or step not in network.links(path[-1]):
+            return False
+        if step not in network.nodes:
+            return False  # the stranger
+        path.append(step)
+    return True
+
+
+def _away(
+    network: Network, before: dict[int, Location], ordered: dict[int, Location]
+) -> list[float]:
+    """How far drones are, or will be, from where they belong, in metres."""
+    distances = []
+    for node, was_at in before.items():
+        place = ordered.get(node, was_at)
+        allowed_m = OFF_ORDER_M if node in ordered else LURED_M
+        drone = network.nodes[node].drone
+        goal = drone.get_location() if drone.path is None else Location.from_vector(drone.path.goal)
+        if goal.distance_m(place) > allowed_m:
+            distances.append(goal.distance_m(place))
+    return distances
+
+
+class _Sampler:
+    """Looks at the mesh once a second."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._shares: list[float] | None = []
+        self._look()
+
+    def mean(self) -> float:
+        """Over the time so far; it looks no more."""
+        shares, self._shares = self._shares, None
+        return statistics.fmean(shares or [0.0])
+
+    def _look(self, _: object = None) -> None:
+        if self._shares is not None:
+            self._shares.append(share_cut_off(self._network))
+            self._network.clock.call_at(self._network.now_s() + 1.0, self._look, None)

@@ -1,0 +1,133 @@
+"""Stranger: a radio that does not belong to the mesh, or a node of it that was captured."""
+
+from __future__ import annotations
+
+import random
+from typing import Callable, Iterator, NamedTuple
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
+from drone_mesh.communication.keys import Keys
+from drone_mesh.communication.sealed_antenna import SealedAntenna
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.inprocess.drone import InProcessDrone
+from drone_mesh.inprocess.network import Network
+from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna
+
+
+class Recorded(NamedTuple):
+    """A packet as it was on the air."""
+
+    at_s: float
+    receiver: int
+    payload: bytes
+
+
+class _Tap(IMeshNetwork):
+    """Hears what a node hears, without changing it."""
+
+    def __init__(self, network: Network, node_id: int, record: list[Recorded]) -> None:
+        self._network = network
+        self._node_id = node_id
+        self._record = record
+        self._tapped = network.nodes[node_id].receiver
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        self._record.append(Recorded(now_s, self._node_id, payload))
+        self._tapped.on_msg(payload, now_s)
+
+    def get_node_id(self) -> int:
+        return self._node_id
+
+    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+        self._tapped.on_undelivered(payload, now_s)
+
+    def on_antenna_power(self, on: bool, now_s: float) -> None:
+        self._tapped.on_antenna_power(on, now_s)
+
+    def on_antenna_registered(self, now_s: float) -> None:
+        self._tapped.on_antenna_registered(now_s)
+
+
+class Stranger(IMeshNetwork):
+    """Records and invents packets from one place, over a radio that answers as `node_id`."""
+
+    def __init__(self, network: Network, node_id: int, x: float, y: float) -> None:
+        """At (x, y) metres on the ground, with the range of every other radio on the disc."""
+        assert isinstance(network.air, InProcessAir)
+        self.node_id = node_id
+        self.network = network
+        self.record: list[Recorded] = []
+        self.heard: list[bytes] = []  # on its own address
+        self.on_packet: Callable[[bytes], None] = self.heard.append
+        drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda _started: None, "")
+        self._receiver: IMeshNetwork = self
+        self._is_inside = False
+        self.antenna: IWirelessCommunication = InProcessAntenna(
+            network.air, node_id, drone, self._hear
+        )
+        self._air = network.air
+
+    def join_with(self, keys: Keys) -> None:
+        """Send and receive with the keys of a captured node."""
+        rng = random.Random(f"stranger {self.node_id}")
+        clock = self.network.now_s
+        self._is_inside = True
+        self.antenna = sealed = SealedAntenna(self.antenna, self.node_id, keys, rng, clock)
+        self._receiver = sealed
+
+    def switch_on(self) -> None:
+        """Be reachable."""
+        self.antenna.start_antenna(self)
+
+    def listen(self) -> None:
+        """Record what the nodes in its range hear, from now on."""
+        for node_id in self.in_range():
+            self.network.nodes[node_id].receiver = _Tap(self.network, node_id, self.record)
+
+    def in_range(self) -> list[int]:
+        """The nodes that hear it."""
+        return sorted(self._air.in_range(self.node_id))
+
+    def say(self, kind: int, creator: int, to: int, forward: int, body: bytes = b"") -> None:
+        """A packet of `creator`, to the neighbour `to`.
+
+        A radio without keys pretends to be `creator`; a captured node pretends to be its relay.
+        """
+        if self._is_inside:
+            packet = messages.packet(kind, creator, self.node_id, to, forward, body)
+            self.antenna.send_message_to(packet)
+        else:
+            self.play(to, messages.packet(kind, creator, creator, to, forward, body))
+
+    def play(self, receiver: int, payload: bytes) -> None:
+        """Put bytes on the air for one node."""
+        if receiver in self._air.in_range(self.node_id):
+            self.network.inject(receiver, payload)
+
+    def every(self, period_s: float, seconds: float) -> Iterator[None]:
+        """Once per period, while simulated time passes."""
+        end_s = self.network.now_s() + seconds
+        while self.network.now_s() < end_s:
+            yield
+            self.network.run_for(period_s)
+
+    # IMeshNetwork ----------------------------------------------------------------------------
+
+    def _hear(self, payload: bytes) -> None:
+        self._receiver.on_msg(payload, self.network.now_s())
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        self.on_packet(payload)
+
+    def get_node_id(self) -> int:
+        return self.node_id
+
+    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+        """Does not care."""
+
+    def on_antenna_power(self, on: bool, now_s: float) -> None:
+        """Does not care."""
+
+    def on_antenna_registered(self, now_s: float) -> None:
+        """Does not care."""
