@@ -125,7 +125,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         )
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
-        self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway)
+        room = messages.BODY_BYTES - antenna.reserved_bytes(messages.DATA_TYPES.start)
+        self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway, room)
 
     # Driven from outside ---------------------------------------------------------------------
 

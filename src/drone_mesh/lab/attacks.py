@@ -135,10 +135,10 @@ def replay_after_restart(stranger: Stranger) -> dict[int, Location]:
 
 def replay_on_another_path(stranger: Stranger) -> dict[int, Location]:
     """The same; the order comes again through another neighbour of the drone."""
-    return _replay(stranger, lambda: None, through=2)
+    return _replay(stranger, lambda: None, through=6)
 
 
-OUTSIDE: Mapping[str, Attack] = {
+ATTACKS: Mapping[str, Attack] = {
     "forged order to the gateway": order_gateway_away,
     "forged orders to all": order_all_away,
     "order replayed after 1 s": replayed_order,
@@ -151,6 +151,7 @@ OUTSIDE: Mapping[str, Attack] = {
     "black hole": black_hole,
     "heartbeats of invented ids": invented_ids,
 }
+RECORDING = (replayed_order, replay_after_restart, replay_on_another_path)
 
 
 def _order(stranger: Stranger, to: int, forward: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import shlex
 import sys
@@ -10,7 +11,9 @@ from pathlib import Path
 from typing import Callable, Sequence
 
 from drone_mesh.errors import MeshError
+from drone_mesh.lab.attacks import ATTACKS
 from drone_mesh.lab.campaign import Campaign
+from drone_mesh.lab.damage import table
 from drone_mesh.lab.estimate import estimate
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.merge import merge
@@ -120,6 +123,15 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     )
     compare.set_defaults(run=_compare)
 
+    attack = commands.add_parser(
+        "attack", help="attack meshes without and with a key, and print the damage as a table"
+    )
+    attack.add_argument(
+        "attacks", nargs="*", metavar="ATTACK", help=f"of: {', '.join(ATTACKS)} (default: all)"
+    )
+    attack.add_argument("--runs", type=_count, default=12, metavar="N", help="seeds (default: 12)")
+    attack.set_defaults(run=_attack)
+
     metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
     metrics.set_defaults(run=_metrics)
 
@@ -150,6 +162,18 @@ def _shard(text: str) -> tuple[int, int]:
     if not (slash and part.isdigit() and of.isdigit() and 0 <= int(part) < int(of)):
         raise argparse.ArgumentTypeError(f"expected I/N with 0 <= I < N, not {text}")
     return int(part), int(of)
+
+
+def _attack(options: argparse.Namespace) -> int:
+    unknown = set(options.attacks).difference(ATTACKS)
+    if unknown:
+        raise MeshError(f"unknown attack {min(unknown)!r}: use one of {', '.join(ATTACKS)}")
+    if options.runs < 1:
+        raise MeshError(f"invalid --runs {options.runs}: must be 1 or more")
+    logging.disable(logging.WARNING)  # an attacked mesh has much to say
+    for line in table(options.attacks or list(ATTACKS), options.runs):
+        print(line, flush=True)
+    return 0
 
 
 def _new(options: argparse.Namespace) -> int:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import enum
 import statistics
-from typing import NamedTuple, Sequence
+from typing import Iterator, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.keys import Keys, MeshKey
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network
-from drone_mesh.lab.attacks import OUTSIDE, highest_bid
+from drone_mesh.lab.attacks import ATTACKS, RECORDING, highest_bid
 from drone_mesh.lab.stranger import Stranger
 
 NODES = 25
@@ -19,7 +20,17 @@ STRANGER = 200
 LURED_M = 50.0  # further than any repair flies here
 OFF_ORDER_M = 3.0  # of a drone that its owner ordered to a place
 KEY = MeshKey(b"the key of a lab")
-INSIDE, WITH_KEY, WITHOUT_KEY = "captured node", "with key", "without key"
+
+
+class Case(enum.Enum):
+    """Whether there is a key, and who attacks."""
+
+    NOBODY = "no attack"
+    WITHOUT_KEY = "without key"
+    WITH_KEY = "with key"
+    CAPTURED = "captured node"  # with its own keys, in a mesh with a key
+
+
 RECOVERY_S = 60.0
 
 
@@ -32,10 +43,10 @@ class Damage(NamedTuple):
     metres: float  # the farthest of them
 
 
-def trial(name: str, case: str, seed: int) -> Damage:
+def trial(name: str, case: Case, seed: int) -> Damage:
     """One attack, on a mesh without a key, with one, or by a captured node of one with a key."""
-    attack = OUTSIDE[name]
-    network = Network(seed, key=None if case == WITHOUT_KEY else _keys_of)
+    attack = ATTACKS[name]
+    network = Network(seed, key=_keys_of if case in (Case.WITH_KEY, Case.CAPTURED) else None)
     if attack is highest_bid:
         network.add_gateway(0, 0.0, 0.0)
         for node in (1, 2, 3):
@@ -49,10 +60,11 @@ def trial(name: str, case: str, seed: int) -> Damage:
     network.run_for(20.0)
     places = {node: network.location(node) for node in network.nodes}
     stranger = Stranger(network, STRANGER, *at)
-    if case == INSIDE:
+    if case is Case.CAPTURED:
         stranger.join_with(KEY.for_node(STRANGER))
+    stranger.mute = case is Case.NOBODY
     stranger.switch_on()
-    if case == INSIDE:
+    if case is Case.CAPTURED:
         _get_acquainted(stranger)
     shares = _Sampler(network)
     ordered = attack(stranger)
@@ -70,20 +82,27 @@ def share_cut_off(network: Network) -> float:
     return sum(not _arrives(network, n) for n in powered) / len(powered)
 
 
-def table(names: Sequence[str], cases: Sequence[str], runs: int) -> list[str]:
+def table(names: Sequence[str], runs: int) -> Iterator[str]:
     """The lines of a Markdown table: means over the runs, the farthest of all drones."""
-    lines = ["| attack | case | cut off | a minute later | drones lured | farthest |"]
-    lines.append("|---|---|---|---|---|---|")
+    yield "| attack | " + " | ".join(case.value for case in Case) + " |"
+    yield "|---" * (1 + len(Case)) + "|"
     for name in names:
-        for case in cases:
+        cells = []
+        for case in Case:
+            if case is Case.CAPTURED and ATTACKS[name] in RECORDING:
+                cells.append("")  # it would play what it recorded like any other radio
+                continue
             damage = [trial(name, case, seed) for seed in range(runs)]
-            cut_off, later, lured, _ = (statistics.fmean(column) for column in zip(*damage))
-            farthest = max(d.metres for d in damage)
-            lines.append(
-                f"| {name} | {case} | {100 * cut_off:.0f} % | {100 * later:.0f} % "
-                f"| {lured:.1f} | {farthest:.0f} m |"
-            )
-    return lines
+            cells.append(_in_words(damage))
+        yield f"| {name} | " + " | ".join(cells) + " |"
+
+
+def _in_words(damage: Sequence[Damage]) -> str:
+    cut_off, later, lured, _ = (statistics.fmean(column) for column in zip(*damage))
+    text = f"{100 * cut_off:.0f} %, later {100 * later:.0f} %"
+    if lured:
+        text += f"; {lured:.1f} lured, {max(d.metres for d in damage):.0f} m"
+    return text
 
 
 def _keys_of(node_id: int) -> Keys:

@@ -57,6 +57,7 @@ class Stranger(IMeshNetwork):
         assert isinstance(network.air, InProcessAir)
         self.node_id = node_id
         self.network = network
+        self.mute = False  # True: it does nothing at all
         self.record: list[Recorded] = []
         self.heard: list[bytes] = []  # on its own address
         self.on_packet: Callable[[bytes], None] = self.heard.append
@@ -94,7 +95,7 @@ class Stranger(IMeshNetwork):
 
         A radio without keys pretends to be `creator`; a captured node pretends to be its relay.
         """
-        if self._is_inside:
+        if self._is_inside and not self.mute:
             packet = messages.packet(kind, creator, self.node_id, to, forward, body)
             self.antenna.send_message_to(packet)
         else:
@@ -102,7 +103,7 @@ class Stranger(IMeshNetwork):
 
     def play(self, receiver: int, payload: bytes) -> None:
         """Put bytes on the air for one node."""
-        if receiver in self._air.in_range(self.node_id):
+        if not self.mute and receiver in self._air.in_range(self.node_id):
             self.network.inject(receiver, payload)
 
     def every(self, period_s: float, seconds: float) -> Iterator[None]:
