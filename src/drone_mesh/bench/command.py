@@ -15,6 +15,7 @@ from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import RosResult, measure
 from drone_mesh.bench.progress import Progress
 from drone_mesh.bench.system import BenchmarkError, check_environment, free_port
+from drone_mesh.communication.key_file import read_key_file
 from drone_mesh.errors import ConfigurationError
 
 WINDOW_S = 20.0  # two rounds of the default timing
@@ -97,6 +98,13 @@ def make_parser() -> argparse.ArgumentParser:
         help="further arguments for factory.launch",
     )
     parser.add_argument(
+        "--key-file",
+        type=Path,
+        metavar="FILE",
+        help="in process: seal all packets with this mesh key (for the other half: "
+        "--launch key:=FILE)",
+    )
+    parser.add_argument(
         "--json", type=Path, metavar="FILE", help="also write all figures to this file"
     )
     parser.add_argument("--port", type=int, help="port of the ROS master; default: a free port")
@@ -119,6 +127,7 @@ class Benchmark:
         self._failed: list[dict[str, str]] = []
         self._inprocess: list[inprocess.InProcessResult] = []
         self._soak: soak.SoakResult | None = None
+        self._key = None if options.key_file is None else read_key_file(options.key_file)
 
     def run(self) -> int:
         """Measure and return the exit code. An interrupted run prints its results so far."""
@@ -158,7 +167,8 @@ class Benchmark:
         runs = QUICK_RUNS if self._options.quick else RUNS
         self._progress.begin("in process")
         for drones in inprocess.SIZES:
-            self._inprocess.append(inprocess.measure(drones, runs, self._progress.say))
+            result = inprocess.measure(drones, runs, self._progress.say, key=self._key)
+            self._inprocess.append(result)
         self._progress.clear()
 
     def _run_soak(self) -> None:
@@ -226,5 +236,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
         signal.signal(number, signal.default_int_handler)
     try:
         sys.exit(Benchmark(options, Progress(sys.stderr)).run())
-    except BenchmarkError as error:
+    except (BenchmarkError, ConfigurationError) as error:
         sys.exit(f"bench: {error}")

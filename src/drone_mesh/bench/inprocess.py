@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.bench.cases import Case
+from drone_mesh.communication.keys import Keys
 from drone_mesh.inprocess import Network
 
 SIZES = (25, 100, 254)
@@ -30,6 +31,7 @@ class InProcessResult:
     running_per_cpu_s: float
     running_per_wall_s: float
     running_best_per_cpu_s: float
+    packets_per_cpu_s: float  # in the second phase
     packets: int  # delivered in both phases of one run
     all_connected: bool
 
@@ -38,13 +40,16 @@ class InProcessResult:
 class _Pace:
     per_cpu_s: float
     per_wall_s: float
+    packets_per_cpu_s: float
 
 
 def _pace(network: Network, simulated_s: float) -> _Pace:
+    delivered = network.air.delivered
     wall_s, cpu_s = time.perf_counter(), time.process_time()
     network.run_for(simulated_s)
     wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
-    return _Pace(simulated_s / cpu_s, simulated_s / wall_s)
+    packets_per_cpu_s = (network.air.delivered - delivered) / cpu_s
+    return _Pace(simulated_s / cpu_s, simulated_s / wall_s, packets_per_cpu_s)
 
 
 def measure(
@@ -52,10 +57,12 @@ def measure(
     runs: int,
     say: Callable[[str], None],
     simulated_s: float = SIMULATED_S,
+    key: Keys | None = None,
 ) -> InProcessResult:
     """Start a network `runs` times and measure two phases of each run.
 
-    The first phase costs more, because the nodes find each other in it.
+    The first phase costs more, because the nodes find each other in it. With a `key` all packets
+    are sealed.
     """
     case = Case(drones, SPACING_M)
     starting: list[_Pace] = []
@@ -63,7 +70,7 @@ def measure(
     packets, connected = 0, True
     for run in range(runs):
         say(f"{drones} drones in process: run {run + 1} of {runs}")
-        network = Network(seed=run)
+        network = Network(seed=run, key=key)
         network.add_fleet(1, case.routers, case.gridsize, SPACING_M)
         starting.append(_pace(network, simulated_s))
         running.append(_pace(network, simulated_s))
@@ -80,6 +87,7 @@ def measure(
         running_per_cpu_s=statistics.median(pace.per_cpu_s for pace in running),
         running_per_wall_s=statistics.median(pace.per_wall_s for pace in running),
         running_best_per_cpu_s=max(pace.per_cpu_s for pace in running),
+        packets_per_cpu_s=statistics.median(pace.packets_per_cpu_s for pace in running),
         packets=packets,
         all_connected=connected,
     )

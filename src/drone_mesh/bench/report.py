@@ -166,9 +166,18 @@ def inprocess_table(results: Sequence[InProcessResult]) -> str:
     return (
         f"In process, one core: simulated seconds per second of processor time (of wall time). "
         f"Medians of {runs} runs and the best run, for the first {period} and the {period} "
-        f"after them.\n\n"
+        f"after them; packets per second of processor time after them.\n\n"
         + table(
-            ("nodes", "spacing", "from the start", "best", "after", "best", "all connected"),
+            (
+                "nodes",
+                "spacing",
+                "from the start",
+                "best",
+                "after",
+                "best",
+                "packets",
+                "all connected",
+            ),
             [
                 [
                     str(result.drones),
@@ -177,6 +186,7 @@ def inprocess_table(results: Sequence[InProcessResult]) -> str:
                     f"{result.from_start_best_per_cpu_s:.0f}",
                     f"{result.running_per_cpu_s:.0f} ({result.running_per_wall_s:.0f})",
                     f"{result.running_best_per_cpu_s:.0f}",
+                    f"{result.packets_per_cpu_s:.0f}",
                     "yes" if result.all_connected else "no",
                 ]
                 for result in results

@@ -94,8 +94,9 @@ def test_the_in_process_table_gives_processor_time_and_wall_time():
         running_per_cpu_s=1700.0,
         running_per_wall_s=1600.0,
         running_best_per_cpu_s=1750.0,
+        packets_per_cpu_s=90000.4,
         packets=6280,
         all_connected=True,
     )
     row = rows(inprocess_table([result]))[1]
-    assert row == ["25", "6 m", "1500 (1400)", "1550", "1700 (1600)", "1750", "yes"]
+    assert row == ["25", "6 m", "1500 (1400)", "1550", "1700 (1600)", "1750", "90000", "yes"]
