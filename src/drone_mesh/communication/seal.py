@@ -157,21 +157,25 @@ class HopSeal:
         body = _ANSWER.pack(nonce, self._epoch, self._count)
         return self._proven(MessageType.SEAL_ANSWER, messages.sender(challenge), body)
 
-    def answered(self, answer: bytes, now_s: float) -> bool:
-        """Take a neighbour's epoch from its answer. False: it answers no challenge of this node."""
+    def answered(self, answer: bytes, now_s: float) -> bool | None:
+        """Take a neighbour's epoch from its answer; whether that epoch is new.
+
+        None: it answers no challenge of this node.
+        """
         node = messages.sender(answer)
         waiting = self._challenges.get(node)
         if waiting is None or not self._is_proven(answer):
-            return False
+            return None
         nonce, epoch, count = _ANSWER.unpack_from(answer, messages.HEADER_BYTES)
         if nonce != waiting.nonce:
-            return False
+            return None
         del self._challenges[node]
         known = self._peers.get(node)
-        if known is not None and known.epoch == epoch:
+        is_new = known is None or known.epoch != epoch
+        if known is not None and not is_new:
             count = max(count, known.window.highest)
         self._peers[node] = _Peer(self._keys.network, self._pair_key(node), epoch, count, now_s)
-        return True
+        return is_new
 
     def _begin_epoch(self) -> None:
         self._epoch = self._rng.getrandbits(_EPOCH_BITS)

@@ -92,6 +92,9 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def patience(self) -> float:
         return self._antenna.patience()
 
+    def data_room(self) -> int:
+        return self._antenna.data_room()
+
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         self._mesh = mesh
         self._antenna.start_antenna(self)
@@ -165,10 +168,14 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
                 opened = opened[:_DIGEST_AT] + _NO_SEAL + opened[_DIGEST_AT:SEAL_AT]
         mesh.on_msg(opened, now_s)
 
-    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+        if self._mesh is not None:
+            self._mesh.on_delivered(neighbour, tries, now_s)
+
+    def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         kind = payload[2]
         if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, _PRESENT):
-            self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, now_s)
+            self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, tries, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
         if self._mesh is not None:

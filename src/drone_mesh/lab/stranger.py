@@ -39,8 +39,11 @@ class _Tap(IMeshNetwork):
     def get_node_id(self) -> int:
         return self._node_id
 
-    def on_undelivered(self, payload: bytes, now_s: float) -> None:
-        self._tapped.on_undelivered(payload, now_s)
+    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+        self._tapped.on_delivered(neighbour, tries, now_s)
+
+    def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
+        self._tapped.on_undelivered(payload, tries, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
         self._tapped.on_antenna_power(on, now_s)
@@ -124,7 +127,10 @@ class Stranger(IMeshNetwork):
     def get_node_id(self) -> int:
         return self.node_id
 
-    def on_undelivered(self, payload: bytes, now_s: float) -> None:
+    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+        """Does not care."""
+
+    def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         """Does not care."""
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:

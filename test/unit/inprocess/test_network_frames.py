@@ -12,7 +12,7 @@ from drone_mesh.communication.messages import IntroduceMessage, frame_digest, wi
 from drone_mesh.inprocess.drone import InProcessDrone
 
 ONE, OTHER = 0x1234, 0x4321
-LOCATION, MOVE_TO_LOCATION, GATEWAY_PLACE = 1, 6, 125
+LOCATION, MOVE_TO_LOCATION, NODE_REPORT, GATEWAY_PLACE = 1, 6, 66, 125
 
 
 @pytest.fixture
@@ -79,5 +79,5 @@ def test_a_place_is_taken_only_from_a_neighbour_with_the_same_origin(own, heard,
     assert frame.refuses(2) is refused
 
 
-def test_three_types_of_packets_carry_places():
-    assert {LOCATION, MOVE_TO_LOCATION, GATEWAY_PLACE} == TYPES_WITH_PLACES
+def test_four_types_of_packets_carry_places():
+    assert {LOCATION, MOVE_TO_LOCATION, NODE_REPORT, GATEWAY_PLACE} == TYPES_WITH_PLACES

@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+import logging
+
+import pytest
+from seal_rig import KEY, OTHER_KEY, packet
+
+from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
+from drone_mesh.communication.sealed_antenna import SealedAntenna
+from drone_mesh.inprocess import Network
+
+
+def line(nodes, key=KEY, radio="disc", **options):
+    network = Network(seed=1, key=key, radio=radio, **options)
+    network.add_gateway(0, 0.0, 0.0)
+    for node in range(1, nodes):
+        network.add_router(node, 6.0 * node, 0.0)
+    return network
+
+
+def node_keys(node_id):
+    return KEY if node_id == 0 else KEY.for_node(node_id)
+
+
+def counts(network, node_id):
+    return network.nodes[node_id].receiver.complaints.counts
+
+
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+@pytest.mark.parametrize("key", [KEY, node_keys], ids=["mesh key", "a key per node"])
+def test_a_mesh_with_a_key_connects_and_stays_connected(radio, key):
+    network = line(5, key, radio)
+    assert network.run_until(network.all_connected, within_s=30.0)
+    for _ in range(12):
+        network.run_for(5.0)
+        assert network.all_connected()
+    assert [network.hops(node) for node in range(5)] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    "routing",
+    ["babel", "batman", "child_table_tree", "dsdv", "etx_tree", "flooding", "steady_tree"],
+)
+def test_every_routing_technique_works_in_a_mesh_with_a_key(routing):
+    network = line(4, routing=routing)
+    assert network.run_until(network.all_connected, within_s=60.0)
+    network.run_for(30.0)
+    assert network.order(3, 18.0, 3.0)
+    assert network.run_until(lambda: network.location(3).latitude == 3.0, within_s=30.0)
+
+
+def test_nodes_know_the_gateways_place_as_they_do_without_a_key():
+    network = line(4)
+    network.run_for(30.0)
+    for node in (1, 2, 3):
+        places = network.nodes[node].component.places
+        assert places.gateway == network.location(0)
+        assert places.good == network.location(node - 1)
+
+
+def test_a_mesh_with_a_key_repairs_itself():
+    network = line(4)
+    network.run_for(30.0)
+    network.power(1, False)
+    assert network.run_until(network.all_connected, within_s=180.0)
+
+
+def test_orders_get_replies_and_messages_arrive():
+    network = line(4, node_keys)
+    network.run_for(30.0)
+    ticket = network.send(0, 3, b"x" * 1000)
+    assert network.run_until(lambda: ticket.state.name == "DELIVERED", within_s=10.0)
+
+
+def test_two_keys_are_two_meshes(caplog):
+    caplog.set_level(logging.WARNING)
+    network = line(4, lambda node: KEY if node < 2 else OTHER_KEY)
+    network.run_for(60.0)
+    assert [network.connected(node) for node in range(4)] == [True, True, False, False]
+    assert (
+        "node 1: a neighbour, node 2, sends packets that this key does not open: "
+        "other mesh or other key?" in caplog.text
+    )
+
+
+def test_a_node_without_a_key_is_named(caplog):
+    caplog.set_level(logging.WARNING)
+    network = line(2)
+    network.run_for(10.0)
+    for _ in range(5):
+        network.inject(1, packet("07 07 03 01 fe 00 01"))
+        network.run_for(10.0)
+    assert "node 7, sends packets without a seal: it has no key" in caplog.text
+
+
+def test_replayed_packets_show_in_the_log(caplog):
+    caplog.set_level(logging.WARNING)
+    network = line(2)
+    heard = []
+    network.run_for(5.0)
+    receive = network.nodes[1].receiver.on_msg
+    network.nodes[1].receiver.on_msg = lambda *it: (heard.append(it[0]), receive(*it))
+    network.run_for(20.0)
+    for _ in range(5):
+        network.inject(1, heard[0])
+        network.run_for(10.0)
+    assert "node 1: packets that node 0 did not send now: replayed or forged" in caplog.text
+    assert network.all_connected()
+
+
+@pytest.mark.parametrize("restarted", [0, 1, 2])
+def test_a_restarted_node_is_back_within_a_check_period(restarted):
+    network = line(4, node_keys)
+    network.run_for(30.0)
+    network.restart(restarted)
+    network.run_for(1.0)
+    assert network.run_until(network.all_connected, within_s=20.0)
+    assert "other key" not in str([counts(network, node) for node in range(4)])
+
+
+def test_a_neighbour_without_power_for_long_is_believed_again():
+    network = line(3)
+    network.run_for(20.0)
+    network.power(2, False)
+    network.run_for(120.0)
+    network.power(2, True)
+    assert network.run_until(network.all_connected, within_s=15.0)
+
+
+def test_no_function_of_the_antenna_below_is_forgotten():
+    public = {name for name in vars(IWirelessCommunication) if not name.startswith("_")}
+    public |= {name for name in vars(IMeshNetwork) if not name.startswith("_")}
+    assert public <= set(vars(SealedAntenna))
+
+
+def test_without_a_key_there_is_no_layer():
+    network = line(2, key=None)
+    network.run_for(1.0)
+    assert network.nodes[0].receiver is network.nodes[0].component

@@ -1,0 +1,74 @@
+"""What strangers do to a mesh (docs/security.md, "Attacks")."""
+
+from __future__ import annotations
+
+import functools
+
+import pytest
+
+from drone_mesh.lab.attacks import ATTACKS, RECORDING
+from drone_mesh.lab.command import main
+from drone_mesh.lab.damage import Case, table, trial
+
+# Of what an attack may not have effects: what the scenario costs by itself differs a little with
+# the moments at which packets travel.
+SLACK = 0.05
+
+
+@functools.lru_cache(maxsize=None)
+def without_attack(name):
+    return trial(name, Case.NOBODY, seed=0)
+
+
+@pytest.mark.parametrize("name", ATTACKS)
+def test_no_stranger_harms_a_mesh_with_a_key(name):
+    quiet = without_attack(name)
+    attacked = trial(name, Case.WITH_KEY, seed=0)
+    assert attacked.lured == 0
+    assert attacked.cut_off <= quiet.cut_off + SLACK
+    assert attacked.later <= quiet.later
+
+
+@pytest.mark.parametrize(
+    "name", ["forged order to the gateway", "forged orders to all", "MISSING storm"]
+)
+def test_without_a_key_one_stranger_cuts_most_nodes_off(name):
+    assert trial(name, Case.WITHOUT_KEY, seed=0).cut_off > 0.5
+
+
+@pytest.mark.parametrize("name", ["forged order to the gateway", "forged orders to all"])
+def test_without_a_key_a_stranger_sends_drones_kilometres_away(name):
+    assert trial(name, Case.WITHOUT_KEY, seed=0).metres > 6000
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "forged order to the gateway",
+        "forged orders to all",
+        "false gateway",
+        "MISSING storm",
+        "far place and an outage",
+    ],
+)
+def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):
+    quiet = without_attack(name)
+    attacked = trial(name, Case.CAPTURED, seed=0)
+    assert attacked.lured == 0
+    assert attacked.cut_off <= quiet.cut_off + SLACK
+
+
+def test_the_table_has_a_cell_for_each_case():
+    name = "order replayed after 1 s"
+    assert ATTACKS[name] in RECORDING
+    heading, _, row = table([name], runs=1)
+    assert heading == "| attack | no attack | without key | with key | captured node |"
+    cells = [cell.strip() for cell in row.split("|")[1:-1]]
+    assert cells[0] == name
+    assert all("later 0 %" in cell for cell in cells[1:4])
+    assert cells[4] == ""
+
+
+def test_an_unknown_attack_is_an_error_in_one_line(capsys):
+    assert main(["attack", "tickling"]) == 1
+    assert "unknown attack 'tickling': use one of forged order" in capsys.readouterr().err
