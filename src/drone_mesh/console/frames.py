@@ -39,6 +39,7 @@ EVENTS_KEPT = 1000  # our choice: more than a person scrolls back
 EVENTS_PER_FRAME = 300  # of a burst of thousands only the newest are read
 SAMPLES_KEPT = 600  # ten minutes
 SAMPLE_PERIOD_S = 1.0  # wall time
+NOTHING_MORE: Mapping[int, Mapping[str, Any]] = {}
 
 
 class FrameStore:
@@ -63,8 +64,16 @@ class FrameStore:
         self._obstacles_at = 0
         self._cache: dict[int, str] = {}
 
-    def update_mesh(self, mesh: MeshStatus, wall_s: float) -> None:
-        """Take over the mesh as it is now. `wall_s`: seconds of wall time."""
+    def update_mesh(
+        self,
+        mesh: MeshStatus,
+        wall_s: float,
+        more: Mapping[int, Mapping[str, Any]] = NOTHING_MORE,
+    ) -> None:
+        """Take over the mesh as it is now.
+
+        `wall_s`: seconds of wall time; `more`: what only real nodes have, by node.
+        """
         self._next_version()
         if self._mesh is not None and mesh.stamp_s < self._mesh.stamp_s:
             self._forget_run()
@@ -94,7 +103,8 @@ class FrameStore:
         for node in mesh.nodes:
             fields = _fields(node, troubles.get(node.id))
             order = self._orders.words(node.id)
-            self._update_node(node.id, {**fields, "slot": slots.get(node.id), "order": order})
+            fields.update(slot=slots.get(node.id), order=order, **more.get(node.id, {}))
+            self._update_node(node.id, fields)
         for node_id, fields in self._links(mesh.nodes, wall_s).items():
             self._update_node(node_id, fields)
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:

@@ -49,6 +49,7 @@ SEND_TIMEOUT_S = 10.0
 MOST_PAGES = 32
 MOST_ORDERS_WAITING = 16  # per page
 ORDER_THREADS = 8
+ALL_ACTIONS = ("fly", "power", "layout", "speed", "demonstrate")
 COOKIE = "drone_mesh_token"
 POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1
 TRY_LATER = 1013  # registry of close codes of RFC 6455
@@ -126,8 +127,10 @@ class ConsoleServer:
         access: Access,
         layouts: Sequence[tuple[int, str]] = (),
         demonstrate: bool = False,
+        actions: Sequence[str] = ALL_ACTIONS,
     ) -> None:
-        """`demonstrate`: show a repair as soon as a page is open."""
+        """`demonstrate`: show a repair as soon as a page is open; `actions`: what it offers."""
+        self._actions = actions
         self._store = store
         self._controls = controls
         self._layouts = layouts
@@ -201,6 +204,7 @@ class ConsoleServer:
         loop = asyncio.get_running_loop()
         try:
             hello = {"type": "hello", "layouts": list(self._layouts), "limits": LIMITS}
+            hello["actions"] = list(self._actions)
             await self._send(page, json.dumps(hello))
             # wait_for may swallow a cancellation that comes as a send ends (before Python 3.12).
             while page in self._pages:

@@ -54,7 +54,8 @@ def test_each_option_reaches_what_it_is_for():
     line = (
         "--id 253 --spi 1.2 --spi-hz 1000000 --ce 22 --irq 24 --channel 76 --rate 2M --crc 8 "
         "--power -12 --broadcast shockburst "
-        "--check-period 5 --connection-lost-after 60 --report-period 45 --latitude 10 --longitude -20.5 "
+        "--check-period 5 --connection-lost-after 60 --report-period 45 "
+        "--latitude 10 --longitude -20.5 "
         "--height 3 --log-level debug --repair home --clearance 3 "
         "--routing drone_mesh.communication.child_table_tree:"
         "ChildTableTree "

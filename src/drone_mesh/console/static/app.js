@@ -101,6 +101,10 @@ connection.addEventListener("change", showLink);
 mesh.addEventListener("layouts", () => {
   byId("layout").replaceChildren(...mesh.layouts.map(([number, name]) => new Option(name, number)));
   byId("layout-form").hidden = !mesh.layouts.length;
+  const offers = (action) => mesh.actions.includes(action);
+  byId("pause").hidden = byId("speed").parentElement.hidden = !offers("speed");
+  byId("power").hidden = !offers("power");
+  byId("demonstrate").hidden = !offers("demonstrate");
 });
 
 // Orders

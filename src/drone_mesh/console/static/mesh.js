@@ -22,6 +22,7 @@ export class Mesh extends EventTarget {
     this.clock = {};
     this.link = "";
     this.layouts = [];
+    this.actions = []; // what the server offers: "fly", "power", ...
     this.limits = { coordinate: Infinity, height: Infinity }; // of goals, m
     this.nodes = new Map(); // id -> node
     this.obstacles = []; // {corners: [[x, y]], top}, m
@@ -77,7 +78,8 @@ export class Mesh extends EventTarget {
     this.#notify("detail");
   }
 
-  applyHello({ layouts, limits }) {
+  applyHello({ layouts, limits, actions }) {
+    this.actions = actions;
     this.layouts = layouts;
     this.limits = limits;
     this.#notify("layouts");

@@ -54,6 +54,8 @@ export class NodePanel {
       ["Messages sent", String(node.total_messages)],
       ["Position", node.position ? node.position.map((m) => m.toFixed(2)).join(", ") : "–"],
       ...(node.channel ? [["Radio channel", node.channel, { wide: true }]] : []),
+      ...(node.earth ? [["Latitude, longitude, altitude", this.#earth(node), { wide: true }]] : []),
+      ...(node.drone ? [["Drone", node.drone, { wide: true }]] : []),
       ["Route", node.route.length ? node.route : "–", { glue: " › ", wide: true }],
       ["Neighbours, seconds since last heard", this.#neighbours(node), { glue: ", ", wide: true }],
     ];
@@ -81,7 +83,13 @@ export class NodePanel {
 
   #neighbours(node) {
     if (!node.neighbours) return "–";
-    return this.mesh.detail?.node === node.id ? this.mesh.detail.neighbours : "…";
+    if (this.mesh.detail?.node !== node.id) return "…";
+    const known = this.mesh.detail.neighbours;
+    return known.length ? known : String(node.neighbours); // a real node reports their number
+  }
+
+  #earth({ earth: [latitude, longitude, altitude] }) {
+    return `${latitude.toFixed(6)}°, ${longitude.toFixed(6)}°, ${altitude.toFixed(1)} m`;
   }
 
   /** `value` is a text, a list of ids, or a list of [id, age]; ids become buttons that select the node. */

@@ -1,0 +1,88 @@
+"""GatewayClient: a real gateway over HTTP, and the page's orders carried out there."""
+
+from __future__ import annotations
+
+import json
+import urllib.error
+import urllib.request
+from typing import Any
+
+from drone_mesh.console.orders import OrderRefused
+from drone_mesh.errors import MeshError
+
+ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two seconds
+
+
+class GatewayGone(MeshError):
+    """The gateway does not answer, or not as a gateway does; the text says how."""
+
+
+class GatewayClient:
+    """One gateway. Any thread: each request has a connection of its own."""
+
+    def __init__(self, url: str, token: str = "") -> None:
+        """`url` as in http://pi:9080; `token`: the gateway's, if it has one."""
+        self.url = url.rstrip("/")
+        self._token = token
+
+    def mesh(self, after: int) -> dict[str, Any]:
+        """What it knows, with the events after this number. Raises GatewayGone."""
+        answer = self._ask("GET", f"/mesh?after={after}")
+        if not isinstance(answer, dict) or "nodes" not in answer:
+            raise GatewayGone(f"{self.url} is not a gateway of this version")
+        return answer
+
+    def order(self, drone: int, latitude: float, longitude: float, height: int) -> None:
+        """Send a drone to a place. Raises GatewayGone, with the gateway's reason."""
+        body = {"latitude": latitude, "longitude": longitude, "height": height}
+        self._ask("POST", f"/drones/{drone}/goal", json.dumps(body).encode())
+
+    def _ask(self, method: str, path: str, body: bytes | None = None) -> Any:
+        request = urllib.request.Request(f"{self.url}{path}", body, method=method)
+        if body is not None:
+            request.add_header("Content-Type", "application/json")
+        if self._token:
+            request.add_header("Authorization", f"Bearer {self._token}")
+        try:
+            with urllib.request.urlopen(request, timeout=ANSWER_WITHIN_S) as answer:
+                return json.load(answer)
+        except urllib.error.HTTPError as error:
+            raise GatewayGone(_reason(error)) from error
+        except (OSError, ValueError) as error:
+            raise GatewayGone(f"no answer from {self.url}: {error}") from error
+
+
+def _reason(error: urllib.error.HTTPError) -> str:
+    try:
+        return str(json.load(error)["detail"])
+    except (ValueError, KeyError, TypeError):
+        return str(error)
+
+
+class GatewayControls:
+    """The MeshControls of a real mesh: it flies drones; nothing else can be ordered from afar."""
+
+    ACTIONS = ("fly",)
+
+    def __init__(self, client: GatewayClient) -> None:
+        self._client = client
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:
+        """Order a drone to a place, through the mesh."""
+        try:
+            self._client.order(node, y, x, round(z))
+        except GatewayGone as error:
+            raise OrderRefused(str(error)) from error
+        return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
+
+    def power(self, node: int, on: bool) -> str:
+        """Refused."""
+        raise OrderRefused("a real node is switched at its battery")
+
+    def layout(self, case: int) -> str:
+        """Refused."""
+        raise OrderRefused("layouts are for the simulation")
+
+    def speed(self, paused: bool, factor: float) -> str:
+        """Refused."""
+        raise OrderRefused("real time has one speed")

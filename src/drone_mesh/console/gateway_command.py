@@ -1,0 +1,121 @@
+"""The program drone_mesh_console: the web console of a real mesh. Needs no ROS."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import secrets
+import signal
+import socket
+import sys
+import time
+from functools import partial
+from typing import Mapping, Sequence
+
+from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
+from drone_mesh.console.real_mesh import events_of, real_mesh
+from drone_mesh.console.runner import ConsoleRunner
+from drone_mesh.console.server import ConsoleServer
+from drone_mesh.errors import MeshError
+from drone_mesh.stopping import StopRequest
+from drone_mesh.web.access import access_for, is_loopback
+
+ASK_PERIOD_S = 1.0  # our choice
+GATEWAY_TOKEN = "DRONE_MESH_TOKEN"  # as of the gateway
+PAGE_TOKEN = "DRONE_MESH_CONSOLE_TOKEN"
+
+
+class GatewayFeed:
+    """Asks the gateway once a second, and passes what it answers to the store. One thread."""
+
+    def __init__(self, client: GatewayClient, store: FrameStore, runner: ConsoleRunner) -> None:
+        self._client = client
+        self._store = store
+        self._runner = runner
+        self._seen = 0  # number of the last event
+        self._uptime_s = 0.0
+
+    def ask(self) -> None:
+        """Once. A gateway that does not answer is shown in the page."""
+        try:
+            answer = self._client.mesh(self._seen)
+            mesh, more = real_mesh(answer)
+            events = events_of(answer)
+            last = max((int(event["number"]) for event in answer["events"]), default=self._seen)
+        except GatewayGone as error:
+            self._runner.in_loop(partial(self._store.set_link, str(error)))
+            return
+        except (KeyError, TypeError, ValueError) as error:
+            text = f"{self._client.url}: invalid answer: {error!r}"
+            self._runner.in_loop(partial(self._store.set_link, text))
+            return
+        if mesh.stamp_s < self._uptime_s:  # restarted: its events count from 1 again
+            self._seen, last, events = 0, 0, []
+        self._seen, self._uptime_s = last, mesh.stamp_s
+
+        def take() -> None:
+            self._store.update_mesh(mesh, time.monotonic(), more)
+            if events:
+                self._store.add_events(events)
+
+        self._runner.in_loop(take)
+
+
+def main(
+    arguments: Sequence[str] | None = None, environment: Mapping[str, str] = os.environ
+) -> int:
+    """Run until Ctrl-C or SIGTERM; the exit status."""
+    parser = argparse.ArgumentParser(
+        "drone_mesh_console",
+        description="The web console of a real mesh: shows what its gateway knows, and orders "
+        f"drones through it. {GATEWAY_TOKEN}: the gateway's token, if it has one; {PAGE_TOKEN}: "
+        "that of the page (default with --bind: a random one, which is printed).",
+    )
+    parser.add_argument(
+        "--gateway", required=True, metavar="URL", help="of the gateway, as in http://pi:9080"
+    )
+    parser.add_argument(
+        "--bind", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--port", type=int, default=8080, help="TCP port (default: %(default)s; 0: any free one)"
+    )
+    options = parser.parse_args(arguments)
+    if not options.gateway.startswith(("http://", "https://")):
+        parser.error(f"--gateway {options.gateway}: must begin with http:// or https://")
+    logging.basicConfig(format="%(levelname)s %(message)s", level="INFO")
+    token = environment.get(PAGE_TOKEN, "")
+    if not token and not is_loopback(options.bind):
+        token = secrets.token_urlsafe(18)
+    with StopRequest() as stop:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: stop.make())
+        try:
+            client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
+            _serve(client, options.bind, options.port, token, stop)
+        except MeshError as error:
+            print(f"drone_mesh_console: {error}", file=sys.stderr)
+            return 1
+    return 0
+
+
+def _serve(client: GatewayClient, address: str, port: int, token: str, stop: StopRequest) -> None:
+    store = FrameStore()
+    controls = GatewayControls(client)
+    server = ConsoleServer(
+        store, controls, access_for(address, token), actions=GatewayControls.ACTIONS
+    )
+    runner = ConsoleRunner(server, address, port)
+    runner.start()
+    name = socket.gethostname() if address in ("0.0.0.0", "::") else address
+    name = f"[{name}]" if ":" in name else name
+    print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
+    feed = GatewayFeed(client, store, runner)
+    try:
+        feed.ask()
+        while not stop.wait(ASK_PERIOD_S):
+            feed.ask()
+    finally:
+        runner.stop()

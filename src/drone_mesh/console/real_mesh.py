@@ -1,0 +1,94 @@
+"""A real mesh as the page shows it, from what its gateway answers to GET /mesh."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, Mapping
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.model import UNKNOWN_POSITION, EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.routes import route_to_gateway
+
+REPORTS_MISSING_S = 75.0  # our choice: two reports of the default period, and a half
+
+More = Dict[int, Dict[str, Any]]
+"""What only real nodes have, by node: fields for the page."""
+
+
+def real_mesh(answer: Mapping[str, Any]) -> tuple[MeshStatus, More]:
+    """The mesh, and what a MeshStatus has no field for.
+
+    Raises KeyError, TypeError or ValueError for anything but such an answer.
+    """
+    gateway = int(answer["gateway"])
+    nodes = [_node(entry, gateway) for entry in answer["nodes"]]
+    by_id = {node.id: node for node in nodes}
+    for node in nodes:
+        node.route = route_to_gateway(node.id, by_id)
+    mesh = MeshStatus(
+        float(answer["uptime_s"]), nodes, max_distance=0.0, achieved_real_time_factor=1.0
+    )
+    return mesh, {int(entry["id"]): _more(entry) for entry in answer["nodes"]}
+
+
+def events_of(answer: Mapping[str, Any]) -> list[EventRecord]:
+    """The events in the answer, oldest first."""
+    return [
+        EventRecord(
+            float(event["t"]),
+            int(event["node"]),
+            event["kind"],
+            tuple(event["peers"]),
+            event["detail"],
+        )
+        for event in answer["events"]
+    ]
+
+
+def _node(entry: Mapping[str, Any], gateway: int) -> NodeStatus:
+    place, age_s = entry["place"], entry["heard_s_ago"]
+    is_silent = age_s is None or age_s > REPORTS_MISSING_S
+    node = NodeStatus(
+        int(entry["id"]),
+        role=Role.GATEWAY if entry["role"] == "gateway" else Role.ROUTER,
+        on=bool(entry["on"]),
+        connected=bool(entry["connected"]),
+        gateway=gateway if entry["connected"] else NO_ROUTE,
+        hops=_or_none(entry["hops"]),
+        next_hop=_or_none(entry["next_hop"]),
+        neighbours=bytes(entry.get("neighbours", ())),
+        neighbour_ages=bytes(len(entry.get("neighbours", ()))),
+        report_age=(age_s or REPORTS_MISSING_S) if is_silent else 0.0,
+        total_messages=int(entry.get("messages_sent", 0)),
+        tries=float(entry.get("tries", 0.0)),
+    )
+    if place is not None:
+        latitude, longitude, height = place
+        node.position = (longitude, latitude, height)
+    else:
+        node.position = UNKNOWN_POSITION
+    if entry.get("flying") and place is not None:
+        node.path = tuple(node.position)  # its goal is not reported
+    return node
+
+
+def _more(entry: Mapping[str, Any]) -> dict[str, Any]:
+    more: dict[str, Any] = {"earth": entry["earth"], "drone": _drone_in_words(entry)}
+    if "neighbour_count" in entry:
+        more["neighbours"] = int(entry["neighbour_count"])
+    return more
+
+
+def _drone_in_words(entry: Mapping[str, Any]) -> str:
+    if not entry["reported"]:
+        return "has not reported yet"
+    battery = entry["battery_percent"]
+    words = [] if battery is None else [f"battery {battery:.0f} %"]
+    if entry["flying"]:
+        words.append("in flight")
+    words.append(f"cannot fly: {entry['why_not_fly']}" if entry["why_not_fly"] else "can fly")
+    return ", ".join(words)
+
+
+def _or_none(value: int | None) -> int:
+    return NO_ROUTE if value is None else int(value)

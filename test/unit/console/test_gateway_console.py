@@ -1,0 +1,170 @@
+"""The console of a real mesh: what it asks of the gateway, and what it does with the answers."""
+
+from __future__ import annotations
+
+import json
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
+import pytest
+
+from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
+from drone_mesh.console.gateway_command import GatewayFeed, main
+from drone_mesh.console.orders import OrderRefused
+
+NODE = {
+    "id": 0,
+    "role": "gateway",
+    "on": True,
+    "connected": True,
+    "hops": 0,
+    "next_hop": 0,
+    "heard_s_ago": 0.0,
+    "reported": True,
+    "neighbours": [],
+    "battery_percent": None,
+    "flying": False,
+    "why_not_fly": "",
+    "place": [1.0, 2.0, 0.0],
+    "earth": [52.0, 5.0, 3.0],
+}
+EVENT = {"number": 7, "t": 1.5, "node": 0, "kind": "started", "peers": [], "detail": ""}
+MESH = {"gateway": 0, "uptime_s": 60.0, "nodes": [NODE], "events": [EVENT]}
+
+
+class Gateway(HTTPServer):
+    """Answers with what the test says, and keeps the requests."""
+
+    def __init__(self):
+        self.requests = []
+        self.status, self.answer = 200, MESH
+        super().__init__(("127.0.0.1", 0), Handler)
+        self.url = f"http://127.0.0.1:{self.server_port}"
+
+
+class Handler(BaseHTTPRequestHandler):
+    server: Gateway
+
+    def do_GET(self):
+        length = int(self.headers.get("Content-Length", 0))
+        body = self.rfile.read(length).decode()
+        sender = self.headers.get("Authorization", "")
+        self.server.requests.append((self.command, self.path, body, sender))
+        text = json.dumps(self.server.answer).encode()
+        self.send_response(self.server.status)
+        self.send_header("Content-Length", str(len(text)))
+        self.end_headers()
+        self.wfile.write(text)
+
+    do_POST = do_GET
+
+    def log_message(self, *_arguments):
+        pass
+
+
+@pytest.fixture
+def gateway():
+    server = Gateway()
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+    thread.start()
+    yield server
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+class PromptRunner:
+    """Does at once what is for the loop."""
+
+    def in_loop(self, function):
+        function()
+
+
+def frame(store):
+    return json.loads(store.frame_since(0))
+
+
+def test_each_question_is_for_the_events_after_the_last_one(gateway):
+    store = FrameStore()
+    feed = GatewayFeed(GatewayClient(gateway.url, "secret"), store, PromptRunner())
+    feed.ask()
+    feed.ask()
+    assert gateway.requests == [
+        ("GET", "/mesh?after=0", "", "Bearer secret"),
+        ("GET", "/mesh?after=7", "", "Bearer secret"),
+    ]
+    shown = frame(store)
+    assert shown["nodes"]["0"]["earth"] == [52.0, 5.0, 3.0]
+    assert shown["nodes"]["0"]["position"] == [2.0, 1.0, 0.0]
+    assert shown["events"][0]["kind"] == "started"
+    assert shown["link"] == ""
+
+
+def test_a_gateway_that_was_restarted_is_asked_from_the_start(gateway):
+    feed = GatewayFeed(GatewayClient(gateway.url), FrameStore(), PromptRunner())
+    feed.ask()
+    gateway.answer = {**MESH, "uptime_s": 3.0, "events": []}
+    feed.ask()
+    feed.ask()
+    assert [path for _, path, _, _ in gateway.requests] == [
+        "/mesh?after=0",
+        "/mesh?after=7",
+        "/mesh?after=0",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("status", "answer", "said"),
+    [
+        (401, {"detail": "token missing"}, "token missing"),
+        (200, ["no mesh"], "is not a gateway of this version"),
+        (200, {**MESH, "nodes": [{}]}, "invalid answer"),
+        (200, {**MESH, "gateway": None}, "invalid answer"),
+    ],
+)
+def test_a_gateway_that_does_not_answer_well_is_named_in_the_page(gateway, status, answer, said):
+    gateway.status, gateway.answer = status, answer
+    store = FrameStore()
+    GatewayFeed(GatewayClient(gateway.url), store, PromptRunner()).ask()
+    assert said in frame(store)["link"]
+
+
+def test_no_gateway_at_all_is_named_in_the_page():
+    store = FrameStore()
+    GatewayFeed(GatewayClient("http://127.0.0.1:1"), store, PromptRunner()).ask()
+    assert frame(store)["link"].startswith("no answer from http://127.0.0.1:1")
+
+
+def test_an_order_of_the_page_is_posted_and_a_refusal_comes_back(gateway):
+    controls = GatewayControls(GatewayClient(gateway.url))
+    assert controls.fly(3, 1.5, -2.0, 4.0) == "ordered drone 3 to x 1.5, y -2, z 4 m"
+    method, path, body, _ = gateway.requests[0]
+    assert (method, path) == ("POST", "/drones/3/goal")
+    assert json.loads(body) == {"latitude": -2.0, "longitude": 1.5, "height": 4}
+    gateway.status, gateway.answer = 503, {"detail": "no route to drone 3"}
+    with pytest.raises(OrderRefused, match="no route to drone 3"):
+        controls.fly(3, 0.0, 0.0, 0.0)
+
+
+def test_what_is_for_a_simulation_is_refused():
+    controls = GatewayControls(GatewayClient("http://127.0.0.1:1"))
+    for refused in (
+        lambda: controls.power(1, True),
+        lambda: controls.layout(0),
+        lambda: controls.speed(True, 1.0),
+    ):
+        with pytest.raises(OrderRefused):
+            refused()
+
+
+def test_an_error_page_without_a_reason_is_named_by_its_status(gateway):
+    gateway.status, gateway.answer = 500, "oops"
+    with pytest.raises(GatewayGone, match="500"):
+        GatewayClient(gateway.url).mesh(0)
+
+
+def test_an_address_that_is_none_ends_the_program_with_a_reason(capsys):
+    with pytest.raises(SystemExit):
+        main(["--gateway", "pi:9080"], {})
+    assert "must begin with http:// or https://" in capsys.readouterr().err
