@@ -108,6 +108,11 @@ class EmulatedFleet:
                 self.air.move(node_id, place)
 
     @property
+    def origin(self) -> Origin | None:
+        """Where the frame of the drones lies on the earth; None: they have none."""
+        return self._flight.origin
+
+    @property
     def vehicles(self) -> list[MavlinkVehicle]:
         """The simulated vehicles, by node id; none on the ground."""
         return self._server.vehicles if self._server is not None else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import logging
 import signal
 import sys
@@ -156,6 +157,9 @@ def _emulated_fleet(options: Options, stack: contextlib.ExitStack) -> EmulatedFl
 
 def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     _log.info("%d nodes on emulated radios; node 0 is the gateway", options.emulated)
+    options = dataclasses.replace(
+        options, flight=dataclasses.replace(options.flight, origin=fleet.origin)
+    )
     events = EventHistory()
     make_internet = (_internet(options) if options.gateway else None) or without_internet
     return [
