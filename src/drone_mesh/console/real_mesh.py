@@ -60,7 +60,6 @@ def _node(entry: Mapping[str, Any], gateway: int) -> NodeStatus:
         neighbour_ages=bytes(len(entry.get("neighbours", ()))),
         report_age=(age_s or REPORTS_MISSING_S) if is_silent else 0.0,
         total_messages=int(entry.get("messages_sent", 0)),
-        tries=float(entry.get("tries", 0.0)),
     )
     if place is not None:
         latitude, longitude, height = place
@@ -73,7 +72,14 @@ def _node(entry: Mapping[str, Any], gateway: int) -> NodeStatus:
 
 
 def _more(entry: Mapping[str, Any]) -> dict[str, Any]:
-    more: dict[str, Any] = {"earth": entry["earth"], "drone": _drone_in_words(entry)}
+    tries = float(entry.get("tries", 0.0))
+    more: dict[str, Any] = {
+        "earth": entry["earth"],
+        "drone": _drone_in_words(entry),
+        "channel": f"{tries:.1f} tries per packet" if tries else "",
+        "known_nodes": None,  # not reported, as the next one
+        "total_messages": entry.get("messages_sent"),
+    }
     if "neighbour_count" in entry:
         more["neighbours"] = int(entry["neighbour_count"])
     return more

@@ -29,13 +29,13 @@ const COLUMNS = [
     name: "Known",
     title: "Known nodes; one known through two neighbours counts twice",
     sort: (n) => n.known_nodes,
-    text: (n) => String(n.known_nodes),
+    text: (n) => String(n.known_nodes ?? "–"),
   },
   {
     name: "Sent",
     title: "Messages sent successfully",
     sort: (n) => n.total_messages,
-    text: (n) => String(n.total_messages),
+    text: (n) => String(n.total_messages ?? "–"),
   },
   {
     name: "Fallback",
