@@ -54,7 +54,8 @@ class GatewayClient:
 
 def _reason(error: urllib.error.HTTPError) -> str:
     try:
-        return str(json.load(error)["detail"])
+        with error:
+            return str(json.load(error)["detail"])
     except (ValueError, KeyError, TypeError):
         return str(error)
 
