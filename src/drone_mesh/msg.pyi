@@ -30,6 +30,11 @@ class FlightOrderAnswer(Message):
     outcome: int
     def __init__(self, gateway: int = ..., drone: int = ..., outcome: int = ...) -> None: ...
 
+class GroundedDrones(Message):
+    ids: bytes
+    reasons: Sequence[str]
+    def __init__(self, ids: bytes | Sequence[int] = ..., reasons: Sequence[str] = ...) -> None: ...
+
 class HostReport(Message):
     header: std_msgs.msg.Header
     host: str
@@ -153,6 +158,9 @@ class NodeState(Message, NodeStatus):
     bid: float
     place_of: int
     emergency_in: float
+    battery: float
+    crashed: bool
+    why_not_fly: str
     repair: str
     def __init__(
         self,
@@ -180,6 +188,9 @@ class NodeState(Message, NodeStatus):
         bid: float = ...,
         place_of: int = ...,
         emergency_in: float = ...,
+        battery: float = ...,
+        crashed: bool = ...,
+        why_not_fly: str = ...,
         repair: str = ...,
     ) -> None: ...
 

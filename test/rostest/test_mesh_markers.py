@@ -73,8 +73,10 @@ class MeshMarkersTest(unittest.TestCase):
         wait_for(
             "a standing frame and a lamp for each",
             WALL_LIMIT_S,
-            lambda: (self.meshes("frames"), self.meshes("lamps"))
-            == (["standing.obj"] * 3, ["gateway_lamp.obj"] + ["router_lamp.obj"] * 2),
+            lambda: (
+                (self.meshes("frames"), self.meshes("lamps"))
+                == (["standing.obj"] * 3, ["gateway_lamp.obj"] + ["router_lamp.obj"] * 2)
+            ),
         )
         legend = [m.text for (name, _), m in self.markers.items() if name == "legend"]
         self.assertIn("disconnected", legend)

@@ -51,7 +51,8 @@ def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedP
 def record_in_an_older_definition(path: Path) -> None:
     """A bag with one state, of a MeshState without its newer fields."""
     newer = (
-        r"(float32 (airtime|tries)|uint16 queue|uint32 given_up|string \w+|Obstacle\[\] \w+) .*\n"
+        r"(float32 (airtime|tries|battery)|uint16 queue|uint32 given_up|bool crashed|string \w+"
+        r"|Obstacle\[\] \w+) .*\n"
     )
     definition = re.sub(newer, "", MeshState._full_text)
     older = genpy.dynamic.generate_dynamic("drone_mesh/MeshState", definition)

@@ -29,6 +29,11 @@ class MeshEventKind(enum.Enum):
     FLIGHT_DECIDED = "flight decided"  # peer: the node whose place it takes
     FLIGHT_ORDERED = "flight ordered"  # peer: the creator of the order
     LANDED = "landed"
+    # Of the drone, reported by its world
+    CRASHED = "crashed"
+    BATTERY_LOW = "battery low"
+    BATTERY_EMPTY = "battery empty"
+    GOAL_REFUSED = "goal refused"  # detail: why
     # What a gateway knows of an order; peer: its drone, detail: its number, and why
     ORDER_SENT = "order sent"
     ORDER_ACCEPTED = "order accepted"

@@ -13,6 +13,7 @@ far its latest order has come, and the links it has with nodes of higher ids.
 from __future__ import annotations
 
 import json
+import math
 from collections import deque
 from dataclasses import asdict
 from typing import Any, Iterable, Mapping, Sequence
@@ -241,6 +242,8 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "position": _centimetres(node.position) if position_is_known(node) else None,
         "path": _centimetres(node.path),
         "repair": node.repair,
+        "battery": round(node.battery) if math.isfinite(node.battery) else None,
+        "why_not_fly": node.why_not_fly,
         "channel": channel_in_words(node),
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,

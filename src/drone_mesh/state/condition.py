@@ -13,6 +13,7 @@ class Condition(enum.Enum):
     """What one can expect of a node now. The value is the word that people see."""
 
     CONNECTED = "connected"
+    CRASHED = "crashed"  # its drone never flies again; its node may go on working
     FLYING = "flying"
     DISCONNECTED = "disconnected"  # on, and looking for a gateway
     OFF = "off"
@@ -20,11 +21,13 @@ class Condition(enum.Enum):
 
 
 def condition_of(node: NodeStatus) -> Condition:
-    """The first of these that holds: silent, off, flying, connected; else disconnected."""
+    """The first that holds: silent, off, crashed, flying, connected; else disconnected."""
     if node.report_age >= SILENT_AFTER_S:
         return Condition.SILENT
     if not node.on:
         return Condition.OFF
+    if node.crashed:
+        return Condition.CRASHED
     if len(node.path):
         return Condition.FLYING
     return Condition.CONNECTED if node.connected else Condition.DISCONNECTED

@@ -48,6 +48,9 @@ class NodeStatus:
     bid: float = NO_BID
     place_of: int = NO_ROUTE
     emergency_in: float = math.inf  # simulated s
+    battery: float = math.nan  # percent; NaN: none, or not known
+    crashed: bool = False
+    why_not_fly: str = ""  # why its drone would not fly now; empty: it would, or not known
     repair: str = ""  # what it does about a lost connection, and why; empty: nothing to repair
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Iterable, Sequence
 
@@ -17,6 +18,9 @@ class DroneView:
     role: int
     position: Sequence[float]  # (3,) m, map frame, of the underside
     path: Sequence[float] = ()  # (3 * waypoints,) m, the rest of its flight; empty: none
+    battery: float = math.nan  # percent; NaN: it has none
+    crashed: bool = False
+    why_not_fly: str = ""  # empty: it would fly
 
 
 class MeshRoster:
@@ -48,14 +52,18 @@ class MeshRoster:
     def snapshot(self, drones: Iterable[DroneView], wall_s: float) -> list[NodeStatus]:
         """All nodes by id, with positions, paths, routes and report ages filled in.
 
-        A drone that no host has reported yet is listed as switched off. The objects are the merged
-        ones: the next call changes them.
+        A drone that no host has reported yet, or whose battery is empty, is listed as switched off.
+        The objects are the merged ones: the next call changes them.
         """
         views = {drone.id: drone for drone in drones}
         for node in self._nodes.values():
             view = views.get(node.id)
             node.position = view.position if view else UNKNOWN_POSITION
             node.path = view.path if view else ()
+            if view is not None:
+                node.battery, node.crashed = view.battery, view.crashed
+                node.why_not_fly = view.why_not_fly
+                node.on = node.on and view.battery != 0.0
             node.route = route_to_gateway(node.id, self._nodes)
             node.report_age = wall_s - self._heard_at_s[node.id]
         unreported = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 from typing import Sequence
 
@@ -49,14 +50,21 @@ def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
                 Trouble(node.id, Severity.STALE, f"no report for {node.report_age:.0f} s")
             )
         elif condition is Condition.OFF:
-            troubles.append(Trouble(node.id, Severity.WARN, "switched off"))
+            text = "battery empty" if node.battery == 0.0 else "switched off"
+            troubles.append(Trouble(node.id, Severity.WARN, text))
         elif not node.connected:
             text = "flying" if condition is Condition.FLYING else "not connected to a gateway"
+            if node.crashed:
+                text = f"crashed, {text}"
             troubles.append(Trouble(node.id, Severity.ERROR, text))
+        elif node.crashed:
+            troubles.append(Trouble(node.id, Severity.WARN, "crashed"))
         elif node.role == Role.ROUTER and not reaches_gateway(node.route, by_id):
             route = " > ".join(map(str, node.route))
             text = f"its route breaks off: {route}" if route else "no route to a gateway"
             troubles.append(Trouble(node.id, Severity.WARN, text))
+        elif node.why_not_fly and math.isfinite(node.battery):
+            troubles.append(Trouble(node.id, Severity.WARN, f"cannot fly: {node.why_not_fly}"))
     return troubles
 
 
@@ -78,6 +86,9 @@ def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summa
     silent = sum(condition is Condition.SILENT for condition in conditions.values())
     if silent:
         parts.append(f"{silent} silent")
+    crashed = sum(node.crashed for node in nodes)
+    if crashed:
+        parts.append(f"{crashed} crashed")
     worst = max((trouble.severity for trouble in troubles), default=Severity.OK)
     return Summary(worst, ", ".join(parts))
 

@@ -24,6 +24,7 @@ class Palette:
     disconnected: Colour
     off: Colour
     silent: Colour
+    crashed: Colour
     known: Colour
     obstacle: Colour
     # of what surrounds them
@@ -58,13 +59,13 @@ class Palette:
 
 LIGHT = Palette(
     gateway="#6d3fd1", connected="#08794f", flying="#a85400", disconnected="#c8231a",
-    off="#646b76", silent="#7d6512", known="#b4bfce", obstacle="#c9beab",
+    off="#646b76", silent="#7d6512", crashed="#a8177f", known="#b4bfce", obstacle="#c9beab",
     page="#f3f5f8", card="#ffffff", hover="#eef2f9", line="#dde2e9", grid="#e7ebf1",
     ink="#18212d", muted="#5d6878", accent="#2458d3", accent_ink="#ffffff",
 )  # fmt: skip
 DARK = Palette(
     gateway="#b193ff", connected="#3ecf95", flying="#ffb14a", disconnected="#ff7b72",
-    off="#939aa5", silent="#d9bf6b", known="#3c4859", obstacle="#8a7f6d",
+    off="#939aa5", silent="#d9bf6b", crashed="#ff7fd0", known="#3c4859", obstacle="#8a7f6d",
     page="#0d1116", card="#161b22", hover="#1e2630", line="#2a323d", grid="#1d242e",
     ink="#e4e9f0", muted="#97a2b2", accent="#6b9bff", accent_ink="#0d1116",
 )  # fmt: skip
@@ -90,6 +91,7 @@ _ANSI_OF_SEVERITY: Mapping[Severity, int] = {
     Severity.STALE: 35,  # magenta
 }
 _ANSI_OF_CONDITION: Mapping[Condition, int] = {
+    Condition.CRASHED: 95,
     Condition.FLYING: 33,
     Condition.DISCONNECTED: 31,
     Condition.OFF: 90,  # grey

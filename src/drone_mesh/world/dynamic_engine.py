@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 
+from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.route import Route
@@ -49,23 +50,32 @@ class DynamicEngine(DroneEngine):
         self._pushed: Vector | None = None  # speed that the last forces alone would have given
         self._trim: Vector = (0.0, 0.0, 0.0)
         self._stepped_s = world.now_s
-        self.battery_percent = 100.0
+        self._battery_percent = 100.0
         self._was_flat = False
-        self.crashed = False
+        self._crashed = False
         world.wake(self)
 
     def why_not_fly(self) -> str:
         """Crashed, or out of battery; empty while it can fly."""
-        if self.crashed:
+        if self._crashed:
             return "crashed"
-        if self.battery_percent <= LAND_AT_PERCENT:
-            return f"battery at {self.battery_percent:.0f} %"
+        if self._battery_percent <= LAND_AT_PERCENT:
+            return f"battery at {self._battery_percent:.0f} %"
         return ""
+
+    def battery_percent(self) -> float:
+        """0..100."""
+        return self._battery_percent
+
+    @property
+    def crashed(self) -> bool:
+        """Whether a hard hit has ended its flights."""
+        return self._crashed
 
     @property
     def is_flat(self) -> bool:
         """Whether the battery is empty."""
-        return self.battery_percent == 0.0
+        return self._battery_percent == 0.0
 
     def is_flying(self) -> bool:
         """Whether a flight is under way."""
@@ -88,7 +98,7 @@ class DynamicEngine(DroneEngine):
         while self._goals:
             self._begin(Location.from_vector(self._goals.popleft()), position, now_s)
         in_air = self._route is not None or self._hover is not None
-        if in_air and not self.crashed:
+        if in_air and not self._crashed:
             self._fly(position, passed_s)
         else:
             self._pushed = None
@@ -147,23 +157,27 @@ class DynamicEngine(DroneEngine):
         self._hover = None if stands else end
 
     def _use_battery(self, position: Vector, passed_s: float) -> None:
-        before = self.battery_percent
+        before = self._battery_percent
         self._drain(passed_s / self._limits.hover_s)
-        if before > LAND_AT_PERCENT >= self.battery_percent:
-            _log.warning("box %d: battery low, it lands", self._box)
+        if before > LAND_AT_PERCENT >= self._battery_percent:
+            self._note(MeshEventKind.BATTERY_LOW, "it lands")
             ground = Location.from_vector((position[0], position[1], self._half_height_m))
             here = Location.from_vector(position)
             self._route = Route(here, ground, here.height, lands=False, speed_m_s=SPEED_M_S)
             self._hover = None
-        elif self.battery_percent == 0.0:
+        elif self._battery_percent == 0.0:
             self._route = self._hover = None  # the motors stop
 
     def _drain(self, share: float) -> None:
-        self.battery_percent = max(0.0, self.battery_percent - 100.0 * share)
+        before = self._battery_percent
+        self._battery_percent = max(0.0, before - 100.0 * share)
+        if before > 0.0 == self._battery_percent:
+            self._note(MeshEventKind.BATTERY_EMPTY)
 
     def _look_for_hits(self, velocity: Vector) -> None:
         assert self._pushed is not None
         if math.dist(velocity, self._pushed) > self._limits.crash_m_s:
-            self.crashed = True
+            hit_m_s = math.dist(velocity, self._pushed)
+            self._crashed = True
             self._route = self._hover = None
-            _log.warning("box %d: crashed", self._box)
+            self._note(MeshEventKind.CRASHED, f"a hit of {hit_m_s:.1f} m/s")

@@ -6,6 +6,7 @@ import logging
 from collections import deque
 from typing import Callable, NamedTuple
 
+from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
@@ -31,6 +32,9 @@ class DroneState(NamedTuple):
 
 StateListener = Callable[[DroneState], None]
 """Is called in the world's thread, inside a step: be quick and do not step the world."""
+
+EngineObserver = Callable[[MeshEventKind, float, str], None]
+"""Is called like a StateListener, with what happened, the simulated time, and a few words."""
 
 
 class DroneEngine(IDroneEngine):
@@ -60,12 +64,26 @@ class DroneEngine(IDroneEngine):
         self._goals: deque[Vector] = deque()  # filled by any thread, emptied by the world's
         self._followed: Vector | None = None  # set by any thread, taken by the world's
         self._listeners: list[StateListener] = []
+        self._observers: list[EngineObserver] = []
         self._state = DroneState(centre, None, world.now_s)
 
     @property
     def state(self) -> DroneState:
         """The drone after the last step in which it moved."""
         return self._state
+
+    @property
+    def crashed(self) -> bool:
+        """Whether a hard hit has ended its flights for good."""
+        return False
+
+    def observe(self, observer: EngineObserver) -> None:
+        """Call `observer` when something happens to the drone. World's thread."""
+        self._observers.append(observer)
+
+    def _note(self, kind: MeshEventKind, detail: str = "") -> None:
+        for observer in self._observers:
+            observer(kind, self._world.now_s, detail)
 
     @property
     def is_flat(self) -> bool:

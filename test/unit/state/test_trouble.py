@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition, condition_of
 from drone_mesh.state.model import NodeStatus
 from drone_mesh.state.trouble import (
     Severity,
@@ -72,3 +73,23 @@ def test_a_route_that_breaks_off_is_a_warning():
 
 def test_a_mesh_without_nodes_is_stale():
     assert summarise([], []).severity == Severity.STALE
+
+
+def test_a_crashed_drone_is_a_warning_while_its_node_works_and_an_error_when_it_does_not():
+    nodes = [GATEWAY, router(1, crashed=True), router(2, crashed=True, connected=False)]
+    troubles = find_trouble(nodes)
+    assert [(t.node, t.severity, t.text) for t in troubles] == [
+        (1, Severity.WARN, "crashed"),
+        (2, Severity.ERROR, "crashed, not connected to a gateway"),
+    ]
+    assert summarise(nodes, troubles).text == "1 of 2 routers connected, 2 crashed"
+    assert condition_of(nodes[1]) is Condition.CRASHED
+
+
+def test_a_battery_is_named_when_it_is_low_and_when_it_is_empty():
+    low = router(1, battery=18.0, why_not_fly="battery at 18 %")
+    empty = router(2, battery=0.0, on=False)
+    assert [t.text for t in find_trouble([GATEWAY, low, empty])] == [
+        "cannot fly: battery at 18 %",
+        "battery empty",
+    ]

@@ -15,7 +15,8 @@ from drone_mesh.view.palette import DARK, LIGHT, Palette, css_variables, rgb
 
 PACKAGE = Path(drone_mesh.__file__).parent
 TEXT_COLOURS = (
-    "gateway", "connected", "flying", "disconnected", "off", "silent", "ink", "muted", "accent",
+    "gateway", "connected", "flying", "disconnected", "off", "silent", "crashed", "ink", "muted",
+    "accent",
 )  # fmt: skip
 COLOUR = r"(?<=[\"': ])#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b(?!\()"
 ENOUGH = 4.5  # WCAG 2.1, 1.4.3

@@ -101,8 +101,9 @@ def test_each_drone_is_where_it_stands_in_the_colour_of_its_condition(shoot):
         for i, condition in enumerate(Condition)
     ]
     assert len({drone.colour for drone in drones}) == len(drones)
-    pixels = shoot(drones)
-    camera = camera_of(drones)
+    size = (480, 320)
+    pixels = shoot(drones, size)
+    camera = camera_of(drones, size)
     for drone in drones:
         (place,) = camera.project([drone.centre()])
         assert share_of_colour(pixels, drone.colour, place, radius=3) > 0.5, drone

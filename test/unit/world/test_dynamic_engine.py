@@ -7,6 +7,7 @@ from typing import Iterator
 
 import pytest
 
+from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.body import BodyLimits, controller_force
@@ -59,10 +60,10 @@ def test_it_hovers_at_a_goal_in_the_air_and_uses_its_battery(world):
     engine = drone(world)
     engine.set_goal(3.0, 0.0, 4)
     run_until_arrived(world, engine)
-    before = engine.battery_percent
+    before = engine.battery_percent()
     run(world, 12.0)
     assert engine.get_location().distance_m(Location(3.0, 0.0, 4.0)) < 0.2
-    assert before - engine.battery_percent == pytest.approx(1.0, rel=0.01)  # 12 s of 1200
+    assert before - engine.battery_percent() == pytest.approx(1.0, rel=0.01)  # 12 s of 1200
 
 
 def test_speed_and_acceleration_have_limits(world):
@@ -105,6 +106,8 @@ def test_two_drones_that_meet_do_not_pass_through_each_other_and_a_hard_hit_ends
     still._hover = Location.from_vector((3.0, 0.0, 2.0))
     other = drone(world, 0.0, 0.0, 2.0, limits=fast)
     other._hover = Location.from_vector((12.0, 0.0, 2.0))  # straight through the first one
+    noted = []
+    other.observe(lambda kind, now_s, detail: noted.append((kind, detail)))
     nearest = math.inf
     for _ in range(600):
         world.step()
@@ -112,6 +115,9 @@ def test_two_drones_that_meet_do_not_pass_through_each_other_and_a_hard_hit_ends
     assert nearest > 0.19
     assert other.crashed
     assert other.why_not_fly() == "crashed"
+    ((kind, detail),) = noted
+    assert kind is MeshEventKind.CRASHED
+    assert detail.startswith("a hit of ")
     with pytest.raises(GoalRefused, match="crashed"):
         other.set_goal(1.0, 1.0, 1)
     run(world, 5.0)
@@ -123,7 +129,7 @@ def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world)
     engine.set_goal(0.0, 0.0, 5)
     run_until_arrived(world, engine)
     run(world, 80.0)
-    assert engine.battery_percent <= LAND_AT_PERCENT
+    assert engine.battery_percent() <= LAND_AT_PERCENT
     place = engine.get_location()
     assert place.height < 0.05
     assert math.hypot(place.latitude, place.longitude) < 0.3
@@ -134,13 +140,15 @@ def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world)
 
 def test_a_drone_is_flat_when_standing_has_used_the_rest_and_that_is_told_once(world):
     engine = drone(world, limits=BodyLimits(standby_s=5.0))
-    told = []
+    told, noted = [], []
     engine.add_listener(lambda _state: told.append(engine.is_flat))
+    engine.observe(lambda kind, now_s, detail: noted.append(kind))
     run(world, 4.0)
     assert not engine.is_flat
     run(world, 3.0)
     assert engine.is_flat
     assert told.count(True) == 1
+    assert noted == [MeshEventKind.BATTERY_EMPTY]
 
 
 def test_the_motors_hold_the_weight_and_no_more_at_the_goal():

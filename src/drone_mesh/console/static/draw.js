@@ -30,6 +30,7 @@ export function readColours() {
     "disconnected",
     "off",
     "silent",
+    "crashed",
     "obstacle",
     "known-link",
     "lost-link",

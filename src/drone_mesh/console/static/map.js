@@ -18,6 +18,7 @@ export class MapView {
     this.top = card.querySelector("#map-top");
     this.note = card.querySelector("#map-note");
     this.legend = card.querySelector(".legend");
+    this.legendCrashed = card.querySelector("#legend-crashed");
     this.legendObstacle = card.querySelector("#legend-obstacle");
     this.fly = fly;
     this.camera = new Camera();
@@ -127,6 +128,8 @@ export class MapView {
     const text = `${drawn.drones} drones, ${drawn.links} links${left}, ${drawn.routeLinks} on routes to a gateway`;
     if (this.note.textContent !== text) this.note.textContent = text;
     const { x, y, scale } = this.camera;
+    const nodes = [...this.mesh.nodes.values()];
+    this.legendCrashed.hidden = !nodes.some((node) => node.condition === "crashed");
     this.legendObstacle.hidden = !this.mesh.obstacles.length;
     Object.assign(this.note.dataset, drawn, { x, y, scale });
   }

@@ -50,6 +50,8 @@ export class NodePanel {
         node.fallback === 255 ? "–" : [node.fallback],
         { before: "node ", after: "’s" },
       ],
+      ...(node.battery == null ? [] : [["Battery", `${node.battery} %`]]),
+      ...(node.why_not_fly ? [["Cannot fly", node.why_not_fly]] : []),
       ["Known nodes", String(node.known_nodes ?? "–")],
       ["Messages sent", String(node.total_messages ?? "–")],
       ["Position", node.position ? node.position.map((m) => m.toFixed(2)).join(", ") : "–"],

@@ -35,6 +35,8 @@ DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simu
 MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz
 MAP_FRAME = "map"
 
+GROUNDED_TOPIC = "/Drones/grounded"  # GroundedDrones, latched: DroneFactory -> hosts
+
 
 def host_param(host: str) -> str:
     """The parameter by which a ROS node declares that it runs nodes of the mesh: their ids."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import math
 import time
+from typing import Callable
 
 import rospy
 
 from drone_mesh.drone.interfaces import IDroneEngine, Location
-from drone_mesh.errors import LocationUnknown
+from drone_mesh.errors import GoalRefused, LocationUnknown
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_msg, location_of
@@ -28,8 +29,10 @@ class RosDroneEngineConnector(IDroneEngine):
     Belongs to the executor's worker. The connection is kept, and reopened when needed.
     """
 
-    def __init__(self, node_id: int) -> None:
+    def __init__(self, node_id: int, why_not_fly: Callable[[], str] = lambda: "") -> None:
+        """`why_not_fly` gives what the world says of this drone."""
         self._node_id = node_id
+        self._why_not_fly = why_not_fly
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
         self._gone_until_s = -math.inf  # monotonic
         self._complaints = ThrottledLog(_log)
@@ -45,8 +48,18 @@ class RosDroneEngineConnector(IDroneEngine):
         except ServiceGone as error:
             _log.debug("drone %d: %s", self._node_id, error)
 
+    def why_not_fly(self) -> str:
+        """As the world says: crashed, or out of battery; empty while it can fly."""
+        return self._why_not_fly()
+
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there (metres); the height is rounded to whole metres, as its field requires."""
+        """Fly there (metres); the height is rounded to whole metres, as its field requires.
+
+        Raises GoalRefused if the drone cannot fly.
+        """
+        why_not = self._why_not_fly()
+        if why_not:
+            raise GoalRefused(f"the drone cannot fly: {why_not}")
         self._goal.publish(location_msg(latitude, longitude, height))
 
     def get_location(self) -> Location:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import logging
 import threading
 import time
@@ -11,6 +12,7 @@ from typing import Callable, Iterable
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros.graph.figures import Figures
+from drone_mesh.ros.host.grounded_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 from drone_mesh.ros.host.radios import Radios, VirtualRadios
@@ -53,6 +55,7 @@ class MeshHost:
         self.executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_host")
         self._radios = VirtualRadios(self.executor) if radios is None else radios
         self._figures = Figures("host", self._take_figures)
+        self._grounded = GroundedDrones()
         self.nodes: dict[int, VirtualRaspberryPi] = {}
         self._stopping = False
 
@@ -106,6 +109,7 @@ class MeshHost:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
         self._stopping = True
         self._figures.stop()
+        self._grounded.stop()
         self._reports.stop()
         self._radios.fall_silent()
         for node in list(self.nodes.values()):
@@ -131,7 +135,9 @@ class MeshHost:
             if self._stopping:
                 return
             try:
-                node = kind(node_id, self._settings, self._radios.antenna(node_id, seat), seat)
+                antenna = self._radios.antenna(node_id, seat)
+                why_not_fly = functools.partial(self._grounded.reason, node_id)
+                node = kind(node_id, self._settings, antenna, seat, why_not_fly)
                 self._reports.add(node.component, node.antenna.on)
                 node.start(now_s)
             except MeshError as error:  # does not go away by itself

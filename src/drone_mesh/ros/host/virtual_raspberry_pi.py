@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import random
+from typing import Callable
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
@@ -26,12 +27,19 @@ class VirtualRaspberryPi(abc.ABC):
     """
 
     def __init__(
-        self, node_id: int, settings: MeshSettings, antenna: IWirelessCommunication, seat: Seat
+        self,
+        node_id: int,
+        settings: MeshSettings,
+        antenna: IWirelessCommunication,
+        seat: Seat,
+        why_not_fly: Callable[[], str],
     ) -> None:
-        """Raises ConfigurationError for a routing technique that does not exist."""
+        """`why_not_fly` as for RosDroneEngineConnector.
+
+        Raises ConfigurationError for a routing technique that does not exist."""
         self.node_id = node_id
         self.settings = settings
-        self.engine = RosDroneEngineConnector(node_id)
+        self.engine = RosDroneEngineConnector(node_id, why_not_fly)
         self.antenna = antenna
         self.seat = seat
         self.users = UsersDesk(node_id, seat.submit)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Iterable
 
 from drone_mesh.state.observation import describe_drone
@@ -14,5 +16,15 @@ def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]
     views = []
     for drone in drones:
         state = drone.engine.state
-        views.append(describe_drone(drone.node_id, drone.ROLE, state.position, state.path, now_s))
+        engine = drone.engine
+        battery = engine.battery_percent()
+        view = describe_drone(drone.node_id, drone.ROLE, state.position, state.path, now_s)
+        views.append(
+            replace(
+                view,
+                battery=math.nan if battery is None else battery,
+                crashed=engine.crashed,
+                why_not_fly=engine.why_not_fly(),
+            )
+        )
     return views

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import logging
 import math
+from typing import Callable
 
 import rospy
 
+from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.errors import GoalRefused
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
@@ -14,6 +16,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import engine_info, gps_response
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
+from drone_mesh.state.model import EventRecord
 from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
 
@@ -65,13 +68,21 @@ class EngineServer:
     Goals and requests come in threads of rospy; `_moved` runs in the world's thread.
     """
 
-    def __init__(self, drone: VirtualDrone, reporter: PositionReporter) -> None:
+    def __init__(
+        self,
+        drone: VirtualDrone,
+        reporter: PositionReporter,
+        happened: Callable[[EventRecord], None],
+    ) -> None:
+        """`happened` is called in any thread with what happens to the drone."""
+        self._happened = happened
         self._node_id = drone.node_id
         self._engine = drone.engine
         self._reporter = reporter
         self._reported_s = -math.inf  # the world's thread
         self._complaints = ThrottledLog(_log)
         self._engine.add_listener(self._moved)
+        self._engine.observe(self._observed)
         rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
         rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps)
 
@@ -80,6 +91,12 @@ class EngineServer:
             self._engine.set_goal(goal.latitude, goal.longitude, goal.height)
         except GoalRefused as error:
             self._complaints.warning(f"drone {self._node_id} refused a goal", str(error))
+            self._observed(MeshEventKind.GOAL_REFUSED, rospy.get_time(), str(error))
+
+    def _observed(self, kind: MeshEventKind, now_s: float, detail: str) -> None:
+        self._happened(EventRecord(now_s, self._node_id, kind.value, detail=detail))
+        if kind is not MeshEventKind.GOAL_REFUSED:
+            _log.warning("drone %d: %s%s", self._node_id, kind.value, detail and f", {detail}")
 
     def _gps(self, _request: RequestGPSRequest) -> RequestGPSResponse:
         return gps_response(self._engine.get_location())

@@ -11,11 +11,11 @@ from typing import Callable, Iterable, Sequence
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 
-from drone_mesh.msg import HostReport, MeshEvent, MeshState
+from drone_mesh.msg import GroundedDrones, HostReport, MeshEvent, MeshState
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import state_msg
+from drone_mesh.ros.graph.conversions import event_msg, state_msg
 from drone_mesh.ros.world.diagnostics import diagnostics_msg
-from drone_mesh.state.model import MeshStatus, ObstacleStatus
+from drone_mesh.state.model import EventRecord, MeshStatus, ObstacleStatus
 from drone_mesh.state.roster import DroneView, MeshRoster
 
 WATCHED_PERIOD_S = 0.2  # wall time between two states with a subscriber: flights look smooth
@@ -42,6 +42,7 @@ class MeshStatePublisher:
     Publishes:  /mesh/state (MeshState, latched), 5 Hz while watched, else 1 Hz, of wall time
                 /mesh/events (MeshEvent)
                 /diagnostics (DiagnosticArray), 1 Hz
+                /Drones/grounded (GroundedDrones, latched), when it changes
 
     Handlers of rospy only put reports into a queue; everything else belongs to the one thread.
     """
@@ -52,11 +53,13 @@ class MeshStatePublisher:
         max_distance_m: float,
         routing: str,
         repair_strategy: str,
+        happened: deque[EventRecord],
         obstacles: Sequence[ObstacleStatus] = (),
         shape: str = "",
     ) -> None:
         """`look` is called in the thread of this object, and must not wait for the world.
 
+        `happened` is emptied here, and filled by any thread with what happens to the drones.
         `routing` and `repair_strategy` are the names of what the nodes use.
         """
         self._look = look
@@ -71,6 +74,11 @@ class MeshStatePublisher:
         self._state = rospy.Publisher(names.STATE_TOPIC, MeshState, queue_size=1, latch=True)
         self._events = rospy.Publisher(names.EVENTS_TOPIC, MeshEvent, queue_size=EVENTS_QUEUE)
         self._diagnostics = rospy.Publisher(names.DIAGNOSTICS_TOPIC, DiagnosticArray, queue_size=4)
+        self._grounded = rospy.Publisher(
+            names.GROUNDED_TOPIC, GroundedDrones, queue_size=1, latch=True
+        )
+        self._grounded_now: dict[int, str] = {}
+        self._happened = happened
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="mesh state", daemon=True)
         self._subscriber = rospy.Subscriber(names.REPORTS_TOPIC, HostReport, self._reported)
@@ -89,7 +97,7 @@ class MeshStatePublisher:
         self._subscriber.unregister()
         self._stopped.set()
         self._thread.join()
-        for publisher in (self._state, self._events, self._diagnostics):
+        for publisher in (self._state, self._events, self._diagnostics, self._grounded):
             publisher.unregister()
 
     def _reported(self, report: HostReport) -> None:
@@ -115,10 +123,14 @@ class MeshStatePublisher:
             self._roster.merge_report(report.host, report.nodes, heard_s)
             for event in report.events:
                 self._events.publish(event)
+        while self._happened:
+            self._events.publish(event_msg(self._happened.popleft()))
 
     def _publish(self, now_s: float) -> None:
         view = self._look()
-        nodes = self._roster.snapshot(view.drones, now_s)
+        drones = list(view.drones)
+        self._publish_grounded(drones)
+        nodes = self._roster.snapshot(drones, now_s)
         mesh = MeshStatus(
             view.stamp_s,
             nodes,
@@ -136,6 +148,12 @@ class MeshStatePublisher:
         if now_s - self._diagnosed_s >= DIAGNOSTICS_PERIOD_S:
             self._diagnosed_s = now_s
             self._diagnostics.publish(diagnostics_msg(mesh))
+
+    def _publish_grounded(self, drones: Sequence[DroneView]) -> None:
+        grounded = {drone.id: drone.why_not_fly for drone in drones if drone.why_not_fly}
+        if grounded != self._grounded_now:
+            self._grounded_now = grounded
+            self._grounded.publish(GroundedDrones(list(grounded), list(grounded.values())))
 
     def _achieved(self, now_s: float, view: WorldView) -> float:
         before, self._last_look = self._last_look, (now_s, view.stamp_s)

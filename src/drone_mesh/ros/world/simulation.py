@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import deque
 
 from drone_mesh.nrf24.settings import data_rate
 from drone_mesh.ros.graph import names
@@ -18,6 +19,7 @@ from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.ros.world.world_window import window_of
+from drone_mesh.state.model import EventRecord
 from drone_mesh.state.observation import describe_obstacles
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
@@ -32,6 +34,7 @@ class Simulation:
         """Make the drones. Nothing runs yet."""
         self._parameters = parameters
         self._world = world
+        self._happened: deque[EventRecord] = deque()  # to the drones; any thread fills it
         configuration = parameters.configuration
         self._drones = DroneFactory(
             world,
@@ -61,7 +64,7 @@ class Simulation:
             for drone in self._drones:
                 if stop.requested():
                     return
-                EngineServer(drone, reporter)
+                EngineServer(drone, reporter, self._happened.append)
         host = self._start_host(stop)
         set_fleet_parameter(self._parameters.configuration)
         MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM).start()
@@ -108,6 +111,7 @@ class Simulation:
             configuration.max_distance,
             configuration.routing,
             configuration.repair,
+            self._happened,
             describe_obstacles(obstacles.boxes if obstacles else ()),
             configuration.shape,
         )
