@@ -15,6 +15,7 @@ from drone_mesh.drone.interfaces import Location
 
 KEPT = 0.9  # of the range: how far behind a neighbour that moved a drone may stay; our choice
 MOVES = 2  # towards one lost next hop
+WAITS = 6  # our choice: checks; the drones beside the dead node have moved twice by then
 
 
 class Inward(Home):
@@ -22,14 +23,19 @@ class Inward(Home):
 
     _lost: Step | None = None  # the place of the lost next hop
     _moves = 0
+    _waits = 0  # for the drones beside the dead node, in checks
 
     def on_gateway_found(self) -> None:
         """The next loss is another one."""
-        self._lost, self._moves = None, 0
+        self._lost, self._moves, self._waits = None, 0, 0
 
     def on_emergency(self) -> None:
         """Move inward; if that was in vain, fly home."""
         mesh, here = self.mesh, self.mesh.own_place()
+        if self._lost is None and mesh.reaches(mesh.lost_next_hop) and self._waits < WAITS:
+            self._waits += 1
+            self.reason = f"{mesh.lost_next_hop} is nearer to the lost node"
+            return
         if self._lost is None and mesh.steps and not mesh.steps[0].home:
             self._lost = mesh.steps[0]
         if self._lost is None or self._moves >= MOVES or here is None or mesh.why_not_fly():
@@ -46,10 +52,15 @@ class Inward(Home):
         """If a neighbour moves out of reach, follow it as far as is needed."""
         mesh, here = self.mesh, self.mesh.own_place()
         may_move = not (mesh.connected or mesh.state is Repair.FLYING or mesh.why_not_fly())
-        if here is None or not may_move or node not in mesh.neighbours():
+        if here is None or not may_move or node not in mesh.neighbours() or self._moves_itself():
             return
         if here.distance_m(place) > mesh.range_m:
             self._move_to(Step(towards(place, here, KEPT * mesh.range_m), node))
+
+    def _moves_itself(self) -> bool:
+        """Whether it is beside the dead node, and has not moved as far as it may."""
+        is_beside = self._lost is not None or not self.mesh.reaches(self.mesh.lost_next_hop)
+        return is_beside and self._moves < MOVES
 
     def _move_to(self, step: Step) -> None:
         self.mesh.tell_place(step.place)

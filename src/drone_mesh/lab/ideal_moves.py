@@ -1,0 +1,103 @@
+"""What `nearest` and `inward` would fly with ideal information, after the death of one node.
+
+Distances on a plane, no packets and no delays: the bound that cut_vertices.py compares runs with.
+"""
+
+from __future__ import annotations
+
+from typing import AbstractSet, Dict, Sequence
+
+from drone_mesh.communication.spots import towards
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.lab.random_layouts import Point
+
+Places = Dict[int, Location]
+Flown = Dict[int, float]  # node -> metres
+
+MOVES = 2  # of `inward` towards one place
+ROUNDING_M = 1e-9  # two drones that move to half the range on opposite sides are in reach
+
+
+def without(points: Sequence[Point], dead: int) -> Places:
+    """The places of the survivors."""
+    return {node: place(point) for node, point in enumerate(points) if node != dead}
+
+
+def place(point: Point) -> Location:
+    """A point (x, y) in metres, on the ground."""
+    return Location(point[1], point[0], 0.0)
+
+
+def cut_off(places: Places, range_m: float, root: int) -> frozenset[int]:
+    """The nodes that no hops shorter than `range_m` lead to from `root`."""
+    known, edge = {root}, [root]
+    while edge:
+        here = places[edge.pop()]
+        near = [n for n, p in places.items() if n not in known and _reach(here, p, range_m)]
+        known.update(near)
+        edge.extend(near)
+    return frozenset(places.keys() - known)
+
+
+def nearest(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
+    """Of `acting`, the nearest neighbour of the hole takes it; those that it leaves repeat that."""
+    places = dict(places)
+    flown: Flown = {}
+    while cut_off(places, range_m, 0):
+        free = [n for n in acting - flown.keys() if hole.distance_m(places[n]) < range_m]
+        if not free:
+            break
+        mover = min(free, key=lambda n: (hole.distance_m(places[n]), n))
+        flown[mover] = hole.distance_m(places[mover])
+        places[mover], hole = hole, places[mover]
+    return flown
+
+
+def inward(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
+    """Those of `acting` that were neighbours of the dead node move in, the others follow."""
+    now = dict(places)
+    flown: Flown = {}
+    first = [n for n in acting if hole.distance_m(places[n]) < range_m]
+    for move in range(MOVES):
+        if not cut_off(now, range_m, 0):
+            break
+        before = dict(now)
+        for node in first:
+            away_m = hole.distance_m(now[node])
+            step_m = min(away_m, range_m / 2) if move else max(0.0, away_m - range_m / 2)
+            _fly(node, towards(now[node], hole, step_m), now, flown)
+        _follow(before, now, flown, acting - set(first), range_m)
+    return flown
+
+
+def _follow(
+    before: Places, now: Places, flown: Flown, rest: AbstractSet[int], range_m: float
+) -> None:
+    """Whoever loses neighbours that moved follows the nearest of them, up to the range."""
+    moved = {node for node in now if now[node] != before[node]}
+    rest = set(rest)
+    while moved:
+        leaders, moved = moved, set()
+        for node in sorted(rest):
+            lost = [
+                m for m in leaders
+                if _reach(before[node], before[m], range_m)
+                and not _reach(now[node], now[m], range_m)
+            ]  # fmt: skip
+            if lost:
+                leader = min(lost, key=lambda m, me=node: (now[me].distance_m(now[m]), m))  # type: ignore[misc]
+                way_m = now[node].distance_m(now[leader]) - range_m
+                _fly(node, towards(now[node], now[leader], way_m), now, flown)
+                moved.add(node)
+        rest -= moved
+
+
+def _reach(one: Location, other: Location, range_m: float) -> bool:
+    return one.distance_m(other) < range_m + ROUNDING_M
+
+
+def _fly(node: int, goal: Location, now: Places, flown: Flown) -> None:
+    way_m = now[node].distance_m(goal)
+    if way_m > ROUNDING_M:
+        flown[node] = flown.get(node, 0.0) + way_m
+        now[node] = goal
