@@ -6,7 +6,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$root/.venv"
 javascript="$venv/javascript"
 noetic=/opt/ros/noetic/setup.bash
-simulation_requirements=(requirements/{console,http,report,simulation}.txt)
+simulation_requirements=(requirements/{console,http,mqtt,report,simulation}.txt)
 
 if [ -e "$noetic" ]; then
   ros_packages=(
@@ -15,7 +15,7 @@ if [ -e "$noetic" ]; then
     ros-noetic-{rosbash,rosgraph-msgs,roslaunch,rosmsg,rosnode,rosparam,rospy,rosservice,rostest}
     ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
   )
-  screen_packages=(libgl1 libxtst6 tshark xvfb)
+  screen_packages=(libgl1 mosquitto libxtst6 tshark xvfb)
   rviz_package=ros-noetic-rviz
 else
   ros_packages=(
@@ -27,7 +27,7 @@ else
     python3-{diagnostic,geometry,tf2,visualization}-msgs python3-diagnostic-updater
     python3-rospy python3-rostest
   )
-  screen_packages=(chromium libgl1 libxtst6 tshark xvfb)
+  screen_packages=(chromium libgl1 mosquitto libxtst6 tshark xvfb)
   rviz_package=rviz
 fi
 

@@ -61,7 +61,9 @@ class FactoryConfiguration:
     obstacle_radio: Literal["block", "wall"] = Field("block")
     radio: Literal["virtual", "nrf24"] = Field("virtual")  # nrf24: the driver on emulated chips
     data_rate: Literal["250k", "1M", "2M"] = Field("250k")  # of the channel, with radio nrf24
-    internet: Literal["mock", "http"] = Field("mock")  # http: gateways also take HTTP orders
+    # http: gateways also take HTTP orders; mqtt: users' data goes to a broker
+    internet: Literal["mock", "http", "mqtt"] = Field("mock")
+    broker: str = Field("mqtt://127.0.0.1/simulation", min_length=1, description="mqtt://HOST/MESH")
     key: str = Field("", description="the name of a key file")  # empty: nothing is sealed
     routing: str = Field(
         "child_table_tree", min_length=1, description="the name of a routing technique"

@@ -10,7 +10,9 @@ from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 
 if TYPE_CHECKING:
     from drone_mesh.internet.asking import Submit
+    from drone_mesh.internet.mqtt_topics import Broker
     from drone_mesh.internet.status import ReadStatus, StatusServer
+    from drone_mesh.users.desk import UsersDesk
 
 
 def http_internet(
@@ -28,6 +30,19 @@ def http_internet(
             f"orders over HTTP need the Python package {error.name}: pip install 'drone_mesh[http]'"
         ) from error
     return HttpInternet(submit, address, port, token, **settings)
+
+
+def mqtt_internet(
+    submit: Submit, users: UsersDesk, broker: Broker, **settings: Any
+) -> IInternetConnection:
+    """An MqttInternet, see there. Raises ConfigurationError also if its library is missing."""
+    try:
+        from drone_mesh.internet.mqtt_internet import MqttInternet
+    except ImportError as error:
+        raise ConfigurationError(
+            f"MQTT needs the Python package {error.name}: pip install 'drone_mesh[mqtt]'"
+        ) from error
+    return MqttInternet(submit, users, broker, **settings)
 
 
 def status_server(status: ReadStatus, *settings: Any) -> StatusServer:

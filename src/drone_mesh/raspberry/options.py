@@ -27,6 +27,7 @@ from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, 
 from drone_mesh.nrf24.spi import SPI_HZ
 from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
+from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
 from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
@@ -82,6 +83,7 @@ class Options:
     gateway: bool
     http: HttpOptions | None  # a router has it only if asked for
     keys: MeshKey | NodeKeys | None = None  # None: nothing is sealed
+    mqtt: MqttOptions | None = None
 
 
 def parse_router(
@@ -122,6 +124,7 @@ def parse_gateway(
     )
     _add_emulated(node)
     _add_http(parser.add_argument_group("HTTP"))
+    add_mqtt_options(parser)
     parser.set_defaults(gateway=True, http=True)
     return _options(parser, parser.parse_args(arguments), environment)
 
@@ -328,6 +331,7 @@ def _options(
             gateway=parsed.gateway,
             http=_http_options(parsed, environment) if parsed.http else None,
             keys=_keys(parsed),
+            mqtt=mqtt_options(parsed, environment) if parsed.gateway else None,
         )
     except MeshError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")

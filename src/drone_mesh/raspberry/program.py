@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.engines import create_engine
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import MeshError
-from drone_mesh.internet.on_demand import http_internet, status_server
+from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
+from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.nrf24.gpio import GpiodCe, GpiodIrq
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings
@@ -161,7 +163,7 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
         options, flight=dataclasses.replace(options.flight, origin=fleet.origin)
     )
     events = EventHistory()
-    make_internet = (_internet(options) if options.gateway else None) or without_internet
+    make_internet = _internet(options) if options.gateway else without_internet
     return [
         RadioNode(
             fleet.air.radio(node_id, options.radio),
@@ -174,24 +176,34 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
     ]
 
 
-def _internet(options: Options) -> MakeInternet | None:
-    http = options.http
-    if http is None:
-        return None
-    settings = {
-        "certificate": http.certificate,
-        "names": http.names,
-        "origin": options.flight.origin,
-    }
-    return lambda node: http_internet(
+def _internet(options: Options) -> MakeInternet:
+    http, mqtt = options.http, options.mqtt
+
+    def make(node: RadioNode) -> IInternetConnection:
+        connections: list[IInternetConnection] = []
+        if mqtt is not None:
+            connections.append(
+                mqtt_internet(node.submit, node.users, mqtt.broker, ca_file=mqtt.ca_file)
+            )
+        if http is not None:
+            connections.append(_http(node, http, options.flight.origin))
+        return SeveralInternets(*connections)
+
+    return make
+
+
+def _http(node: RadioNode, http: HttpOptions, origin: Origin | None) -> IInternetConnection:
+    return http_internet(
         node.submit,
         http.address,
         http.port,
         http.token,
+        certificate=http.certificate,
+        names=http.names,
+        origin=origin,
         status=node.status,
         mesh=node.mesh,
         users=node.users,
-        **settings,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from typing import Callable
+from typing import Callable, Optional
 
 from drone_mesh.communication.data.echo import EchoAnswer
 from drone_mesh.communication.data.ticket import Ticket, TicketState
@@ -18,6 +18,9 @@ Submit = Callable[[Callable[[float], None]], None]
 """Runs a function, with the time, on the thread that owns the node. Any thread may call it."""
 
 
+WhenOver = Callable[[Optional[Ticket], Optional[MessageRefused]], None]
+
+
 class Sending:
     """One message that another thread hands in. Its fields are set by the node's thread."""
 
@@ -26,14 +29,17 @@ class Sending:
         self._handed_in = threading.Event()
         self._ended = threading.Event()
         self._ticket: Ticket | None = None
-        self._why_not = ""
+        self._refusal: MessageRefused | None = None
+        self._lock = threading.Lock()
+        self._when_over: WhenOver | None = None
 
     def ticket(self) -> Ticket:
         """The ticket; raises MessageRefused with the reason if there is none."""
         if not self._handed_in.wait(HANDOVER_S):
             raise MessageRefused("the node is too busy to take a message, or it has stopped")
-        if self._ticket is None:
-            raise MessageRefused(self._why_not)
+        if self._refusal is not None:
+            raise self._refusal
+        assert self._ticket is not None
         return self._ticket
 
     def wait(self, seconds: float) -> bool:
@@ -53,22 +59,38 @@ class Sending:
         """Whether the message was refused, or its last state is known."""
         return self._ended.is_set() or (self._handed_in.is_set() and self._ticket is None)
 
+    def when_over(self, call: WhenOver) -> None:
+        """Have `call` called once, with the ticket or the refusal; on this thread or the node's."""
+        self._when_over = call
+        self._tell()
+
     def hand_in(self, transport: Transport, now_s: float) -> None:
         """On the node's thread."""
         to, payload, port, reliable = self._arguments
         try:
             ticket = transport.send(to, payload, now_s, port=port, reliable=reliable)
         except MessageRefused as error:
-            self._why_not = str(error)
+            self._refusal = error
         else:
             ticket.changed = self._changed
             self._ticket = ticket
             self._changed(ticket)
         self._handed_in.set()
+        self._tell()
 
     def _changed(self, ticket: Ticket) -> None:
         if ticket.final:
             self._ended.set()
+            self._tell()
+
+    def _tell(self) -> None:
+        """Call `when_over` once, whichever comes last: the end, or that it was asked for."""
+        with self._lock:
+            call = self._when_over if self._handed_in.is_set() and self.is_over else None
+            if call is not None:
+                self._when_over = None
+        if call is not None:
+            call(self._ticket, self._refusal)
 
 
 class Listener:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class MeshSettings:
     seed: int
     debug: bool
     observer: MeshObserver
-    internet: str  # "mock" or "http"
+    internet: str  # "mock", "http" or "mqtt"
+    broker: Broker  # with "mqtt"
     key: MeshKey | None  # None: nothing is sealed
 
     @classmethod
@@ -51,6 +54,7 @@ class MeshSettings:
             observer=ignore_events,
             internet=configuration.internet,
             key=_mesh_key(configuration.key),
+            broker=parse_broker(configuration.broker, os.environ.get(PASSWORD_VARIABLE, "")),
         )
 
 

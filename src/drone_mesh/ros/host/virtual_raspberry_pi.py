@@ -11,7 +11,7 @@ from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCo
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.execution import Seat
 from drone_mesh.internet import DEFAULT_PORT
-from drone_mesh.internet.on_demand import http_internet
+from drone_mesh.internet.on_demand import http_internet, mqtt_internet
 from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
 from drone_mesh.ros.host.internet_mock import RosInternetMock
@@ -99,5 +99,10 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
         mock = RosInternetMock(self.node_id, self.seat)
         if self.settings.internet == "mock":
             return mock
+        if self.settings.internet == "mqtt":
+            # One gateway sends what is published: several would send it several times.
+            sends, broker = self.node_id == 0, self.settings.broker
+            mqtt = mqtt_internet(self.seat.submit, self.users, broker, sends=sends)
+            return SeveralInternets(mock, mqtt)
         http = http_internet(self.seat.submit, port=DEFAULT_PORT + self.node_id, users=self.users)
         return SeveralInternets(mock, http)

@@ -1,0 +1,273 @@
+"""MqttInternet: users' messages between a gateway and an MQTT broker (paho-mqtt).
+
+Delivery is "at least once" on both sides. What the gateway received waits in memory until the
+broker has it, also while there is no connection. A message from the broker is acknowledged only
+when its node has it or it was given up, so that the broker keeps it if the gateway restarts.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import ssl
+import threading
+from pathlib import Path
+from typing import Any, Callable
+
+import paho.mqtt.client as mqtt
+from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from drone_mesh.communication.data.ticket import Ticket
+from drone_mesh.communication.data.transport import ReceivedMessage
+from drone_mesh.communication.interfaces import (
+    NO_ROUTE,
+    IGatewayCommands,
+    IInternetConnection,
+    KnownNode,
+)
+from drone_mesh.errors import ConfigurationError, QueueFull
+from drone_mesh.internet.asking import Submit
+from drone_mesh.internet.mqtt_topics import Broker, Topics
+from drone_mesh.users.desk import UsersDesk
+
+QOS = 1  # at least once
+KEEP_ALIVE_S = 15  # our choice: how soon a broken connection is noticed, and the last will sent
+MOST_WAITING = 10_000  # our choice: messages for a broker that is gone, then new ones are dropped
+STATE_PERIOD_S = 5.0  # our choice
+RETRY_S = 0.5  # our choice: after the mesh's queue was full
+_DELAYS_S = (1, 30)  # our choice: shortest and longest pause between attempts to connect
+
+_log = logging.getLogger(__name__)
+
+
+class MqttInternet(IInternetConnection):
+    """The MQTT connection of a gateway.
+
+    Threads: paho's, which calls `_on_...`; one for the states, which also hands in again what the
+    mesh refused for want of room; the node's, which calls `_received` and what follows a message.
+    paho's client may be used by all.
+    """
+
+    def __init__(
+        self,
+        submit: Submit,
+        users: UsersDesk,
+        broker: Broker,
+        ca_file: Path | None = None,
+        sends: bool = True,
+    ) -> None:
+        """`submit` runs a function on the node's thread; `sends`: what is published on tx.
+
+        Where several gateways use one broker, only one of them should send. Raises
+        ConfigurationError for a file that cannot be read.
+        """
+        self._submit = submit
+        self._users = users
+        self._broker = broker
+        self._topics = Topics(broker.mesh)
+        self._node = users.node_id
+        self._sends = sends
+        self._stopped = threading.Event()
+        self._end_subscription: Callable[[], None] = lambda: None
+        self._states: dict[int, str] = {}  # as published; for the thread of the states
+        self._lock = threading.Lock()
+        self._to_retry: list[mqtt.MQTTMessage] = []  # under the lock
+        # Messages of the broker that it does not know to be acknowledged, by packet id: whether
+        # they are over. Under the lock.
+        self._unacknowledged: dict[int, bool] = {}
+        self._dropped = 0
+        self._client = mqtt.Client(
+            CallbackAPIVersion.VERSION2,
+            client_id=f"drone_mesh-{broker.mesh}-{self._node}",
+            clean_session=False,  # the broker keeps what comes while this program is away
+            manual_ack=True,
+        )
+        self._client.max_queued_messages_set(MOST_WAITING)
+        self._client.reconnect_delay_set(*_DELAYS_S)
+        if broker.user:
+            self._client.username_pw_set(broker.user, broker.password or None)
+        if broker.tls:
+            try:
+                context = ssl.create_default_context(cafile=ca_file)
+            except OSError as error:
+                raise ConfigurationError(f"{ca_file}: {error}") from error
+            self._client.tls_set_context(context)
+        self._client.will_set(self._topics.state(self._node), _offline(self._node), QOS, True)
+        self._client.on_connect = self._on_connect
+        self._client.on_connect_fail = self._on_connect_fail
+        self._client.on_disconnect = self._on_disconnect
+        self._client.on_message = self._on_message
+        self._watch: threading.Thread | None = None
+        self._complained = False
+
+    def connect(self, commands: IGatewayCommands) -> None:
+        """Connect as soon as the broker answers; never waits for it."""
+        self._client.connect_async(self._broker.host, self._broker.port, KEEP_ALIVE_S)
+        self._client.loop_start()
+        self._end_subscription = self._users.subscribe(self._received)
+        self._watch = threading.Thread(
+            target=self._look_after, args=(commands,), name=f"MQTT states {self._node}"
+        )
+        self._watch.start()
+
+    def disconnect(self) -> None:
+        """Say good-bye, and end the threads."""
+        self._stopped.set()
+        self._end_subscription()
+        if self._watch is not None:
+            self._watch.join()
+            self._watch = None
+            if self._client.is_connected():
+                info = self._client.publish(
+                    self._topics.state(self._node), _offline(self._node), QOS, True
+                )
+                info.wait_for_publish(1.0)
+            self._client.disconnect()
+            self._client.loop_stop()
+
+    # From the mesh to the broker ---------------------------------------------------------------
+
+    def _received(self, message: ReceivedMessage) -> None:
+        """On the node's thread; paho keeps the message until the broker has it."""
+        topic = self._topics.rx(message.sender, message.port)
+        if self._client.publish(topic, message.payload, QOS).rc == mqtt.MQTT_ERR_QUEUE_SIZE:
+            self._dropped += 1
+            if self._dropped == 1 or self._dropped % 1000 == 0:
+                _log.error(
+                    "MQTT: %d messages wait for %s; %d are lost",
+                    MOST_WAITING,
+                    self._broker.url,
+                    self._dropped,
+                )
+
+    def _look_after(self, commands: IGatewayCommands) -> None:
+        due_s = 0.0
+        while not self._stopped.wait(RETRY_S):
+            with self._lock:
+                again, self._to_retry = self._to_retry, []
+            for message in again:
+                self._hand_in(message)
+            due_s -= RETRY_S
+            if due_s <= 0.0 and self._client.is_connected():
+                due_s = STATE_PERIOD_S
+                self._submit(lambda now_s: self._tell_states(commands, now_s))
+
+    def _tell_states(self, commands: IGatewayCommands, now_s: float) -> None:
+        """On the node's thread: publish what has changed."""
+        states = {node.node_id: _state(node, now_s) for node in commands.get_known_nodes()}
+        states[self._node] = json.dumps({"online": True, "node": self._node, "gateway": True})
+        for node, state in states.items():
+            if self._states.get(node) != state:
+                self._states[node] = state
+                self._client.publish(self._topics.state(node), state, QOS, True)
+
+    # From the broker to the mesh ---------------------------------------------------------------
+
+    def _on_message(self, _client: mqtt.Client, _userdata: Any, message: mqtt.MQTTMessage) -> None:
+        with self._lock:
+            is_over = self._unacknowledged.get(message.mid) if message.dup else None
+            if is_over is None:
+                self._unacknowledged[message.mid] = False
+        if is_over is None:
+            self._hand_in(message)
+        elif is_over:  # it came again because the connection broke before it was acknowledged
+            self._acknowledge(message)
+
+    def _hand_in(self, message: mqtt.MQTTMessage) -> None:
+        destination = self._topics.destination(message.topic)
+        node = self._topics.node_of(message.topic)
+        if destination is None:
+            self._say(
+                node, {"state": "refused", "reason": f"no such node or port: {message.topic}"}
+            )
+            self._acknowledge(message)
+            return
+        sending = self._users.send(destination.to, message.payload, destination.port)
+
+        def ended(ticket: Ticket | None, refusal: Exception | None) -> None:
+            if isinstance(refusal, QueueFull):
+                with self._lock:
+                    self._to_retry.append(message)
+                return
+            if ticket is None:
+                self._say(node, {"state": "refused", "reason": str(refusal)})
+            else:
+                self._say(
+                    node,
+                    {"state": ticket.state.value, "reason": ticket.reason, "bytes": ticket.size},
+                )
+            self._acknowledge(message)
+
+        sending.when_over(ended)
+
+    def _acknowledge(self, message: mqtt.MQTTMessage) -> None:
+        with self._lock:
+            self._unacknowledged[message.mid] = True
+        if self._client.ack(message.mid, message.qos) == mqtt.MQTT_ERR_SUCCESS:
+            with self._lock:
+                self._unacknowledged.pop(message.mid, None)
+
+    def _say(self, node: str, event: dict[str, Any]) -> None:
+        self._client.publish(self._topics.event(node), json.dumps(event), QOS)
+
+    # The connection ----------------------------------------------------------------------------
+
+    def _on_connect(
+        self,
+        client: mqtt.Client,
+        _userdata: Any,
+        _flags: mqtt.ConnectFlags,
+        reason: ReasonCode,
+        _properties: Properties | None,
+    ) -> None:
+        if reason.is_failure:
+            self._complain(f"refuses the connection: {reason}")
+            return
+        self._complained = False
+        _log.info("MQTT: connected to %s, mesh %s", self._broker.url, self._broker.mesh)
+        if self._sends:
+            client.subscribe([(topic, QOS) for topic in self._topics.all_tx])
+        self._submit(lambda _now_s: self._states.clear())  # the will may have replaced them
+
+    def _on_connect_fail(self, _client: mqtt.Client, _userdata: Any) -> None:
+        self._complain("does not answer")
+
+    def _on_disconnect(
+        self,
+        _client: mqtt.Client,
+        _userdata: Any,
+        _flags: mqtt.DisconnectFlags,
+        reason: ReasonCode,
+        _properties: Properties | None,
+    ) -> None:
+        if not self._stopped.is_set() and reason.is_failure:
+            self._complain("broke the connection")
+
+    def _complain(self, what: str) -> None:
+        """One line per outage."""
+        if not self._complained:
+            self._complained = True
+            _log.warning(
+                "MQTT: the broker %s %s; trying again, messages wait", self._broker.url, what
+            )
+
+
+def _offline(node: int) -> str:
+    return json.dumps({"online": False, "node": node, "gateway": True})
+
+
+def _state(node: KnownNode, now_s: float) -> str:
+    heard = math.isfinite(node.heard_s)
+    return json.dumps(
+        {
+            "online": node.next_hop != NO_ROUTE,
+            "node": node.node_id,
+            "gateway": False,
+            "hops": None if node.hops == NO_ROUTE else node.hops,
+            "next_hop": None if node.next_hop == NO_ROUTE else node.next_hop,
+            "heard_minutes_ago": int(max(0.0, now_s - node.heard_s) // 60) if heard else None,
+        }
+    )

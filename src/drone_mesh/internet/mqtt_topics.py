@@ -1,0 +1,120 @@
+"""The topics of MQTT and what their messages hold.
+
+    drone_mesh/<mesh>/<node>/rx[/<port>]   a message that the gateway received from that node
+    drone_mesh/<mesh>/<node>/tx[/<port>]   publish here to send a message to that node
+    drone_mesh/<mesh>/<node>/state         retained: JSON, what the gateway knows of the node
+    drone_mesh/<mesh>/<node>/event         JSON: what became of a message for that node
+
+`rx` and `tx` hold the bytes of the message and nothing else; port 0 has no level of its own. <node>
+is an id, for `tx` also "all".
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+from drone_mesh.communication.data.ticket import TO_ALL
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.errors import ConfigurationError
+
+ROOT = "drone_mesh"
+DEFAULT_MESH = "mesh"
+PASSWORD_VARIABLE = "DRONE_MESH_MQTT_PASSWORD"  # of the environment
+_PORTS = {"mqtt": 1883, "mqtts": 8883}
+
+
+@dataclass(frozen=True)
+class Broker:
+    """Where the broker is, and as whom to connect."""
+
+    host: str
+    port: int
+    tls: bool
+    mesh: str  # name of the mesh, a level of the topics
+    user: str = ""  # empty: none
+    password: str = ""
+
+    @property
+    def url(self) -> str:
+        """Address without user and password."""
+        return f"{'mqtts' if self.tls else 'mqtt'}://{self.host}:{self.port}"
+
+
+def parse_broker(url: str, password: str = "") -> Broker:
+    """mqtt[s]://[USER@]HOST[:PORT]/[MESH]. Raises ConfigurationError."""
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError as error:
+        raise ConfigurationError(f"invalid MQTT address {url!r}: {error}") from error
+    if parts.scheme not in _PORTS or not parts.hostname or parts.query or parts.fragment:
+        raise ConfigurationError(
+            f"invalid MQTT address {url!r}: use mqtt://HOST/ or mqtts://USER@HOST:PORT/MESH"
+        )
+    if parts.password is not None:
+        raise ConfigurationError(
+            "a password in the MQTT address shows in the list of processes: use a file"
+        )
+    mesh = parts.path.strip("/") or DEFAULT_MESH
+    if not re.fullmatch(r"[\w.-]{1,64}", mesh):
+        raise ConfigurationError(f"invalid mesh name {mesh!r}: use letters, digits, '_', '.', '-'")
+    if password and not parts.username:
+        raise ConfigurationError("an MQTT password needs a user: mqtt://USER@HOST/")
+    return Broker(
+        parts.hostname,
+        port or _PORTS[parts.scheme],
+        parts.scheme == "mqtts",
+        mesh,
+        parts.username or "",
+        password,
+    )
+
+
+class Destination(NamedTuple):
+    """What a topic of `tx` says."""
+
+    to: int
+    port: int
+
+
+class Topics:
+    """The topics of one mesh."""
+
+    def __init__(self, mesh: str) -> None:
+        self._prefix = f"{ROOT}/{mesh}"
+
+    def rx(self, node: int, port: int) -> str:
+        """Where a message from `node` goes."""
+        return f"{self._prefix}/{node}/rx" + (f"/{port}" if port else "")
+
+    def state(self, node: int) -> str:
+        """Where the state of `node` stays."""
+        return f"{self._prefix}/{node}/state"
+
+    def event(self, node: str) -> str:
+        """Where it is said what became of a message for `node`."""
+        return f"{self._prefix}/{node}/event"
+
+    @property
+    def all_tx(self) -> list[str]:
+        """Filters for every topic of `tx`."""
+        return [f"{self._prefix}/+/tx", f"{self._prefix}/+/tx/+"]
+
+    def node_of(self, topic: str) -> str:
+        """The level of the node, as it stands there."""
+        return topic[len(self._prefix) + 1 :].partition("/")[0]
+
+    def destination(self, topic: str) -> Destination | None:
+        """Where a message on a topic of `tx` is to go; None: the topic makes no sense."""
+        node, _tx, rest = topic[len(self._prefix) + 1 :].partition("/tx")
+        port = rest[1:] or "0"
+        if not (port.isascii() and port.isdigit() and int(port) <= 255):
+            return None
+        if node == "all":
+            return Destination(TO_ALL, int(port))
+        if not (node.isascii() and node.isdigit() and int(node) <= MAX_NODE_ID):
+            return None
+        return Destination(int(node), int(port))

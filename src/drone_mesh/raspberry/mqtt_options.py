@@ -1,0 +1,60 @@
+"""The options of raspberry_gateway that are about MQTT."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Mapping
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
+
+
+@dataclass(frozen=True)
+class MqttOptions:
+    """The broker of a gateway."""
+
+    broker: Broker
+    ca_file: Path | None  # None: the authorities that this machine trusts
+
+
+def add_mqtt_options(parser: argparse.ArgumentParser) -> None:
+    """Add the group to a parser."""
+    group = parser.add_argument_group("MQTT", "docs/data.md explains the topics.")
+    group.add_argument(
+        "--mqtt",
+        metavar="URL",
+        help="exchange users' messages with a broker: mqtt://HOST/MESH, or with TLS "
+        "mqtts://USER@HOST:PORT/MESH",
+    )
+    group.add_argument(
+        "--mqtt-password-file",
+        type=Path,
+        metavar="FILE",
+        help="file with the password of USER; without this option the environment variable "
+        f"{PASSWORD_VARIABLE} is used",
+    )
+    group.add_argument(
+        "--mqtt-ca",
+        type=Path,
+        metavar="FILE",
+        help="certificate (PEM) of the authority that signed the broker's, if it is a private one",
+    )
+
+
+def mqtt_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> MqttOptions | None:
+    """What was asked for. Raises ConfigurationError."""
+    if parsed.mqtt is None:
+        if parsed.mqtt_password_file is not None or parsed.mqtt_ca is not None:
+            raise ConfigurationError("--mqtt-password-file and --mqtt-ca need --mqtt")
+        return None
+    password = environment.get(PASSWORD_VARIABLE, "")
+    if parsed.mqtt_password_file is not None:
+        try:
+            password = parsed.mqtt_password_file.read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigurationError(
+                f"--mqtt-password-file {parsed.mqtt_password_file}: {error}"
+            ) from error
+    return MqttOptions(parse_broker(parsed.mqtt, password), parsed.mqtt_ca)

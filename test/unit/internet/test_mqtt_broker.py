@@ -1,0 +1,206 @@
+"""A gateway and a real broker, which is stopped and started again."""
+
+from __future__ import annotations
+
+import json
+import queue
+import shutil
+import socket
+import subprocess
+import time
+
+import paho.mqtt.client as mqtt
+import pytest
+from paho.mqtt.enums import CallbackAPIVersion
+
+from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.execution import MeshExecutor
+from drone_mesh.inprocess import Network
+from drone_mesh.internet.mqtt_internet import MqttInternet
+from drone_mesh.internet.mqtt_topics import Broker
+from drone_mesh.users.desk import UsersDesk
+
+MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(MOSQUITTO is None, reason="needs a broker: apt install mosquitto"),
+]
+PATIENCE_S = 40.0
+
+
+class Mosquitto:
+    """A broker that keeps its messages on disk."""
+
+    def __init__(self, folder):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self._file = folder / "mosquitto.conf"
+        self._file.write_text(
+            f"listener {self.port} 127.0.0.1\nallow_anonymous true\npersistence true\n"
+            f"persistence_location {folder}/\nuser root\nmax_queued_messages 0\n"
+        )
+        self._process = None
+
+    def start(self):
+        command = [MOSQUITTO, "-c", str(self._file)]
+        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        deadline_s = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", self.port), 1.0).close()
+                return
+            except OSError:
+                assert time.monotonic() < deadline_s, "the broker did not start"
+                time.sleep(0.05)
+
+    def stop(self):
+        if self._process is not None:
+            self._process.terminate()
+            self._process.wait(PATIENCE_S)
+            self._process = None
+
+
+class Client:
+    """Another program that uses the broker; its session outlives the connection."""
+
+    def __init__(self, port, topic):
+        self.messages = queue.Queue()
+        self._client = mqtt.Client(
+            CallbackAPIVersion.VERSION2, client_id="test", clean_session=False
+        )
+        self._client.reconnect_delay_set(1, 1)
+        self._client.on_connect = lambda client, *_: client.subscribe(topic, 1)
+        self._client.on_subscribe = lambda *_: self.messages.put(None)
+        self._client.on_message = lambda _client, _data, message: self.messages.put(message)
+        self._client.connect("127.0.0.1", port)
+        self._client.loop_start()
+        assert self.messages.get(timeout=PATIENCE_S) is None
+
+    def publish(self, topic, payload):
+        return self._client.publish(topic, payload, 1)
+
+    def next(self, wanted=lambda message: True):
+        deadline_s = time.monotonic() + PATIENCE_S
+        while True:
+            message = self.messages.get(timeout=max(0.01, deadline_s - time.monotonic()))
+            if message is not None and wanted(message):
+                return message
+
+    def close(self):
+        self._client.disconnect()
+        self._client.loop_stop()
+
+
+class Gateway:
+    """Gateway 0 and router 1; what is handed in is followed by a second of the mesh."""
+
+    def __init__(self, port):
+        self.network = Network(seed=1)
+        self.network.add_gateway(0, 0.0, 0.0)
+        self.network.add_router(1, 6.0, 0.0)
+        assert self.network.run_until(self.network.all_connected, 15.0)
+        gateway = self.network.nodes[0].component
+        assert isinstance(gateway, MeshnetworkGateway)
+        self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_is_poked=True)
+        self.users = UsersDesk(0, self.submit)
+        self.users.open(gateway.data)
+        self.internet = MqttInternet(
+            self.submit, self.users, Broker("127.0.0.1", port, False, "field")
+        )
+        self.executor.start()
+        self.internet.connect(gateway)
+
+    def submit(self, work):
+        def then_run(now_s):
+            work(now_s)
+            self.network.nodes[0].plan()
+            self.network.run_for(1.0)
+
+        self.executor.submit(then_run)
+
+    def from_node_1(self, payload, port=0):
+        self.submit(lambda _now_s: self.network.send(1, 0, payload, port))
+
+    def close(self):
+        self.internet.disconnect()
+        self.executor.stop()
+
+
+@pytest.fixture
+def broker(tmp_path):
+    broker = Mosquitto(tmp_path)
+    broker.start()
+    yield broker
+    broker.stop()
+
+
+@pytest.fixture
+def gateway(broker):
+    gateway = Gateway(broker.port)
+    yield gateway
+    gateway.close()
+
+
+@pytest.fixture
+def client(broker, gateway):
+    client = Client(broker.port, "drone_mesh/field/#")
+    yield client
+    client.close()
+
+
+def is_topic(topic):
+    return lambda message: message.topic == f"drone_mesh/field/{topic}"
+
+
+def test_what_a_node_sends_to_the_gateway_is_published(gateway, client):
+    gateway.from_node_1(b"21.5", port=3)
+    assert client.next(is_topic("1/rx/3")).payload == b"21.5"
+
+
+def test_what_is_published_arrives_at_the_node_and_an_event_says_so(gateway, client):
+    client.publish("drone_mesh/field/1/tx", b"blink")
+    event = json.loads(client.next(is_topic("1/event")).payload)
+    assert event == {"state": "delivered", "reason": "", "bytes": 5}
+    assert [message.payload for message in gateway.network.received[1]] == [b"blink"]
+
+
+@pytest.mark.parametrize(
+    ("topic", "payload", "reason"),
+    [("1", bytes(1025), "too large"), ("999", b"", "no such node or port")],
+)
+def test_what_cannot_be_sent_is_refused_in_an_event(client, topic, payload, reason):
+    client.publish(f"drone_mesh/field/{topic}/tx", payload)
+    event = json.loads(client.next(is_topic(f"{topic}/event")).payload)
+    assert event["state"] == "refused"
+    assert reason in event["reason"]
+
+
+def test_the_state_of_a_node_is_retained_and_the_end_of_the_gateway_shows(broker, gateway, client):
+    known = json.loads(client.next(is_topic("1/state")).payload)
+    assert (known["online"], known["node"], known["next_hop"]) == (True, 1, 1)
+    assert json.loads(client.next(is_topic("0/state")).payload)["online"] is True
+    gateway.internet._client._sock.shutdown(socket.SHUT_RDWR)  # as if its host lost power
+    gone = client.next(is_topic("0/state"))
+    assert json.loads(gone.payload) == {"online": False, "node": 0, "gateway": True}
+
+
+def test_nothing_is_lost_while_the_broker_is_away(broker, gateway, client, caplog):
+    for number in range(20):
+        gateway.from_node_1(b"up %d" % number)
+        client.publish("drone_mesh/field/1/tx", b"down %d" % number)
+        if number == 5:
+            broker.stop()
+        if number == 12:
+            broker.start()
+    received = set()
+    while len(received) < 20:
+        received.add(client.next(is_topic("1/rx")).payload)
+    assert received == {b"up %d" % number for number in range(20)}
+    deadline_s = time.monotonic() + PATIENCE_S
+    wanted = {b"down %d" % number for number in range(20)}
+    while {message.payload for message in gateway.network.received.get(1, [])} != wanted:
+        assert time.monotonic() < deadline_s, gateway.network.received[1]
+        time.sleep(0.05)
+    lines = [record.message for record in caplog.records if "the broker" in record.message]
+    assert len(lines) == 1, lines
