@@ -39,6 +39,7 @@ from drone_mesh.communication.messages import (
 )
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.node_reports import NodeReporter
+from drone_mesh.communication.node_search import NodeSearch
 from drone_mesh.communication.observer import (
     MeshEventKind,
     MeshObserver,
@@ -123,6 +124,7 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         self._introduction = Introduction(
             self._parts, self, self._frame, rng, lambda neighbour: self.send_heartbeat(neighbour)
         )
+        self._search = NodeSearch(self._parts, self._answer_search)
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
         room = messages.BODY_BYTES - antenna.reserved_bytes(messages.DATA_TYPES.start)
@@ -396,6 +398,9 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
     def _on_gateway_place(self, gateway: messages.GatewayPlace) -> None:
         """A node says where a gateway was."""
 
+    def _on_goal(self, neighbour: int, goal: Location) -> None:
+        """A neighbour says where it is about to fly."""
+
     def _on_neighbour_found(self, node: int) -> None:
         """A packet arrived from a node that was not a neighbour."""
 
@@ -408,6 +413,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         if kind == MessageType.LOCATION:
             location = messages.LocationMessage.from_payload(payload).location
             self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
+            if creator == from_ and messages.addressee(payload) == BROADCAST:
+                self._on_goal(creator, location)
         elif kind == MessageType.GATEWAY_PLACE:
             gateway = messages.GatewayPlace.from_payload(payload)
             if gateway is not None:
@@ -437,6 +444,8 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
         """A report, or the request for one, for this node."""
         if kind == MessageType.ORDER_QUERY:
             self._orders.on_query(creator, OrderQuery.number_in(payload))
+        elif kind == MessageType.NODE_SEARCH:
+            self._search.on_packet(creator, payload)
         else:
             self._drop("a type that is not processed", payload)
 
@@ -446,6 +455,10 @@ class MeshnetworkComponent(IMeshNetwork, IMeshDebugInfo, IRoutingEssentials):
 
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._deadlines.now_s)
+
+    def _answer_search(self, gateway: int) -> bool:
+        """A heartbeat even if one is under way: that one may have gone where no route leads."""
+        return self._delivery.send_own(messages.addressed(self._heartbeat(), gateway))
 
     def _heartbeat(self) -> bytes:
         me = self._node_id

@@ -222,6 +222,10 @@ class Delivery:
             messages.MissingMessage(me, me, BROADCAST, BROADCAST, missing).to_payload()
         )
 
+    def neighbour_leaves(self, node: int) -> None:
+        """A neighbour is about to fly out of reach: other routes are needed from now on."""
+        self._neighbour_lost(node, NO_ROUTE)
+
     def _neighbour_lost(self, node: int, came_from: int) -> None:
         if self._neighbours.lost(node, self._deadlines.now_s):
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)

@@ -31,6 +31,8 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused
 
+SEARCH_WITHIN_S = 60.0  # our choice: a node that was heard so lately is still looked for
+
 
 class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     """A node that answers heartbeats and brings orders from outside into the mesh."""
@@ -52,7 +54,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
         self._reports = ReportBook()
-        self._book = OrderBook(self._parts)
+        self._book = OrderBook(self._parts, self._search_known)
         self._orders.on_own_reply = self._book.on_outcome
 
     def stop(self) -> None:
@@ -137,6 +139,12 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         else:
             self._book.on_reply(creator, reply)
 
+    def _search_known(self, node: int) -> bool:
+        """Look for a node that was there lately. False: that is not possible, or of no use."""
+        _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
+        recent = self._deadlines.now_s - heard_s < SEARCH_WITHIN_S
+        return recent and self._search.search(node)
+
     def _begin(self) -> None:
         self._internet.connect(self)
 
@@ -154,6 +162,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
         self._heartbeats[creator] = (min(hops + 1, NO_ROUTE), self._deadlines.now_s)
+        self._book.on_found(creator)
         if creator != preferred_gateway:  # gateways do not answer each other
             self.send_heartbeat(creator)
 

@@ -48,6 +48,7 @@ class MessageType(enum.IntEnum):
     ORDER_QUERY = 65  # asks for an ORDER_REPLY
     NODE_REPORT = 66  # the state of its creator, for the gateway; see node_report
     NODE_WORDS = 67  # why its creator cannot fly
+    NODE_SEARCH = 68  # a gateway looks for a node; see node_search
     GATEWAY_PLACE = 125  # where a gateway was, in a mesh with a key
     SEAL_CHALLENGE = 126  # asks a neighbour to prove that it has the key
     SEAL_ANSWER = 127

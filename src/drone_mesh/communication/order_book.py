@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass, field
+from typing import Callable
 
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -23,6 +24,7 @@ OLD_ORDERS_KEPT = 100  # our choice: beside the latest of each drone
 HIGHEST_NUMBER = 2**16 - 1
 NUMBERS_PER_S = 16  # our choice: a gateway that is restarted does not begin where it began before
 REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # our choice: without a reply, so long after each try
+FOUND_WITHIN_S = 2.0  # our choice: a search passes through 100 nodes within half a second
 QUERY_PERIOD_S = 15.0  # our choice: how often a drone under way is asked
 MOST_QUERIES = 20  # our choice: without an answer; five minutes
 
@@ -57,6 +59,8 @@ class _Order:
     reason: str = ""
     changed_s: float = 0.0
     due_s: float = math.inf  # next repeat or query
+    sought: bool = False  # there was no route, and the drone was or is looked for
+    seeking: bool = False  # it is looked for now
     unanswered: int = 0  # packets since the drone was last heard about it
     settled: bool = False  # the drone itself has said how it ended
     reason_parts: TextAssembly = field(default_factory=TextAssembly)
@@ -65,8 +69,10 @@ class _Order:
 class OrderBook:
     """The orders of one gateway. Only its component calls it."""
 
-    def __init__(self, parts: NodeParts) -> None:
+    def __init__(self, parts: NodeParts, search: Callable[[int], bool]) -> None:
+        """`search` looks for a drone without a route; False: it is not looked for."""
         self._parts = parts
+        self._search = search
         self._orders: dict[int, _Order] = {}  # oldest first
         self._last_number = 0
 
@@ -98,18 +104,36 @@ class OrderBook:
     def send(self, number: int) -> bool:
         """Send it for the first time. False: there was no route, and it is not tried again."""
         order = self._orders[number]
-        if not self._parts.delivery.send_own(self._packet(order)):
+        if self._parts.delivery.send_own(self._packet(order)):
+            self._wait(order, REPEAT_AFTER_S[0])
+        elif not self._seek(order):
             self._no_route(order)
             return False
         self._report(order)
-        self._wait(order, REPEAT_AFTER_S[0])
         return True
 
     def on_missing(self, drone: int) -> None:
         """A relay says that it can take packets for this drone no further."""
         for order in self._open_for(drone):
-            if order.state is OrderState.ASKED:
+            waits = order.state is not OrderState.ASKED or order.seeking
+            if not waits and not self._seek(order):
                 self._no_route(order)
+
+    def on_found(self, drone: int) -> None:
+        """A drone has said that it is there, along a path that works."""
+        for order in self._open_for(drone):
+            if order.seeking:
+                order.seeking = False
+                self._parts.delivery.send_own(self._packet(order))
+                self._wait(order, REPEAT_AFTER_S[0])
+
+    def _seek(self, order: _Order) -> bool:
+        """Look for the drone, once per order; it is lost if the drone is not found in time."""
+        if order.sought or not self._search(order.drone):
+            return False
+        order.sought = order.seeking = True
+        self._wait(order, FOUND_WITHIN_S)
+        return True
 
     def on_reply(self, drone: int, reply: OrderReply) -> None:
         """A part of what a drone says; acts when the last missing part is there."""
@@ -144,7 +168,9 @@ class OrderBook:
     def _pursue(self, order: _Order) -> None:
         order.unanswered += 1
         order.due_s = math.inf
-        if order.state is OrderState.ASKED:
+        if order.seeking:
+            self._no_route(order)
+        elif order.state is OrderState.ASKED:
             if order.unanswered >= len(REPEAT_AFTER_S):
                 self._move(order, OrderState.GIVEN_UP, "the drone did not reply")
                 return
@@ -178,6 +204,7 @@ class OrderBook:
             return
         order.state, order.reason, order.changed_s = state, reason, self._parts.now_s
         order.due_s = math.inf
+        order.seeking = False
         self._report(order)
 
     def _report(self, order: _Order) -> None:

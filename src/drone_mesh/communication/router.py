@@ -207,7 +207,21 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._connection.on_route_lost()
         self._repair.on_neighbour_lost(node)
 
+    def _on_goal(self, neighbour: int, goal: Location) -> None:
+        here = self._pilot.goal or self._pilot.location()
+        if not self._antenna.medium.shared or here is None:
+            return
+        if here.distance_m(goal) >= self._repair.range_m:
+            self._delivery.neighbour_leaves(neighbour)
+
     def _took_off(self) -> None:
+        goal = self._pilot.goal
+        if self._antenna.medium.shared and goal is not None:
+            self._repair.tell_place(goal)
+            for neighbour in sorted(self._neighbours.ids()):
+                heard = self._neighbours.place_of(neighbour)
+                if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:
+                    self._delivery.neighbour_leaves(neighbour)
         if not self._is_short_flight():
             self._repair.on_ordered_flight()
 

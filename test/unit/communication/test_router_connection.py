@@ -555,3 +555,36 @@ def test_a_queued_packet_teaches_the_routes_when_the_antenna_says_what_became_of
     assert routing.links.etx(2) == 1.0
     rig.mesh.on_delivered(2, 4, rig.now_s)
     assert routing.links.etx(2) > 1.0
+
+
+def test_a_router_that_takes_off_says_where_to():
+    rig = shared_rig()
+    rig.connect_through(2)
+    rig.hear("00 02 06 01 01 00 00 80 3f")  # latitude 1
+    assert rig.broadcasts() == [packet("01 01 01 fe fe 00 00 80 3f")]
+
+
+@pytest.mark.parametrize(("latitude", "stays"), [("00 00 00 41", True), ("00 00 10 41", False)])
+def test_a_neighbour_that_flies_out_of_reach_is_no_neighbour_from_its_take_off(latitude, stays):
+    """8 m and 9 m away; the range is 9 m. It has announced its goal to all."""
+    rig = shared_rig()
+    rig.connect_through(2)
+    rig.hear(f"02 02 01 01 fe {latitude}")
+    assert (2 in rig.mesh.get_neighbours()) is stays
+    assert rig.mesh.get_connected_to_gateway() is stays
+
+
+def test_a_place_that_was_asked_for_does_not_end_a_link():
+    """The range is only what the node knows of it: a link may be longer."""
+    rig = shared_rig()
+    rig.connect_through(2)
+    rig.hear("02 02 01 01 01 00 00 20 41")  # 10 m away
+    assert rig.mesh.get_connected_to_gateway()
+
+
+def test_a_router_that_flies_out_of_reach_of_its_next_hop_takes_another_way_at_once():
+    rig = shared_rig()
+    rig.connect_through(2)
+    rig.hear("02 02 01 01 01 00 00 00 41")  # 8 m away
+    rig.hear("00 02 06 01 01 00 00 80 bf")  # latitude -1
+    assert 2 not in rig.mesh.get_neighbours()

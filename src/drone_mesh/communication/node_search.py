@@ -1,0 +1,64 @@
+"""NodeSearch: a gateway on a shared channel looks for a node that no known route leads to.
+
+A relay that loses a neighbour loses the routes to all nodes behind it, and learns others only from
+packets of those nodes. On a busy channel these may be silent for 25 s, so the gateway asks for one.
+docs/protocol.md, "Shared channel".
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Callable
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.parts import NodeParts
+
+BODY = struct.Struct("<BH")  # the node, the number of the search
+SEARCH_EVERY_S = 0.3  # our choice: each search is one broadcast of every node
+SAME_SEARCH_S = 10.0  # our choice: far longer than a search takes to pass through a mesh
+NUMBERS_PER_S = 16  # a restarted gateway does not begin where it began before
+
+
+class NodeSearch:
+    """Searches of one node, and its part in those of others. Only its component calls it."""
+
+    def __init__(self, parts: NodeParts, answer: Callable[[int], bool]) -> None:
+        """`answer` sends a heartbeat to the gateway that looks for this node."""
+        self._parts = parts
+        self._answer = answer
+        self._searched_s = -math.inf
+        self._seen_s: dict[tuple[int, int, int], float] = {}  # creator, node, number
+
+    def search(self, node: int) -> bool:
+        """Ask all nodes for it. False: not on this medium, or not so soon after another search."""
+        now_s = self._parts.now_s
+        if not self._parts.antenna.medium.shared or now_s - self._searched_s < SEARCH_EVERY_S:
+            return False
+        self._searched_s = now_s
+        number = int(now_s * NUMBERS_PER_S) % 2**16
+        self._broadcast(self._parts.node_id, node, number)
+        return True
+
+    def on_packet(self, creator: int, payload: bytes) -> None:
+        """Answer a search for this node; pass any other on, once."""
+        node, number = BODY.unpack_from(payload, messages.HEADER_BYTES)
+        now_s, search = self._parts.now_s, (creator, node, number)
+        old = [seen for seen, at_s in self._seen_s.items() if now_s - at_s >= SAME_SEARCH_S]
+        for seen in old:
+            del self._seen_s[seen]
+        if creator == self._parts.node_id or search in self._seen_s:
+            return
+        self._seen_s[search] = now_s
+        if node == self._parts.node_id:
+            self._answer(creator)
+        else:
+            self._broadcast(creator, node, number)
+
+    def _broadcast(self, creator: int, node: int, number: int) -> None:
+        me, kind = self._parts.node_id, MessageType.NODE_SEARCH
+        self._parts.antenna.broadcast_message(
+            messages.packet(kind, creator, me, BROADCAST, BROADCAST, BODY.pack(node, number))
+        )

@@ -1,0 +1,129 @@
+"""On a shared channel a gateway looks for a drone that it has an order for and no route to."""
+
+from __future__ import annotations
+
+import pytest
+from rig import Rig, packet
+
+from drone_mesh.communication.medium import UNDISTURBED, Medium
+
+ORDER, HEARTBEAT = 6, 4
+SHARED = Medium(shared=True, answer_s=1.0)
+FROM_5_THROUGH_2 = "05 02 04 01 01 01 01 01"  # a heartbeat for gateway 1
+LOST_BEHIND_2 = "02 02 05 01 01 05"  # 2 cannot reach 5
+
+
+def gateway_rig(medium=SHARED):
+    """Gateway 1 with an order under way to drone 5, behind 2; at 2 s: the search is number 32."""
+    rig = Rig(gateway=True)
+    rig.antenna.medium = medium
+    rig.wait(2.0)
+    rig.hear(FROM_5_THROUGH_2)
+    assert order(rig)
+    rig.forget()
+    return rig
+
+
+def order(rig, drone=5):
+    return rig.mesh.send_goal_request_to_drone(drone, 1.0, 0.0, 0, rig.now_s)
+
+
+def router_rig():
+    """Router 1, a neighbour of gateway 0."""
+    rig = Rig()
+    rig.antenna.medium = SHARED
+    rig.connect_to_gateway()
+    return rig
+
+
+def test_a_drone_that_a_relay_lost_is_looked_for_and_gets_its_order_when_it_answers():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2)
+    assert packet("01 01 44 fe fe 05 20 00") in rig.broadcasts()
+    assert rig.sent(ORDER) == []
+    rig.wait(0.5)
+    rig.hear("05 03 04 01 01 01 01 02")
+    assert [(p[3], p[4]) for p in rig.sent(ORDER)] == [(3, 5)]
+    assert "NO_ROUTE" not in rig.kinds()
+
+
+def test_another_report_of_the_loss_does_not_end_the_search():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2, LOST_BEHIND_2)
+    assert "NO_ROUTE" not in rig.kinds()
+
+
+def test_the_order_is_lost_if_the_drone_does_not_answer_within_two_seconds():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2)
+    rig.wait(1.9)
+    assert "NO_ROUTE" not in rig.kinds()
+    rig.wait(0.2)
+    assert rig.kinds()[-1] == "NO_ROUTE"
+
+
+def test_an_order_is_searched_for_once():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2)
+    rig.wait(0.5)
+    rig.hear(FROM_5_THROUGH_2, LOST_BEHIND_2)
+    assert rig.kinds()[-1] == "NO_ROUTE"
+
+
+def test_a_drone_without_a_route_that_was_there_lately_is_looked_for_before_the_order_leaves():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2)
+    rig.wait(3.0)
+    assert order(rig)
+    assert rig.sent(ORDER) == []
+    assert not order(rig, drone=9)  # never heard
+
+
+def test_it_is_not_looked_for_long_after_it_was_heard():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2)
+    rig.wait(61.0)
+    assert not order(rig)
+
+
+def test_searches_do_not_follow_each_other_at_once():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2)
+    assert not order(rig)
+    rig.wait(0.4)
+    assert order(rig)
+
+
+def test_on_a_medium_without_contention_nothing_is_looked_for():
+    rig = gateway_rig(UNDISTURBED)
+    rig.hear(LOST_BEHIND_2)
+    assert rig.broadcasts() == []
+    assert rig.kinds()[-1] == "NO_ROUTE"
+
+
+def test_a_search_is_passed_on_once_by_each_node():
+    rig = router_rig()
+    rig.hear("00 03 44 01 fe 05 20 00", "00 04 44 01 fe 05 20 00")
+    assert rig.broadcasts() == [packet("00 01 44 fe fe 05 20 00")]
+
+
+@pytest.mark.parametrize("other", ["05 21 00", "06 20 00"])
+def test_another_number_or_another_node_is_another_search(other):
+    rig = router_rig()
+    rig.hear("00 03 44 01 fe 05 20 00", f"00 03 44 01 fe {other}")
+    assert len(rig.broadcasts()) == 2
+
+
+def test_the_node_that_is_looked_for_answers_even_if_a_heartbeat_is_under_way():
+    rig = router_rig()
+    rig.mesh.send_heartbeat(0)
+    rig.forget()
+    rig.hear("00 03 44 01 fe 01 20 00")
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 00 00 01 00 00")]
+    assert rig.broadcasts() == []
+
+
+def test_a_gateway_does_not_pass_on_its_own_search():
+    rig = gateway_rig()
+    rig.hear("01 02 44 01 fe 05 20 00")
+    assert rig.broadcasts() == []
