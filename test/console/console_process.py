@@ -11,6 +11,7 @@ import time
 from inprocess_mesh import InProcessMesh
 
 from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.history import History
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import FRAME_PERIOD_S, ConsoleServer
 from drone_mesh.web.access import access_for
@@ -41,13 +42,16 @@ def main() -> None:
         help="times faster than ordered, and time passes only from frame to frame: none is missed",
     )
     parser.add_argument("--demonstrate", action="store_true")
+    parser.add_argument("--recording", default="")
     options = parser.parse_args()
     logging.basicConfig(level=logging.INFO)
     mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
     mesh.skip(options.skip)
-    store = FrameStore()
+    store = FrameStore(History())
     access = access_for(options.address, options.token)
-    server = ConsoleServer(store, mesh, access, LAYOUTS, options.demonstrate)
+    server = ConsoleServer(
+        store, mesh, access, LAYOUTS, options.demonstrate, recording=options.recording
+    )
     runner = ConsoleRunner(server, options.address, options.port)
     stop = threading.Event()
     # A flag and not the event: the handler may run while this thread holds the event's lock.

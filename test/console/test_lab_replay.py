@@ -56,7 +56,11 @@ def replay_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 def replay(replay_url: str, browser: Browser) -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     page.goto(replay_url)
-    expect(page.locator("#timeline output")).to_contain_text("of 60 s")
+    expect(page.locator("#time-now")).to_contain_text("of 60 s")
+    expect(page.locator("#badge")).to_be_visible()
+    expect(page.locator("#fly-form, .tools > .live")).to_have_count(4)
+    for order in page.locator("#fly-form, .tools > .live, #demonstrate, #power").all():
+        expect(order).to_be_hidden()
     yield page
     page.close()
 
@@ -78,7 +82,7 @@ def test_the_time_line_has_a_mark_for_the_fault_and_the_flight(replay: Page) -> 
 
 
 def test_dragging_shows_the_mesh_as_it_was_at_that_moment(replay: Page) -> None:
-    replay.get_by_role("button", name="pause", exact=True).last.click()
+    replay.get_by_role("button", name="pause", exact=True).click()
     drag_to(replay, 0.45)  # 27 s: node 2 is dead
     expect(replay.locator("#timeline output")).to_contain_text(re.compile(r"^2[67]\.\d"))
     row = replay.locator("#nodes tbody tr").nth(2)

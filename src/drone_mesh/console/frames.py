@@ -18,6 +18,7 @@ from collections import deque
 from dataclasses import asdict
 from typing import Any, Iterable, Mapping, Sequence
 
+from drone_mesh.console.history import History
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import (
@@ -46,8 +47,10 @@ NOTHING_MORE: Mapping[int, Mapping[str, Any]] = {}
 class FrameStore:
     """Belongs to one thread, the server's event loop. Version 0 is a page that knows nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self, history: History | None = None) -> None:
+        """`history` keeps what the store is given, for pages that look back."""
         self.version = 0
+        self.history = history
         self._mesh: MeshStatus | None = None
         self._link = "waiting for the first state of a mesh"
         self._clock: dict[str, Any] = {}
@@ -79,6 +82,8 @@ class FrameStore:
         if self._mesh is not None and mesh.stamp_s < self._mesh.stamp_s:
             self._forget_run()
         self._mesh, self._link = mesh, ""
+        if self.history is not None:
+            self.history.add(mesh, wall_s)
         troubles = {trouble.node: trouble for trouble in find_trouble(mesh.nodes)}
         summary = summarise(mesh.nodes, list(troubles.values()))
         self._clock = {
@@ -117,6 +122,8 @@ class FrameStore:
         events = list(events)
         self._next_version()
         self._orders.take(events)
+        if self.history is not None:
+            self.history.add_events(events)
         for event in events:
             self._events.append(
                 (
@@ -135,6 +142,14 @@ class FrameStore:
     def mesh(self) -> MeshStatus | None:
         """The newest state."""
         return self._mesh
+
+    def restart(self, samples: Sequence[MeshSample]) -> None:
+        """Begin again, as a page that jumps in time: with these samples and without events."""
+        self._next_version()
+        self._forget_run()
+        self._mesh = None
+        self._samples.extend((self.version, sample) for sample in samples[-SAMPLES_KEPT:])
+        self._sampled_at_s = float("-inf")
 
     def set_story(self, story: Mapping[str, Any]) -> None:
         """Set what the page tells about a demonstration; empty: nothing."""

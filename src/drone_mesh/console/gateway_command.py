@@ -15,6 +15,7 @@ from typing import Mapping, Sequence
 
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
+from drone_mesh.console.history import History
 from drone_mesh.console.real_mesh import events_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
@@ -102,7 +103,7 @@ def main(
 
 
 def _serve(client: GatewayClient, address: str, port: int, token: str, stop: StopRequest) -> None:
-    store = FrameStore()
+    store = FrameStore(History())
     controls = GatewayControls(client)
     server = ConsoleServer(
         store, controls, access_for(address, token), actions=GatewayControls.ACTIONS

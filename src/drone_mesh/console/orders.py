@@ -15,11 +15,15 @@ from drone_mesh.errors import MeshError
 from drone_mesh.layouts import MAX_CASE
 
 MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
+RECORDED = "this is a recording: it cannot be changed"
 LIMITS = {"coordinate": MAX_COORDINATE_M, "height": MAX_HEIGHT_M}  # metres; for the page's form
 
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
+MomentOrNone = Optional[Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]]  # simulated s
+SwitchOrNone = Optional[bool]
+FactorOrNone = Optional[Annotated[float, Field(gt=0, le=MAX_REAL_TIME_FACTOR, allow_inf_nan=False)]]
 
 
 class OrderRefused(MeshError):
@@ -104,19 +108,49 @@ class Demonstrate(_Request):
     on: bool
 
 
+class TimeLine(_Request):
+    """The page wants to look at another moment; None: as it is."""
+
+    do: Literal["time"]
+    t: MomentOrNone = None
+    step: int = Field(0, ge=-1000, le=1000)  # states on, or back
+    paused: SwitchOrNone = None
+    factor: FactorOrNone = None  # simulated seconds per second
+    live: bool = False  # back to the present
+
+
+class Recorded:
+    """The MeshControls of a recording: nothing can be ordered."""
+
+    def power(self, node: int, on: bool) -> str:
+        """Refused, as all that follows."""
+        raise OrderRefused(RECORDED)
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def layout(self, case: int) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def speed(self, paused: bool, factor: float) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+
 class _Numbered(_Request):
     number: int
 
 
-_REQUESTS: TypeAdapter[PageOrder | NeighbourWatch | Demonstrate] = TypeAdapter(
+Request = Union[PageOrder, NeighbourWatch, Demonstrate, TimeLine]
+
+_REQUESTS: TypeAdapter[Request] = TypeAdapter(
     Annotated[
-        Union[_Power, _Fly, _Layout, _Speed, NeighbourWatch, Demonstrate],
+        Union[_Power, _Fly, _Layout, _Speed, NeighbourWatch, Demonstrate, TimeLine],
         Field(discriminator="do"),
     ]
 )
 
 
-def parse_request(text: str) -> PageOrder | NeighbourWatch | Demonstrate:
+def parse_request(text: str) -> Request:
     """Parse a page's message. Raises OrderRefused for anything but a valid request."""
     try:
         return _REQUESTS.validate_json(text)

@@ -13,7 +13,6 @@ import contextlib
 import json
 import logging
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Sequence
 
@@ -27,6 +26,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.history import History
 from drone_mesh.console.orders import (
     LIMITS,
     Demonstrate,
@@ -34,9 +34,11 @@ from drone_mesh.console.orders import (
     NeighbourWatch,
     OrderRefused,
     PageOrder,
+    TimeLine,
     number_of,
     parse_request,
 )
+from drone_mesh.console.page import Page
 from drone_mesh.console.stage import Stage
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied
@@ -62,16 +64,6 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
 }
-
-
-@dataclass(eq=False)
-class Page:
-    """One open page."""
-
-    socket: WebSocket
-    version: int = 0  # of what it knows
-    watching: int | None = None  # the node whose neighbours it shows
-    orders: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Guard:
@@ -128,12 +120,19 @@ class ConsoleServer:
         layouts: Sequence[tuple[int, str]] = (),
         demonstrate: bool = False,
         actions: Sequence[str] = ALL_ACTIONS,
+        recording: str = "",
     ) -> None:
-        """`demonstrate`: show a repair as soon as a page is open; `actions`: what it offers."""
+        """`demonstrate`: show a repair as soon as a page is open; `actions`: what it offers.
+
+        `recording`: its name, if the console shows one. A recording that is in the store's history
+        as a whole, and not played, is shown from its start.
+        """
         self._actions = actions
         self._store = store
         self._controls = controls
         self._layouts = layouts
+        self._history = History() if store.history is None else store.history
+        self._recording = recording
         self._pages: set[Page] = set()
         self._workers = ThreadPoolExecutor(ORDER_THREADS, thread_name_prefix="order")
         self._stage = Stage(store, controls, self._workers)
@@ -168,7 +167,8 @@ class ConsoleServer:
         if len(self._pages) >= MOST_PAGES:
             await socket.close(TRY_LATER)
             return
-        page = Page(socket)
+        is_live = not (self._recording and self._store.mesh is None and self._history.times)
+        page = Page(socket, self._store, self._history, is_live)
         self._pages.add(page)
         sender = None
         try:
@@ -203,18 +203,22 @@ class ConsoleServer:
     async def _send_frames(self, page: Page) -> None:
         loop = asyncio.get_running_loop()
         try:
-            hello = {"type": "hello", "layouts": list(self._layouts), "limits": LIMITS}
-            hello["actions"] = list(self._actions)
+            hello = {
+                "type": "hello",
+                "layouts": list(self._layouts),
+                "limits": LIMITS,
+                "actions": list(self._actions),
+                "recording": self._recording,
+            }
             await self._send(page, json.dumps(hello))
+            before_s = loop.time()
             # wait_for may swallow a cancellation that comes as a send ends (before Python 3.12).
             while page in self._pages:
-                started = loop.time()
-                if page.version != self._store.version:
-                    frame, page.version = self._store.frame_since(page.version), self._store.version
-                    await self._send(page, frame)
-                    if page.watching is not None:
-                        await self._send(page, self._detail(page.watching))
-                await asyncio.sleep(max(0.0, started + FRAME_PERIOD_S - loop.time()))
+                started_s = loop.time()
+                for text in page.messages(started_s - before_s):
+                    await self._send(page, text)
+                before_s = started_s
+                await asyncio.sleep(max(0.0, started_s + FRAME_PERIOD_S - loop.time()))
         except asyncio.TimeoutError:
             log.info("console: disconnected a page that accepted nothing for %g s", SEND_TIMEOUT_S)
         except (WebSocketDisconnect, RuntimeError):
@@ -222,11 +226,6 @@ class ConsoleServer:
 
     async def _send(self, page: Page, text: str) -> None:
         await asyncio.wait_for(page.socket.send_text(text), SEND_TIMEOUT_S)
-
-    def _detail(self, node: int) -> str:
-        return json.dumps(
-            {"type": "detail", "node": node, "neighbours": self._store.neighbours_of(node)}
-        )
 
     async def _on_request(self, page: Page, text: str) -> None:
         try:
@@ -237,7 +236,9 @@ class ConsoleServer:
         if isinstance(request, NeighbourWatch):
             page.watching = request.node
             if request.node is not None:
-                await self._send(page, self._detail(request.node))
+                await self._send(page, page.detail(request.node))
+        elif isinstance(request, TimeLine):
+            page.move(request)
         elif isinstance(request, Demonstrate):
             try:
                 text = self._stage.begin() if request.on else self._stage.end()

@@ -35,7 +35,9 @@ class PromptProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
-        if self.cycle is not None and not self.cycle.response_complete:
+        speaks_websocket = self.transport.get_protocol() is not self
+        is_answered = self.cycle is not None and not self.cycle.response_complete
+        if speaks_websocket or is_answered:
             self._head_is_there()
         elif not self.is_waiting and not self.transport.is_closing():
             self._wait_for_head()

@@ -116,6 +116,7 @@ def test_a_page_is_greeted_and_then_gets_everything():
             "layouts": [[0, "0: field case"]],
             "limits": {"coordinate": 5000.0, "height": 500.0},
             "actions": ["fly", "power", "layout", "speed", "demonstrate"],
+            "recording": "",
         }
         assert page.received[1]["full"]
 

@@ -8,6 +8,7 @@ import { Mesh } from "./mesh.js";
 import { NodePanel } from "./panel.js";
 import { Story } from "./story.js";
 import { NodeTable } from "./table.js";
+import { TimeLine } from "./timeline.js";
 
 const TOAST_MS = 5000;
 const FAILURE_MS = 9000;
@@ -54,6 +55,7 @@ const panel = new NodePanel(
 );
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
+new TimeLine(mesh, (request) => connection.ask({ do: "time", ...request }));
 new Story(mesh, (on) => order({ do: "demonstrate", on }));
 mesh.addEventListener("story", () => mesh.story.running && !map.moved && map.fit());
 
@@ -174,11 +176,11 @@ showTheme();
 // Keys
 
 const KEYS = {
-  " ": () => byId("pause").click(),
+  " ": () => byId(mesh.canOrder ? "pause" : "time-play").click(),
   n: () => mesh.selectNext(1),
   b: () => mesh.selectNext(-1),
   "/": () => byId("find").focus(),
-  p: () => panel.switchPower(),
+  p: () => mesh.canOrder && panel.switchPower(),
   g: () => panel.focusGoal(),
   f: () => map.fit(),
   "?": () => byId("help").showModal(),

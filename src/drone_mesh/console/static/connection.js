@@ -32,6 +32,11 @@ export class Connection extends EventTarget {
     });
   }
 
+  /** Asks for something that is not answered. */
+  ask(request) {
+    if (this.open) this.#socket.send(JSON.stringify(request));
+  }
+
   #connect() {
     const socket = new WebSocket(
       `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`,
@@ -58,6 +63,8 @@ export class Connection extends EventTarget {
   #receive(message) {
     if (message.type === "frame") this.mesh.apply(message);
     else if (message.type === "detail") this.mesh.applyDetail(message);
+    else if (message.type === "timeline") this.mesh.applyTimeLine(message);
+    else if (message.type === "marks") this.mesh.applyMarks(message);
     else if (message.type === "hello") this.mesh.applyHello(message);
     else if (message.type === "answer") {
       const order = this.#orders.get(message.number);

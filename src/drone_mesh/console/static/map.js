@@ -174,7 +174,10 @@ export class MapView {
     this.canvas.setPointerCapture(event.pointerId);
     const node = this.#nodeAt(event.offsetX, event.offsetY);
     // A finger that moves the map must not send away a drone that happens to be under it.
-    const mayDrag = node && (event.pointerType === "mouse" || node.id === this.mesh.selected);
+    const mayDrag =
+      node &&
+      this.mesh.canOrder &&
+      (event.pointerType === "mouse" || node.id === this.mesh.selected);
     this.pointers.set(event.pointerId, {
       x: event.offsetX,
       y: event.offsetY,

@@ -30,6 +30,10 @@ export class Mesh extends EventTarget {
     this.events = [];
     this.samples = [];
     this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}}
+    this.recording = ""; // its name, if the console shows one
+    this.timeline = {}; // {start, end, now, live, paused, factor} of what can be looked at again
+    this.marks = []; // on the time line: [{t, kind, node}]
+    this.hasPresent = false; // whether there is a present to return to
     this.selected = null;
     this.detail = null; // {node, neighbours: [[id, age]]} of the selected node
   }
@@ -78,7 +82,24 @@ export class Mesh extends EventTarget {
     this.#notify("detail");
   }
 
-  applyHello({ layouts, limits, actions }) {
+  /** Whether the page looks at a mesh that takes orders. */
+  get canOrder() {
+    return !this.recording && this.timeline.live !== false;
+  }
+
+  applyTimeLine(timeline) {
+    this.timeline = timeline;
+    if (timeline.live) this.hasPresent = true;
+    this.#notify("timeline");
+  }
+
+  applyMarks({ marks }) {
+    this.marks = marks;
+    this.#notify("marks");
+  }
+
+  applyHello({ layouts, limits, actions, recording }) {
+    this.recording = recording;
     this.actions = actions;
     this.layouts = layouts;
     this.limits = limits;

@@ -12,6 +12,8 @@ import rosgraph
 import rospy
 
 from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.history import History
+from drone_mesh.console.orders import MeshControls, Recorded
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import ConfigurationError
@@ -108,7 +110,8 @@ def main() -> None:
 
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
     (str): password of the console; if none is given, an address that other machines can reach
-    gets a random one; ~demo (str): "repair" shows a repair as soon as a page is open.
+    gets a random one; ~demo (str): "repair" shows a repair as soon as a page is open;
+    ~recording (str): the name of the recording that is played, which takes no orders.
     /DroneManager/casus (str): the file of the layouts.
     """
     prepare_node(main.__doc__)
@@ -126,10 +129,14 @@ def _run() -> int:
     demo = str(rospy.get_param("~demo", ""))
     if demo not in ("", REPAIR_DEMO):
         raise ConfigurationError(f"invalid demo {demo!r}: must be {REPAIR_DEMO} or empty")
-    store = FrameStore()
+    recording = str(rospy.get_param("~recording", ""))
+    store = FrameStore(History())
     layouts = layout_names(manager_layouts())
     access = access_for(address, token)
-    server = ConsoleServer(store, RosControls(), access, layouts, demo == REPAIR_DEMO)
+    controls: MeshControls = Recorded() if recording else RosControls()
+    server = ConsoleServer(
+        store, controls, access, layouts, demo == REPAIR_DEMO, recording=recording
+    )
     runner = ConsoleRunner(server, address, port)
     stop = StopRequest()  # rospy's signal handler makes it, in the thread that waits for it
     rospy.on_shutdown(stop.make)

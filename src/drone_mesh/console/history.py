@@ -1,0 +1,115 @@
+"""History: the states and events of a run, to look at again; of a live one the last 30 minutes."""
+
+from __future__ import annotations
+
+import bisect
+import math
+import pickle
+import zlib
+from dataclasses import fields, replace
+from typing import Any, Iterable, Sequence
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.outages import MeshSample, take_sample
+
+KEPT_S = 1800.0  # simulated
+KEPT_BYTES = 64_000_000  # our choice; 254 nodes with 200 neighbours each need some 20 kB per state
+PERIOD_S = 0.4  # wall, between two states of a live run
+MOST_MARKS = 400
+_NODE_FIELDS = [field.name for field in fields(NodeStatus)]
+_MARKED = {
+    MeshEventKind.POWER_OFF.value: "off",
+    MeshEventKind.POWER_ON.value: "on",
+    MeshEventKind.DISCONNECTED.value: "lost",
+    MeshEventKind.FLIGHT_DECIDED.value: "flight",
+}
+
+
+class History:
+    """States are kept compressed. Belongs to one thread. Times are simulated seconds."""
+
+    def __init__(self, kept_s: float = KEPT_S, kept_bytes: float = KEPT_BYTES) -> None:
+        self._kept_s, self._kept_bytes = kept_s, kept_bytes
+        self._clear()
+
+    def _clear(self) -> None:
+        self._states: list[bytes] = []
+        self._bytes = 0
+        self._added_at_s = -math.inf  # wall
+        self.times: list[float] = []  # one per state, ascending
+        self._samples: list[MeshSample] = []  # one per state
+        self._events: list[EventRecord] = []  # oldest first
+        self._event_times: list[float] = []
+        self.marks: list[dict[str, Any]] = []  # what a time line shows: t, node and kind
+
+    @classmethod
+    def of(cls, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> History:
+        """A whole recorded run, oldest first."""
+        history = cls(math.inf, math.inf)
+        for state in states:
+            history._append(state)
+        history.add_events(sorted(events, key=lambda event: event.stamp_s))
+        return history
+
+    def add(self, mesh: MeshStatus, wall_s: float) -> None:
+        """Keep this state of a live run, if the last one is old enough. A new run begins anew."""
+        if self.times and mesh.stamp_s < self.times[-1]:
+            self._clear()
+        stands_still = bool(self.times) and mesh.stamp_s == self.times[-1]
+        if stands_still or wall_s - self._added_at_s < PERIOD_S:
+            return
+        self._added_at_s = wall_s
+        self._append(mesh)
+        too_old = bisect.bisect_left(self.times, mesh.stamp_s - self._kept_s)
+        size = self._bytes
+        while size > self._kept_bytes and too_old < len(self.times) - 1:
+            size -= len(self._states[too_old])
+            too_old += 1
+        if too_old:
+            self._forget(too_old)
+
+    def add_events(self, events: Iterable[EventRecord]) -> None:
+        """Keep these, oldest first."""
+        for event in events:
+            self._events.append(event)
+            self._event_times.append(event.stamp_s)
+            if event.kind in _MARKED:
+                mark = {"t": event.stamp_s, "kind": _MARKED[event.kind], "node": event.node}
+                self.marks = [*self.marks[1 - MOST_MARKS :], mark]
+
+    def index_at(self, at_s: float) -> int:
+        """Which state shows the mesh as it was at this time."""
+        return max(0, bisect.bisect_right(self.times, at_s) - 1)
+
+    def state(self, index: int) -> MeshStatus:
+        """The state with this number."""
+        mesh: MeshStatus
+        mesh, rows = pickle.loads(zlib.decompress(self._states[index]))
+        nodes = [NodeStatus(**dict(zip(_NODE_FIELDS, row))) for row in rows]
+        return replace(mesh, nodes=nodes)
+
+    def events_until(self, at_s: float) -> Sequence[EventRecord]:
+        """All events up to this time, oldest first."""
+        return self._events[: bisect.bisect_right(self._event_times, at_s)]
+
+    def samples_until(self, at_s: float) -> Sequence[MeshSample]:
+        """What charts show, up to this time."""
+        return self._samples[: bisect.bisect_right(self.times, at_s)]
+
+    def _append(self, mesh: MeshStatus) -> None:
+        rows = [[getattr(node, name) for name in _NODE_FIELDS] for node in mesh.nodes]
+        packed = zlib.compress(pickle.dumps((replace(mesh, nodes=()), rows)), 1)
+        self._states.append(packed)
+        self._bytes += len(packed)
+        self.times.append(mesh.stamp_s)
+        self._samples.append(take_sample(mesh))
+
+    def _forget(self, states: int) -> None:
+        """The oldest ones."""
+        self._bytes -= sum(map(len, self._states[:states]))
+        for kept in (self._states, self.times, self._samples):
+            del kept[:states]
+        old = bisect.bisect_left(self._event_times, self.times[0])
+        del self._events[:old], self._event_times[:old]
+        self.marks = [mark for mark in self.marks if mark["t"] >= self.times[0]]

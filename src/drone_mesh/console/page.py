@@ -1,0 +1,105 @@
+"""Page: one open page, and what it looks at: the present, or a moment of the history."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any, Iterator
+
+from starlette.websockets import WebSocket
+
+from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.history import History
+from drone_mesh.console.orders import TimeLine
+from drone_mesh.console.player import Player
+
+
+class Page:
+    """Belongs to the server's event loop."""
+
+    def __init__(
+        self, socket: WebSocket, live: FrameStore, history: History, is_live: bool
+    ) -> None:
+        """`is_live`: there is a present, to which the page can return."""
+        self.socket = socket
+        self.watching: int | None = None  # the node whose neighbours it shows
+        self.orders: set[asyncio.Task[None]] = set()
+        self._live, self._history, self._is_live = live, history, is_live
+        self._player = None if is_live else Player(history, history.times[0])
+        self._version = 0  # of what it knows
+        self._time_line: dict[str, Any] = {}
+        self._marks: list[dict[str, Any]] = []
+
+    @property
+    def store(self) -> FrameStore:
+        """What it looks at."""
+        return self._live if self._player is None else self._player.store
+
+    def messages(self, wall_s: float) -> Iterator[str]:
+        """What is new for the page; so much wall time has passed."""
+        if self._player is not None:
+            self._play(self._player, wall_s)
+        store = self.store
+        if self._version != store.version:
+            # Only what is sent counts as known: a page that falls behind gets it all at once.
+            frame, self._version = store.frame_since(self._version), store.version
+            yield frame
+            if self.watching is not None:
+                yield self.detail(self.watching)
+        if self._history.times:
+            yield from self._time_line_messages()
+
+    def move(self, request: TimeLine) -> None:
+        """Look at another moment."""
+        if request.live and self._is_live:
+            self._look_at(None)
+            return
+        if not self._history.times:
+            return
+        if self._player is None:
+            self._look_at(Player(self._history, self._history.times[-1]))
+        player = self._player
+        assert player is not None
+        if request.factor is not None:
+            player.factor = request.factor
+        if request.t is not None:
+            player.show(request.t)
+        if request.paused is not None:
+            player.pause(request.paused)
+        if request.step:
+            player.step(request.step)
+
+    def detail(self, node: int) -> str:
+        """The neighbours of a node, as JSON text."""
+        neighbours = self.store.neighbours_of(node)
+        return json.dumps({"type": "detail", "node": node, "neighbours": neighbours})
+
+    def _play(self, player: Player, wall_s: float) -> None:
+        if not self._history.times or self._history.times[-1] < player.now_s:
+            self._look_at(None)  # another run has begun
+            return
+        player.advance(wall_s)
+        if self._is_live and player.at_end and not player.paused:
+            self._look_at(None)
+
+    def _look_at(self, player: Player | None) -> None:
+        self._player, self._version = player, 0
+
+    def _time_line_messages(self) -> Iterator[str]:
+        times, player = self._history.times, self._player
+        now_s = times[-1] if player is None else player.now_s
+        time_line = {
+            "type": "timeline",
+            "start": times[0],
+            "end": times[-1],
+            "now": now_s,
+            "live": player is None,
+            "paused": player is not None and player.paused,
+            "factor": 1.0 if player is None else player.factor,
+        }
+        if time_line != self._time_line:
+            self._time_line = time_line
+            yield json.dumps(time_line)
+        if self._history.marks is not self._marks:
+            self._marks = self._history.marks
+            yield json.dumps({"type": "marks", "marks": self._marks})

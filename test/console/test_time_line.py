@@ -1,0 +1,80 @@
+"""The time line of a live run: drag back, play, return to the present."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from conftest import Visit
+
+HASTE = ("--skip", "5", "--haste", "5")
+
+
+@pytest.fixture
+def page(start_console, visit) -> Visit:
+    opened = visit(start_console(*HASTE).url)
+    opened.wait_for_drones(18)
+    return opened
+
+
+def clock_s(page: Visit) -> float:
+    return float(page.page.inner_text("#clock").split()[0])
+
+
+def drag_to(page: Visit, share: float) -> None:
+    box = page.page.locator("#time").bounding_box()
+    assert box is not None
+    page.page.mouse.click(box["x"] + 8 + (box["width"] - 16) * share, box["y"] + box["height"] / 2)
+
+
+def test_dragging_back_shows_the_past_and_live_returns_to_the_present(page):
+    page.wait_for("some time to look back at", lambda: clock_s(page) > 12.0)
+    page.page.click("#nodes tr[data-id='5']")
+    page.page.click("#power")
+    page.wait_for("5 is off", lambda: page.row(5, 2) == "off")
+    page.wait_for("a mark", lambda: page.page.locator("#marks .mark.off").count() == 1)
+    drag_to(page, 0.0)
+    page.wait_for("5 was on", lambda: page.row(5, 2) == "connected")
+    page.wait_for("the badge", lambda: page.page.is_visible("#past"))
+    assert clock_s(page) < 12.0
+    for order in ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate"):
+        assert not page.page.is_visible(order)
+    page.page.click("#time-live")
+    page.wait_for("the present", lambda: page.row(5, 2) == "off")
+    page.wait_for("the orders", lambda: page.page.is_visible("#power"))
+    assert not page.page.is_visible("#past")
+
+
+def test_the_past_can_be_paused_stepped_and_played_until_the_present(page):
+    page.wait_for("some time to look back at", lambda: clock_s(page) > 20.0)
+    drag_to(page, 0.0)
+    page.wait_for("the past", lambda: page.page.is_visible("#time-play"))
+    page.page.click("#time-play")
+    page.wait_for("it is paused", lambda: page.page.inner_text("#time-play") == "Play")
+    before_s = clock_s(page)
+    page.page.click("#time-step")
+    page.wait_for("a later moment", lambda: clock_s(page) > before_s)
+    page.page.select_option("#time-factor", "20")
+    page.page.click("#time-play")
+    page.wait_for("the present", lambda: page.page.inner_text("#time-now") == "now", 20.0)
+
+
+def test_one_page_looks_back_while_another_stays_in_the_present(start_console, visit):
+    console = start_console(*HASTE)
+    page, other = visit(console.url), visit(console.url)
+    page.wait_for_drones(18)
+    page.wait_for("some time to look back at", lambda: clock_s(page) > 12.0)
+    drag_to(page, 0.0)
+    page.wait_for("the past", lambda: page.page.is_visible("#past"))
+    assert not other.page.is_visible("#past")
+    assert clock_s(other) > 12.0
+
+
+def test_a_recording_that_is_played_wears_a_badge_and_takes_no_orders(start_console, visit):
+    page = visit(start_console(*HASTE, "--recording", "run.bag").url)
+    page.wait_for_drones(18)
+    page.wait_for("the badge", lambda: page.page.is_visible("#badge"))
+    assert re.match("run.bag", page.page.title())
+    page.page.click("#nodes tr[data-id='5']")
+    for order in ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate"):
+        assert not page.page.is_visible(order)

@@ -1,0 +1,104 @@
+"""What a page can look at again."""
+
+from __future__ import annotations
+
+import json
+
+from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.history import History
+from drone_mesh.console.player import Player
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+
+
+def mesh(stamp_s: float, hops: int = 1, size: int = 1) -> MeshStatus:
+    nodes = [NodeStatus(n, connected=True, hops=hops, route=bytes([n, 9])) for n in range(size)]
+    return MeshStatus(stamp_s, nodes, routing="child_table_tree")
+
+
+def filled(seconds: int = 20) -> History:
+    """One state per second, whose hops are its second, and two events."""
+    events = [EventRecord(5.0, 0, "power off"), EventRecord(12.0, 0, "connected", (9,))]
+    return History.of([mesh(float(s), hops=s) for s in range(seconds)], events)
+
+
+def shown(player: Player) -> dict:
+    return json.loads(player.store.frame_since(0))
+
+
+def test_a_state_comes_back_as_it_was():
+    history = History()
+    given = MeshStatus(3.0, [NodeStatus(4, position=(1.0, 2.0, 0.5), neighbours=b"\x01\x02")])
+    history.add(given, wall_s=0.0)
+    assert history.state(0) == given
+
+
+def test_of_a_live_run_thirty_minutes_are_kept():
+    history = History()
+    for second in range(2000):
+        history.add(mesh(float(second)), wall_s=float(second))
+    history.add_events([EventRecord(1999.0, 0, "power off")])
+    assert history.times[0] == 199.0
+    assert history.times[-1] == 1999.0
+
+
+def test_states_of_a_crowd_are_kept_as_far_as_there_is_room():
+    history = History(kept_bytes=20_000)
+    for second in range(200):
+        history.add(mesh(float(second), size=50), wall_s=float(second))
+    assert 1 < len(history.times) < 199
+    assert history.times[-1] == 199.0
+
+
+def test_a_paused_mesh_and_one_that_reports_often_do_not_fill_it():
+    history = History()
+    for stamp_s, wall_s in [(1.0, 0.0), (1.0, 5.0), (2.0, 5.1), (2.2, 5.3), (2.4, 5.5)]:
+        history.add(mesh(stamp_s), wall_s)
+    assert history.times == [1.0, 2.0, 2.4]
+
+
+def test_a_new_run_begins_a_new_history():
+    history = filled()
+    history.add(mesh(0.5), wall_s=100.0)
+    assert history.times == [0.5]
+    assert history.marks == []
+
+
+def test_a_jump_back_shows_the_state_and_the_events_of_that_moment():
+    player = Player(filled(), at_s=19.0)
+    assert [event["kind"] for event in shown(player)["events"]] == ["power off", "connected"]
+    player.show(7.4)
+    frame = shown(player)
+    assert frame["clock"]["t"] == 7.0
+    assert frame["nodes"]["0"]["hops"] == 7
+    assert [event["kind"] for event in frame["events"]] == ["power off"]
+    assert len(frame["samples"]) == 8
+
+
+def test_playing_adds_what_happened_since():
+    player = Player(filled(), at_s=10.0)
+    known = player.store.version
+    player.factor = 5.0
+    player.advance(wall_s=0.5)
+    frame = json.loads(player.store.frame_since(known))
+    assert not frame["full"]
+    assert frame["clock"]["t"] == 12.0
+    assert [event["kind"] for event in frame["events"]] == ["connected"]
+
+
+def test_a_step_pauses_and_ends_at_both_ends():
+    player = Player(filled(), at_s=18.2)
+    for expected_s in (19.0, 19.0):
+        player.step(1)
+        assert shown(player)["clock"]["t"] == expected_s
+    assert shown(player)["clock"]["paused"]
+    player.step(-1000)
+    assert shown(player)["clock"]["t"] == 0.0
+
+
+def test_the_store_fills_the_history_that_it_is_given():
+    history = History()
+    store = FrameStore(history)
+    store.update_mesh(mesh(1.0), wall_s=0.0)
+    store.add_events([EventRecord(1.0, 0, "flight decided", (2,))])
+    assert history.times == [1.0]
+    assert history.marks == [{"t": 1.0, "kind": "flight", "node": 0}]
