@@ -66,9 +66,9 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     return arguments
 
 
-def _links(name: str, rng: random.Random) -> LinkModel:
+def _links(name: str, rng: random.Random, bits_per_s: int) -> LinkModel:
     if name == "distance":
-        return LogDistance.with_edge_at(MAX_DISTANCE_M, rng)
+        return LogDistance.with_edge_at(MAX_DISTANCE_M, rng, bits_per_s=bits_per_s)
     if name == "measured":
         return measured_curve(rng, range_m=MAX_DISTANCE_M)
     return IdealDisc(MAX_DISTANCE_M)
@@ -86,8 +86,9 @@ def main(argv: list[str] | None = None) -> int:
     """Run it and print the result."""
     arguments = _arguments(argv)
     clock = WallClock() if arguments.wall else VirtualClock()
-    links = _links(arguments.links, random.Random(f"{arguments.seed} links"))
     settings = RadioSettings(data_rate=DATA_RATES[arguments.rate])
+    rng = random.Random(f"{arguments.seed} links")
+    links = _links(arguments.links, rng, settings.data_rate.value)
     mesh = EmulatedMesh(clock, links, arguments.seed, settings=settings)
     trace = FrameTrace()
     if arguments.trace:

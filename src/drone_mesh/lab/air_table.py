@@ -54,7 +54,8 @@ def _connects(trial: AirTrial, within_s: float, share: float) -> Row:
         text = (
             f"{when}, {100 * got.share:.2f} %; {got.frames / got.simulated_s:.0f} frames/s, "
             f"{100 * got.collided:.0f} % collided, airtime {100 * got.airtime:.0f} %, "
-            f"{got.tries:.2f} tries, {got.lost} given up"
+            f"{got.tries:.2f} tries, {got.lost} given up; "
+            f"{got.simulated_s / max(got.cpu_s, 1e-9):.0f} s per core s"
         )
         reached = got.connected_s <= within_s and got.share >= share and not got.warnings
         return Result(text, reached, got.share - got.connected_s / 1000)
