@@ -107,6 +107,7 @@ class MeshExecutor:
         self._queue: queue.SimpleQueue[tuple[float, Work, Seat | None] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._stopping = False
+        self._on_idle: Callable[[], None] = lambda: None
         # Written by the worker, read by others; single floats need no lock.
         self._working_since_s = math.inf  # when the current work was due
         self._next_due_s = math.inf
@@ -122,6 +123,10 @@ class MeshExecutor:
     def start(self) -> None:
         """Start the worker. Earlier submissions come first."""
         self._thread.start()
+
+    def when_idle(self, function: Callable[[], None]) -> None:
+        """Have the worker call this, before `start`, each time when no work is left for now."""
+        self._on_idle = function
 
     def stop(self) -> None:
         """Finish the submitted work, then stop; returns when the thread has ended."""
@@ -164,7 +169,10 @@ class MeshExecutor:
         waiting: tuple[float, Work, Seat | None] | None = None
         while not self._stopping:
             if waiting is None:
-                waiting = self._take(block=not deadlines or deadlines[0][0] > self._clock())
+                block = not deadlines or deadlines[0][0] > self._clock()
+                if block and self._queue.empty():
+                    self._on_idle()
+                waiting = self._take(block)
             now_s = self._clock()
             due_s = deadlines[0][0] if deadlines else math.inf
             if due_s <= now_s and (waiting is None or due_s <= waiting[0]):

@@ -183,6 +183,19 @@ def test_lateness_is_measured_in_seconds_of_the_clock(executor, clock):
     assert executor.lag_s(1.25) == 0.0
 
 
+def test_it_says_so_when_no_work_is_left_and_not_before(clock):
+    executor = MeshExecutor(clock, clock_is_poked=True)
+    seen = []
+    idle = threading.Event()
+    executor.when_idle(lambda: (seen.append("idle"), idle.set()))
+    for number in range(3):
+        executor.submit(lambda _now_s, number=number: seen.append(number))
+    executor.start()
+    assert idle.wait(PATIENCE_S), "it never said that it is idle"
+    executor.stop()
+    assert seen[:4] == [0, 1, 2, "idle"]
+
+
 def test_stop_works_off_what_was_submitted_and_joins_the_thread(clock):
     executor = MeshExecutor(clock, clock_is_poked=True, name="joined")
     executor.start()

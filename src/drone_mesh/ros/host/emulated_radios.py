@@ -67,6 +67,11 @@ class EmulatedRadios:
             rate.value // 1000,
         )
 
+    @property
+    def under_way(self) -> int:
+        """0: the chips live in wall time, and the world does not wait for them."""
+        return 0
+
     def figures(self) -> dict[str, float]:
         """Of the air and all radios. One thread."""
         with self._wall_clock.access():

@@ -6,9 +6,9 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
-from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
+from drone_mesh.ros.host.mesh_host import MeshHost
 
 _QUEUE = 100
 
@@ -17,22 +17,25 @@ class FollowedClock:
     """Follows /clock, and reports to the world how far the work of this process is.
 
     Subscribes: /clock (Clock)
-    Publishes:  /mesh/progress (Header: stamp = all work up to this simulated time is done)
+    Publishes:  /mesh/progress (Header: stamp = all work up to this simulated time is done;
+                seq = packets handed over less those worked off, modulo 2**32)
 
-    `now_s` is set by rospy's thread and read by all.
+    `now_s` is set by rospy's thread and read by all; `_reported` is set by the executor's worker.
     """
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        self._executor: MeshExecutor | None = None
+        self._host: MeshHost | None = None
+        self._reported = 0  # packets under way, as they were published last
         self._progress = rospy.Publisher(
             names.PROGRESS_TOPIC, Header, tcp_nodelay=True, queue_size=_QUEUE
         )
         rospy.Subscriber(names.CLOCK_TOPIC, Clock, self._advance, tcp_nodelay=True)
 
-    def drive(self, executor: MeshExecutor) -> None:
-        """Move this executor with the clock, and report its work from now on."""
-        self._executor = executor
+    def drive(self, host: MeshHost) -> None:
+        """Move this host with the clock, and report its work from now on."""
+        self._host = host
+        host.executor.when_idle(self._idle)
 
     def is_followed(self) -> bool:
         """Whether the world subscribes to the reports."""
@@ -40,16 +43,26 @@ class FollowedClock:
 
     def report_progress(self) -> None:
         """Report now; also while one piece of work takes long, or time stands still."""
-        assert self._executor is not None
+        assert self._host is not None
         now_s = self.now_s
-        self._publish(ros_time(now_s - self._executor.lag_s(now_s)))
+        self._publish(ros_time(now_s - self._host.lag_s(now_s)))
 
     def _advance(self, clock: Clock) -> None:
         self.now_s = clock.clock.to_sec()
-        if self._executor is not None:
-            self._executor.time_advanced()
+        if self._host is not None:
+            self._host.time_advanced()
             # Runs after everything that was due by now, or was submitted before.
-            self._executor.submit(lambda _now_s: self._publish(clock.clock))
+            self._host.executor.submit(lambda _now_s: self._publish(clock.clock))
+
+    def _idle(self) -> None:
+        """The worker has nothing left to do: the world may be waiting for just that."""
+        assert self._host is not None
+        if self._host.under_way != self._reported:
+            self._publish(ros_time(self.now_s))
 
     def _publish(self, done: rospy.Time) -> None:
-        self._progress.publish(Header(stamp=done, frame_id=rospy.get_name()))
+        assert self._host is not None
+        self._reported = self._host.under_way
+        # rospy numbers the headers that messages have, and leaves a message that is one alone.
+        packets = self._reported & 0xFFFFFFFF
+        self._progress.publish(Header(seq=packets, stamp=done, frame_id=rospy.get_name()))

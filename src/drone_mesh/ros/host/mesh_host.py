@@ -73,6 +73,11 @@ class MeshHost:
         """
         return self.executor.lag_s(now_s)
 
+    @property
+    def under_way(self) -> int:
+        """Packets that this process handed over, less those that its nodes have worked off."""
+        return self._radios.under_way
+
     def time_advanced(self) -> None:
         """The clock was moved."""
         self.executor.time_advanced()

@@ -107,7 +107,7 @@ def main() -> None:
         # The world waits for declared hosts only.
         rospy.set_param(names.host_param(rospy.get_name()), [ids.start, ids.stop - 1])
         MasterWatch(names.host_param(rospy.get_name())).start()
-        clock.drive(host.executor)
+        clock.drive(host)
         host.start()
         try:
             host.wait_for_radios(stop.requested)

@@ -24,6 +24,10 @@ class Radios(Protocol):
     def never_handed_over(self) -> int:
         """Packets, since the start, that the simulated air never received."""
 
+    @property
+    def under_way(self) -> int:
+        """Packets that were handed over, less those worked off; 0 if these radios do not wait."""
+
     def figures(self) -> dict[str, float]:
         """Of the channel that all nodes share, for people; empty if they do not share one."""
 
@@ -64,6 +68,11 @@ class VirtualRadios:
     def never_handed_over(self) -> int:
         """Packets, since the start, that no simulator accepted."""
         return self._link.never_handed_over
+
+    @property
+    def under_way(self) -> int:
+        """See SimulatorLink."""
+        return self._link.under_way
 
     def figures(self) -> dict[str, float]:
         """None: packets do not meet on an ideal disc."""

@@ -88,14 +88,16 @@ class SimulatorConnection:
         answer = self._messages.call_bytes(fields)
         return [bool(taken) for taken in answer[_LENGTH.size :]]
 
-    def broadcast(self, payload: bytes) -> None:
-        """Hand over a packet for every node in range of its sender."""
+    def broadcast(self, payload: bytes) -> int:
+        """Hand over a packet for every node in range of its sender; returns how many have it."""
         asker = bytes((sender(payload),))
         if self._broadcast is not None:
-            self._broadcast.call_bytes(asker + payload)  # the fields of a BroadcastRequest
-        elif self._others is not None:
-            for node_id in self._others.call_bytes(asker)[_LENGTH.size :]:
-                self.send(readdressed(payload, node_id))
+            # The fields of a BroadcastRequest; the answer is the array of the nodes that have it.
+            return len(self._broadcast.call_bytes(asker + payload)) - _LENGTH.size
+        if self._others is None:
+            return 0
+        others = self._others.call_bytes(asker)[_LENGTH.size :]
+        return sum(self.send(readdressed(payload, node_id)) for node_id in others)
 
 
 def _if_offered(

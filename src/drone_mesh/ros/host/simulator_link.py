@@ -42,7 +42,8 @@ class SimulatorLink(rospy.SubscribeListener):
         self._complaints = ThrottledLog(_log)
         self._look = threading.Event()
         self._stopping = False
-        self._never_handed_over = 0  # written by the executor's worker
+        self._never_handed_over = 0  # written by the executor's worker, as the next one
+        self._under_way = 0
         self._probing = False  # the worker has been asked to probe, and has not done so yet
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC,
@@ -71,6 +72,18 @@ class SimulatorLink(rospy.SubscribeListener):
         return self._never_handed_over
 
     @property
+    def under_way(self) -> int:
+        """Packets that this process handed over, less those that its nodes have worked off.
+
+        Over all processes together this is how many packets are under way or wait in a queue.
+        """
+        return self._under_way
+
+    def worked_off(self) -> None:
+        """A node of this process is done with a packet. On the executor's worker."""
+        self._under_way -= 1
+
+    @property
     def connected(self) -> bool:
         """Whether packets can be handed to a simulator."""
         return self._connection is not None
@@ -91,8 +104,11 @@ class SimulatorLink(rospy.SubscribeListener):
             return [False] * len(payloads)
         try:
             if len(payloads) > 1:
-                return connection.send_all(payloads)
-            return [connection.send(payload) for payload in payloads]
+                taken = connection.send_all(payloads)
+            else:
+                taken = [connection.send(payload) for payload in payloads]
+            self._under_way += sum(taken)
+            return taken
         except ServiceRefused as error:
             self._complaints.warning("packet refused", str(error))
         except ServiceGone as error:
@@ -108,7 +124,7 @@ class SimulatorLink(rospy.SubscribeListener):
             self._never_handed_over += 1
             return
         try:
-            connection.broadcast(payload)
+            self._under_way += connection.broadcast(payload)
         except ServiceRefused:
             # A new simulator, to which this antenna is announced in a moment: no line in the log.
             self._complaints.counts["broadcast refused"] += 1

@@ -93,12 +93,15 @@ class VirtualNRF24(IWirelessCommunication):
         payload = message.payload
         if payload == self._probe:
             self._link.antennas.probe_returned(self.node_id)
-        elif self._on:
+        else:
             self._seat.submit(lambda now_s: self._receive(payload, now_s))
 
     def _receive(self, payload: bytes, now_s: float) -> None:
-        if self._on and self._mesh is not None:
-            self._mesh.on_msg(payload, now_s)
+        try:
+            if self._on and self._mesh is not None:
+                self._mesh.on_msg(payload, now_s)
+        finally:
+            self._link.worked_off()
 
     def _switch_power(self, on: bool) -> None:
         mesh = self._mesh

@@ -5,15 +5,18 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import rospy
 from std_msgs.msg import Header
 
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.world.under_way import UnderWay
 
-MAX_LAG_S = 0.03  # our choice: timers may fire at most 50 ms of simulated time late
+# Our choice, simulated: a timer is late by this and one step of the world at most, and so is the
+# last of all packets that follow from it. The mesh waits ten times as long for an answer.
+MAX_LAG_S = 0.05
 HOST_TIMEOUT_S = 2.0  # wall seconds; the world goes on without a host that is silent for longer
 LOOK_AGAIN_AFTER_S = 1.0  # wall seconds; between two looks at whether a stranger is a host
 
@@ -23,6 +26,10 @@ _log = logging.getLogger(__name__)
 class PacedNodes(Protocol):
     """Nodes that live in the time of the world."""
 
+    @property
+    def under_way(self) -> int:
+        """Packets that they handed over, less those that they have worked off."""
+
     def lag_s(self, now_s: float) -> float:
         """For how many simulated seconds the oldest undone work has been waiting."""
 
@@ -30,8 +37,21 @@ class PacedNodes(Protocol):
         """The world has made a step."""
 
 
+class _Progress(NamedTuple):
+    """What a host reported last."""
+
+    done_s: float  # simulated; all work up to then is done
+    under_way: int  # packets that it handed over, less those that it has worked off
+    reported_s: float  # monotonic
+
+
 class PacedHosts:
     """The nodes of this process, and hosts in other processes.
+
+    The mesh is quiet when all hosts have done what was due and no packet is under way, in a queue
+    or between processes. The world may not be ahead of the last quiet moment by more than
+    MAX_LAG_S. So whatever follows from an event, over any number of hops, has happened within that
+    time, however slow the machine is.
 
     Subscribes: /mesh/progress (Header), of processes that have declared themselves hosts
 
@@ -41,30 +61,39 @@ class PacedHosts:
     def __init__(self, nodes: PacedNodes | None) -> None:
         """`nodes` are those of this process, if there are any."""
         self._nodes = nodes
-        # Host -> (simulated, monotonic) seconds of its latest report.
-        self._progress: dict[str, tuple[float, float]] = {}
+        self._progress: dict[str, _Progress] = {}
+        self._under_way = UnderWay()
+        self._quiet_s = 0.0  # simulated
         self._strangers: dict[str, float] = {}  # node -> monotonic seconds of the last look at it
         self._complaints = ThrottledLog(_log)
         self._held_up_since_s = math.inf  # monotonic
         rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._reported, tcp_nodelay=True)
 
     def are_behind(self, now_s: float) -> bool:
-        """Whether undone work has been waiting too long for another step of the world."""
-        slowest, lag_s = "", 0.0 if self._nodes is None else self._nodes.lag_s(now_s)
-        for host, (done_s, reported_s) in list(self._progress.items()):
-            if time.monotonic() - reported_s > HOST_TIMEOUT_S:
+        """Whether the mesh was quiet too long ago for another step of the world."""
+        wall_s = time.monotonic()
+        slowest, done_s, under_way = "the nodes of this process", now_s, 0
+        if self._nodes is not None:
+            done_s, under_way = now_s - self._nodes.lag_s(now_s), self._nodes.under_way
+        for host, progress in list(self._progress.items()):
+            if wall_s - progress.reported_s > HOST_TIMEOUT_S:
                 _log.warning("host %s is silent; the world continues without it", host)
                 del self._progress[host]
-            elif now_s - done_s > lag_s:
-                slowest, lag_s = host, now_s - done_s
-        if lag_s <= MAX_LAG_S:
+                continue
+            under_way += progress.under_way
+            if progress.done_s < done_s:
+                slowest, done_s = f"host {host}", progress.done_s
+        if self._under_way.is_none(under_way, wall_s):
+            self._quiet_s = max(self._quiet_s, done_s)
+        elif done_s >= now_s:
+            slowest = f"{under_way} packets"
+        if now_s - self._quiet_s <= MAX_LAG_S:
             self._held_up_since_s = math.inf
             return False
-        self._held_up_since_s = min(self._held_up_since_s, time.monotonic())
-        if time.monotonic() - self._held_up_since_s > HOST_TIMEOUT_S:
-            waiting_for = f"host {slowest}" if slowest else "the nodes of this process"
+        self._held_up_since_s = min(self._held_up_since_s, wall_s)
+        if wall_s - self._held_up_since_s > HOST_TIMEOUT_S:
             self._complaints.warning(
-                "time stands still", f"waiting for {waiting_for}, {lag_s:.2f} s behind"
+                "time stands still", f"waiting for {slowest}, {now_s - self._quiet_s:.2f} s behind"
             )
         return True
 
@@ -78,10 +107,11 @@ class PacedHosts:
         if reporter not in self._progress and not self._is_host(reporter):
             self._complaints.warning("progress ignored", f"{reporter} is not a host of nodes")
             return
-        before_s, _reported_s = self._progress.get(reporter, (0.0, 0.0))
+        before = self._progress.get(reporter)
         # Two threads of a host report: the later report may know less.
-        done_s = max(before_s, progress.stamp.to_sec())
-        self._progress[reporter] = (done_s, time.monotonic())
+        done_s = max(0.0 if before is None else before.done_s, progress.stamp.to_sec())
+        under_way = progress.seq - 2**32 if progress.seq >= 2**31 else progress.seq
+        self._progress[reporter] = _Progress(done_s, under_way, time.monotonic())
 
     def _is_host(self, reporter: str) -> bool:
         """Whether it has declared itself a host; the master is not asked for each message."""

@@ -1,0 +1,54 @@
+"""UnderWay: which packets the world waits for, and for how long."""
+
+from __future__ import annotations
+
+from drone_mesh.world.under_way import PATIENCE_S, UnderWay
+
+
+def test_it_waits_for_packets_that_are_worked_off_one_after_the_other():
+    under_way = UnderWay()
+    assert under_way.is_none(0, 0.0)
+    counts = [3, 2, 4, 1]  # on a slow machine, each just within the patience
+    assert not any(under_way.is_none(n, i * 0.9 * PATIENCE_S) for i, n in enumerate(counts, 1))
+    assert under_way.is_none(0, 5.0 * PATIENCE_S)
+
+
+def test_a_packet_that_never_arrives_is_waited_for_once():
+    under_way = UnderWay()
+    assert not under_way.is_none(1, 0.0)
+    assert not under_way.is_none(1, PATIENCE_S)
+    assert under_way.is_none(1, PATIENCE_S + 0.1)
+    assert not under_way.is_none(3, 2.0)  # two more, which do arrive
+    assert under_way.is_none(1, 2.1)
+
+
+def test_a_simulator_that_delivers_nothing_stops_time_ever_more_briefly():
+    under_way = UnderWay()
+    wall_s, waited_s = 0.0, []
+    for count in range(1, 12):
+        begun_s = wall_s
+        while not under_way.is_none(count, wall_s):
+            wall_s += 0.001
+        waited_s.append(round(wall_s - begun_s, 2))
+    assert waited_s == sorted(waited_s, reverse=True)
+    assert waited_s[0] >= PATIENCE_S > 0.03 > waited_s[-1]
+
+
+def test_after_a_packet_that_arrives_it_has_its_patience_again():
+    under_way = UnderWay()
+    wall_s = 0.0
+    for count in (1, 2, 3):
+        while not under_way.is_none(count, wall_s):
+            wall_s += 0.01
+    assert not under_way.is_none(4, wall_s)
+    assert under_way.is_none(3, wall_s)
+    assert not under_way.is_none(4, wall_s)
+    assert not under_way.is_none(4, wall_s + 0.9 * PATIENCE_S)
+
+
+def test_packets_of_a_stranger_do_not_hide_those_of_the_nodes_for_long():
+    under_way = UnderWay()
+    assert under_way.is_none(-5, 0.0)
+    assert under_way.is_none(-5, PATIENCE_S + 0.1)
+    assert not under_way.is_none(-4, PATIENCE_S + 0.2)
+    assert under_way.is_none(-5, PATIENCE_S + 0.3)
