@@ -66,7 +66,8 @@ class PacedHosts:
         self._quiet_s = 0.0  # simulated
         self._strangers: dict[str, float] = {}  # node -> monotonic seconds of the last look at it
         self._complaints = ThrottledLog(_log)
-        self._held_up_since_s = math.inf  # monotonic
+        self._seen = (0.0, 0)  # what was done and what is under way, at the last look
+        self._stuck_since_s = time.monotonic()  # time stands still, and no work is done
         rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._reported, tcp_nodelay=True)
 
     def are_behind(self, now_s: float) -> bool:
@@ -88,10 +89,11 @@ class PacedHosts:
         elif done_s >= now_s:
             slowest = f"{under_way} packets"
         if now_s - self._quiet_s <= MAX_LAG_S:
-            self._held_up_since_s = math.inf
+            self._stuck_since_s = wall_s
             return False
-        self._held_up_since_s = min(self._held_up_since_s, wall_s)
-        if wall_s - self._held_up_since_s > HOST_TIMEOUT_S:
+        if (done_s, under_way) != self._seen:
+            self._seen, self._stuck_since_s = (done_s, under_way), wall_s
+        if wall_s - self._stuck_since_s > HOST_TIMEOUT_S:
             self._complaints.warning(
                 "time stands still", f"waiting for {slowest}, {now_s - self._quiet_s:.2f} s behind"
             )
