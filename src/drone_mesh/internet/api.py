@@ -215,7 +215,9 @@ def make_api(
     add_order_requests(app, desk, guards, refusals, {**refusals, **not_found})
 
     if users is not None:
-        bad_message = {422: {"model": Refusal, "description": "Invalid node, port or message"}}
+        bad_message: Responses = {
+            422: {"model": Refusal, "description": "Invalid node, port or message"}
+        }
         add_data_requests(app, users, guards, {**refusals, **bad_message})
     if status is not None:
         add_status_request(app, guards, status)
