@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import reprlib
+import sys
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
 
@@ -67,6 +68,13 @@ class Layouts:
         field = cases.get(FIELD_CASE, _field_layout())
         singles = {n: {n: field[n]} for n in _FIELD_PLACES if n in field}
         self._cases = {FIELD_CASE: field, **singles, GRID_CASE: _grid_layout(), **cases}
+
+    @classmethod
+    def shipped(cls) -> Layouts:
+        """Those of config/casus.yaml, in a checkout or as the wheel installs it."""
+        places = (Path(__file__).resolve().parents[2], Path(sys.prefix) / "share" / "drone_mesh")
+        files = (place / "config" / "casus.yaml" for place in places)
+        return next((cls.load(file) for file in files if file.exists()), cls({}))
 
     @classmethod
     def load(cls, path: str | Path) -> Layouts:

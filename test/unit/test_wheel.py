@@ -39,7 +39,7 @@ def installed(tmp_path):
     checkout.mkdir()  # building leaves files in the checkout that it builds from
     for name in FILES:
         shutil.copy(ROOT / name, checkout / name)
-    for name in ("requirements", "src"):
+    for name in ("config", "requirements", "src"):
         ignored = shutil.ignore_patterns("*.egg-info", "__pycache__")
         shutil.copytree(ROOT / name, checkout / name, ignore=ignored)
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
@@ -61,6 +61,7 @@ def test_in_an_empty_environment_the_programs_of_a_pi_start_and_all_files_are_th
     for name in ("py.typed", "console/static/index.html", "nrf24/emulator/nrf24_range.csv"):
         assert (package / name).is_file(), name
     assert (installed / "share/drone_mesh/systemd/raspberry_router.service").is_file()
+    assert (installed / "share/drone_mesh/config/casus.yaml").is_file()
     (metadata,) = package.parent.glob("drone_mesh-*.dist-info/METADATA")
     extras = re.findall(r"^Provides-Extra: (\w+)$", metadata.read_text(), flags=re.MULTILINE)
     assert {"raspberry", "simulation", "console", "http", "report"} <= set(extras)

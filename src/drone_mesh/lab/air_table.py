@@ -7,7 +7,6 @@ import math
 import random
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Callable, Iterator, Sequence
 
 from drone_mesh.lab.air_trial import (
@@ -26,7 +25,6 @@ AFTER_S = 600.0  # watched after the first "all connected"
 QUICK_AFTER_S = 60.0
 SEEDS = 5
 WITHIN_S = 180.0  # a mesh that is not connected by then counts as never
-LAYOUTS_FILE = Path(__file__).parents[3] / "config" / "casus.yaml"
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ _ON_THE_DISC_S = {
 
 def _layout(case: int, dead: tuple[int, ...]) -> Row:
     def run(seed: int, kind: str, after_s: float) -> Result:
-        goals = Layouts.load(LAYOUTS_FILE).orders(case)
+        goals = Layouts.shipped().orders(case)
         places = {node: (goal.longitude, goal.latitude) for node, goal in goals}
         trial = AirTrial(
             len(places) + 1, seed=seed, places=tuple(places[node] for node in sorted(places))

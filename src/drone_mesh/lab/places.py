@@ -90,10 +90,8 @@ def read_places(path: Path) -> list[StartPlace]:
 
 def _casus(layout: Layout) -> list[StartPlace]:
     """The drones of a DroneManager layout at their places, and its gateway."""
-    file = Path(__file__).resolve().parents[3] / "config" / "casus.yaml"
-    layouts = Layouts.load(file) if file.exists() else Layouts({})
     try:
-        orders = layouts.orders(layout.case)
+        orders = Layouts.shipped().orders(layout.case)
     except UnknownCase as error:
         raise ConfigurationError(f"layout casus: {error}") from error
     fleet = plan_fleet(layout.gateways, 0, 1, 1.0)

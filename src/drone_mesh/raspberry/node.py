@@ -11,7 +11,6 @@ from typing import Any, Callable
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.execution import MeshExecutor, Work
@@ -78,7 +77,7 @@ class RadioNode:
             internet=self._internet,
             routing=options.routing,
             repair=options.repair,
-            repair_options=RepairOptions(clearance_m=options.clearance_m),
+            repair_options=options.repair_options,
             timing=options.timing,
             observer=self._events.observe,
         )

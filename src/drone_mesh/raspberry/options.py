@@ -40,6 +40,7 @@ LOG_LEVELS = ("debug", "info", "warning", "error")
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
 CLEARANCE_M = 5.0  # our choice: a position by satellite is good to some metres
+RANGE_M = 100.0  # our choice: hardly a packet was lost at it (nrf24/emulator/nrf24_range.csv)
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class Options:
     timing: MeshTiming
     routing: str
     repair: str
-    clearance_m: float
+    repair_options: RepairOptions
     location: Location | None  # None: not known
     flight: FlightOptions
     fleet: FleetOptions  # the drones of emulated nodes
@@ -243,6 +244,14 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(default: %(default)g)",
     )
     mesh.add_argument(
+        "--range",
+        type=float,
+        default=RANGE_M,
+        metavar="M",
+        help="how far the radio reaches, in metres, for the repair; raspberry_radio range measures "
+        "it (default: %(default)g, for 250k)",
+    )
+    mesh.add_argument(
         "--key-file",
         type=Path,
         metavar="FILE",
@@ -303,7 +312,6 @@ def _options(
             check_goal(*location)
         create_routing_technique(parsed.routing)
         create_repair_strategy(parsed.repair)
-        RepairOptions(clearance_m=parsed.clearance)
         return Options(
             node_id=parsed.id or 0,
             hardware=Hardware(parsed.spi, parsed.ce, parsed.irq, parsed.spi_hz),
@@ -321,7 +329,7 @@ def _options(
             ),
             routing=parsed.routing,
             repair=parsed.repair,
-            clearance_m=parsed.clearance,
+            repair_options=RepairOptions(clearance_m=parsed.clearance, range_m=parsed.range),
             location=location,
             flight=flight_options(parsed),
             fleet=fleet_options(parsed),

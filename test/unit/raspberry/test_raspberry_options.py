@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone import Location
 from drone_mesh.drone.engines import FlightOptions
@@ -32,7 +33,7 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         timing=MeshTiming(report_period_s=30.0),
         routing="child_table_tree",
         repair="thesis",
-        clearance_m=5.0,
+        repair_options=RepairOptions(clearance_m=5.0, range_m=100.0),
         location=None,
         flight=FlightOptions(),
         fleet=FleetOptions(),
@@ -56,7 +57,7 @@ def test_each_option_reaches_what_it_is_for():
         "--power -12 --broadcast shockburst "
         "--check-period 5 --connection-lost-after 60 --report-period 45 "
         "--latitude 10 --longitude -20.5 "
-        "--height 3 --log-level debug --repair home --clearance 3 "
+        "--height 3 --log-level debug --repair home --clearance 3 --range 40 "
         "--routing drone_mesh.communication.child_table_tree:"
         "ChildTableTree "
         "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
@@ -76,7 +77,7 @@ def test_each_option_reaches_what_it_is_for():
         timing=MeshTiming(5.0, 60.0, report_period_s=45.0),
         routing="drone_mesh.communication.child_table_tree:ChildTableTree",
         repair="home",
-        clearance_m=3.0,
+        repair_options=RepairOptions(clearance_m=3.0, range_m=40.0),
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),
         flight=FlightOptions(
             "mavlink:/dev/serial0,921600",
@@ -136,6 +137,7 @@ def test_emulated_nodes_need_no_id():
         ),
         ("--id 3 --repair hope", "unknown repair strategy 'hope': use one of field, follow, home"),
         ("--id 3 --clearance 0", "invalid clearance 0.0: must be above 0 metres"),
+        ("--id 3 --range nan", "invalid range nan: must be above 0 metres"),
         ("--id 3 --latitude 5", "--latitude and --longitude: give both, or neither"),
         ("--id 3 --latitude 5001 --longitude 0", "latitude 5001 m is outside -5000..5000 m"),
         ("--id 3 --latitude 0 --longitude inf", "longitude inf is not a finite number"),
