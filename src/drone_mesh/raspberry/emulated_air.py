@@ -10,6 +10,7 @@ from pathlib import Path
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.emulator.air import Air
+from drone_mesh.nrf24.emulator.air_server import AirServer
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.trace import FrameTrace
@@ -28,6 +29,16 @@ _COLUMN_WIDTH = 0.5  # from its first to its last router, in distances between c
 _log = logging.getLogger(__name__)
 
 
+def column_place(node_id: int, data_rate: DataRate, in_column: int = FEWEST_IN_COLUMN) -> Location:
+    """The position of a node: 0 at the origin, then columns of nodes at growing distance."""
+    if node_id == 0:
+        return Location(0.0, 0.0, 0.0)
+    column_m = COLUMN_M[data_rate]
+    column, row = divmod(node_id - 1, in_column)
+    side = _COLUMN_WIDTH * (row / (in_column - 1) - 0.5)
+    return Location(latitude=side * column_m, longitude=(column + 1) * column_m, height=0.0)
+
+
 class EmulatedAir:
     """Creates emulated radios: node 0, then columns of nodes at growing distance."""
 
@@ -37,10 +48,11 @@ class EmulatedAir:
         self._trace = FrameTrace()
         if trace_file is not None:
             self._write_trace(trace_file)
-        self._column_m = COLUMN_M[settings.data_rate]
+        self._settings = settings
         self._in_column = max(FEWEST_IN_COLUMN, math.ceil((nodes - 1) / MOST_COLUMNS))
         self._clock = WallClock()
         self.nodes = nodes
+        self._server: AirServer | None = None
         self._chips: dict[int, EmulatedChip] = {}
         self._air = Air(self._clock, LogDistance(random.Random()), random.Random())
         if trace_file is not None:
@@ -48,17 +60,24 @@ class EmulatedAir:
 
     def place(self, node_id: int) -> Location:
         """The position of a node."""
-        if node_id == 0:
-            return Location(0.0, 0.0, 0.0)
-        column, row = divmod(node_id - 1, self._in_column)
-        side = _COLUMN_WIDTH * (row / (self._in_column - 1) - 0.5)
-        return Location(
-            latitude=side * self._column_m, longitude=(column + 1) * self._column_m, height=0.0
-        )
+        return column_place(node_id, self._settings.data_rate, self._in_column)
 
-    def radio(self, node_id: int, settings: RadioSettings) -> NRF24LowLevelInterface:
-        """The driver of a new chip at the place of that node."""
-        chip = EmulatedChip(self._air, f"node {node_id}", self.place(node_id).to_vector())
+    def serve(self, host: str, port: int) -> tuple[str, int]:
+        """Let other processes join; returns the address. Raises ConfigurationError."""
+        try:
+            self._server = AirServer(self._air, host, port)
+        except OSError as error:
+            raise ConfigurationError(
+                f"cannot serve the emulated air on {host}:{port}: {error.strerror or error}"
+            ) from error
+        return self._server.address
+
+    def radio(
+        self, node_id: int, settings: RadioSettings, place: Location | None = None
+    ) -> NRF24LowLevelInterface:
+        """The driver of a new chip at the place of that node, or at another one."""
+        place = place or self.place(node_id)
+        chip = EmulatedChip(self._air, f"node {node_id}", place.to_vector())
         self._chips[node_id] = chip
         return NRF24LowLevelInterface(
             chip.spi,
@@ -75,6 +94,8 @@ class EmulatedAir:
 
     def close(self) -> None:
         """End the air and write the trace. The radios must be closed before."""
+        if self._server is not None:
+            self._server.close()
         self._clock.close()
         if self._trace_file is not None:
             frames = self._write_trace(self._trace_file)

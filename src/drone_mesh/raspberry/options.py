@@ -22,19 +22,16 @@ from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
 from drone_mesh.nrf24.spi import SPI_HZ
+from drone_mesh.raspberry.air_options import AirOptions, add_air_options, air_options
 from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
+from drone_mesh.raspberry.http_options import HttpOptions, add_http_options, http_options
 from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
 from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
-from drone_mesh.web.access import access_for
-from drone_mesh.web.listening import MAX_PORT
-from drone_mesh.web.tls import Certificate
 
 MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
-TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
 LOG_LEVELS = ("debug", "info", "warning", "error")
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
@@ -54,17 +51,6 @@ class Hardware:
 
 
 @dataclass(frozen=True)
-class HttpOptions:
-    """The address at which a gateway takes orders."""
-
-    address: str
-    port: int
-    token: str  # empty: none
-    names: tuple[str, ...] = ()  # of this machine, beside its host name
-    certificate: Certificate | None = None  # None: plain HTTP
-
-
-@dataclass(frozen=True)
 class Options:
     """The options of one program."""
 
@@ -78,6 +64,7 @@ class Options:
     location: Location | None  # None: not known
     flight: FlightOptions
     fleet: FleetOptions  # the drones of emulated nodes
+    air: AirOptions  # an emulated air that several processes share
     emulated: int  # number of emulated nodes that replace the real one; 0: none
     trace: Path | None  # file for the frames on the emulated air
     log_level: str
@@ -99,11 +86,12 @@ def parse_router(
         "--id", type=whole(0, MAX_NODE_ID), help="node id, 0..253, unique in the mesh"
     )
     _add_emulated(node)
+    add_air_options(parser, gateway=False)
     http = parser.add_argument_group("HTTP")
     http.add_argument(
         "--http", action="store_true", help="answer GET /status over HTTP, for raspberry_status"
     )
-    _add_http(http)
+    add_http_options(http)
     parser.set_defaults(gateway=False)
     return _options(parser, parser.parse_args(arguments), environment)
 
@@ -124,41 +112,11 @@ def parse_gateway(
         help="node id, 0..253, unique in the mesh (default: %(default)s)",
     )
     _add_emulated(node)
-    _add_http(parser.add_argument_group("HTTP"))
+    add_air_options(parser, gateway=True)
+    add_http_options(parser.add_argument_group("HTTP"))
     add_mqtt_options(parser)
     parser.set_defaults(gateway=True, http=True)
     return _options(parser, parser.parse_args(arguments), environment)
-
-
-def _add_http(http: argparse._ArgumentGroup) -> None:
-    http.add_argument(
-        "--bind",
-        metavar="ADDRESS",
-        default=DEFAULT_ADDRESS,
-        help="address to listen on; an address that other machines can reach needs a token "
-        "(default: %(default)s)",
-    )
-    http.add_argument(
-        "--port",
-        type=whole(1, MAX_PORT),
-        default=DEFAULT_PORT,
-        help="TCP port (default: %(default)s)",
-    )
-    http.add_argument(
-        "--token-file",
-        metavar="FILE",
-        type=Path,
-        help="file with the token that requests must carry, at least 16 characters; without this "
-        f"option the environment variable {TOKEN_VARIABLE} is used",
-    )
-    http.add_argument(
-        "--name",
-        action="append",
-        default=[],
-        help="another name by which clients ask for this machine; may be given several times",
-    )
-    http.add_argument("--cert", metavar="FILE", type=Path, help="certificate (PEM), for HTTPS")
-    http.add_argument("--key", metavar="FILE", type=Path, help="its private key (PEM)")
 
 
 def _parser(program: str, description: str) -> argparse.ArgumentParser:
@@ -297,7 +255,8 @@ def _add_emulated(node: argparse._MutuallyExclusiveGroup) -> None:
 def _options(
     parser: argparse.ArgumentParser, parsed: argparse.Namespace, environment: Mapping[str, str]
 ) -> Options:
-    if parsed.trace is not None and not parsed.emulated:
+    serves = parsed.emulated or getattr(parsed, "emulated_air_serve", None)
+    if parsed.trace is not None and not serves:
         parser.error("--trace needs --emulated: a real radio cannot record the frames of others")
     if (parsed.latitude is None) != (parsed.longitude is None):
         parser.error("--latitude and --longitude: give both, or neither")
@@ -333,11 +292,12 @@ def _options(
             location=location,
             flight=flight_options(parsed),
             fleet=fleet_options(parsed),
+            air=air_options(parsed),
             emulated=parsed.emulated,
             trace=parsed.trace,
             log_level=parsed.log_level,
             gateway=parsed.gateway,
-            http=_http_options(parsed, environment) if parsed.http else None,
+            http=http_options(parsed, environment) if parsed.http else None,
             keys=_keys(parsed),
             mqtt=mqtt_options(parsed, environment) if parsed.gateway else None,
         )
@@ -361,24 +321,3 @@ def _keys(parsed: argparse.Namespace) -> MeshKey | NodeKeys | None:
             f"--key-file {parsed.key_file}: the keys are those of node {keys.node}, not {parsed.id}"
         )
     return keys
-
-
-def _http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> HttpOptions:
-    token = environment.get(TOKEN_VARIABLE, "")
-    if parsed.token_file is not None:
-        try:
-            token = parsed.token_file.read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigurationError(f"--token-file {parsed.token_file}: {error}") from error
-        if not token:
-            raise ConfigurationError(
-                f"--token-file {parsed.token_file}: the file contains no token"
-            )
-    try:
-        access_for(parsed.bind, token)
-    except ConfigurationError as error:
-        raise ConfigurationError(f"{error} (--token-file, or {TOKEN_VARIABLE})") from error
-    if (parsed.cert is None) != (parsed.key is None):
-        raise ConfigurationError("--cert and --key are needed together")
-    certificate = None if parsed.cert is None else Certificate(parsed.cert, parsed.key)
-    return HttpOptions(parsed.bind, parsed.port, token, tuple(parsed.name), certificate)

@@ -25,10 +25,12 @@ from drone_mesh.nrf24.spi import open_spi
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
 from drone_mesh.raspberry.event_history import EventHistory
+from drone_mesh.raspberry.http_options import HttpOptions
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.node_status import one_line
-from drone_mesh.raspberry.options import Hardware, HttpOptions, Options
+from drone_mesh.raspberry.options import Hardware, Options
 from drone_mesh.raspberry.service_manager import ServiceManager
+from drone_mesh.raspberry.shared_air import MoveRadio, joining_node, serving_node
 from drone_mesh.stopping import StopRequest
 
 if TYPE_CHECKING:
@@ -77,19 +79,27 @@ def _signals() -> Iterator[StopRequest]:
 
 
 def _run(options: Options, request: StopRequest) -> None:
-    if options.keys is None:
-        _log.warning(
-            "no key: every radio in range can take part in this mesh and order its drones to fly; "
-            "raspberry_key new makes a key, --key-file uses it"
-        )
     with contextlib.ExitStack() as stack:
-        fleet = None
+        move_radios: MoveRadio = _stay
         if options.emulated:
             fleet = _emulated_fleet(options, stack)
-            nodes = _emulated_nodes(options, fleet)
+            nodes, move_radios = _emulated_nodes(options, fleet), fleet.move_radios
+        elif options.air.join is not None:
+            node, move_radios = joining_node(options, options.air.join, _orders(options))
+            nodes = [node]
+        elif options.air.serve is not None:
+            air = EmulatedAir(options.radio, 1, options.trace)
+            stack.callback(air.close)
+            node, move_radios = serving_node(options, air, options.air.serve, _orders(options))
+            nodes = [node]
         else:
             nodes = [_real_node(options)]
         stack.callback(_stop, nodes)
+        if options.keys is None:
+            _log.warning(
+                "no key: every radio in range can take part in this mesh and order its drones to fly; "
+                "raspberry_key new makes a key, --key-file uses it"
+            )
         if not options.gateway and options.http is not None:
             server = _status_server(nodes[0], options.http)
             server.start()
@@ -101,8 +111,7 @@ def _run(options: Options, request: StopRequest) -> None:
         watch = _Watch(nodes, options, manager)
         while not request.wait(LOOK_PERIOD_S):
             watch.look(time.monotonic())
-            if fleet is not None:
-                fleet.move_radios()
+            move_radios()
         manager.stopping()
         _log.info("stopping")
 
@@ -120,7 +129,7 @@ def _real_node(options: Options) -> RadioNode:
         opened.callback(radio.close)
         engine = create_engine(options.node_id, options.location, options.flight)
         opened.callback(engine.close)
-        node = RadioNode(radio, engine, options, _internet(options) if options.gateway else None)
+        node = RadioNode(radio, engine, options, _orders(options))
         opened.pop_all()
     hardware = options.hardware
     _log.info(
@@ -163,7 +172,7 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
         options, flight=dataclasses.replace(options.flight, origin=fleet.origin)
     )
     events = EventHistory()
-    make_internet = _internet(options) if options.gateway else without_internet
+    make_internet = _orders(options) or without_internet
     return [
         RadioNode(
             fleet.air.radio(node_id, options.radio),
@@ -174,6 +183,15 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
         )
         for node_id in range(options.emulated)
     ]
+
+
+def _stay() -> None:
+    """Real radios go with their drones by themselves."""
+
+
+def _orders(options: Options) -> MakeInternet | None:
+    """How a gateway takes orders; None for a router."""
+    return _internet(options) if options.gateway else None
 
 
 def _internet(options: Options) -> MakeInternet:

@@ -11,8 +11,8 @@ import urllib.request
 from typing import Sequence
 
 from drone_mesh.internet import DEFAULT_PORT
+from drone_mesh.raspberry.http_options import TOKEN_VARIABLE
 from drone_mesh.raspberry.node_status import table
-from drone_mesh.raspberry.options import TOKEN_VARIABLE
 
 ANSWER_WITHIN_S = 10.0
 

@@ -13,10 +13,11 @@ from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings, TxPower
+from drone_mesh.raspberry.air_options import AirAddress, AirOptions
 from drone_mesh.raspberry.emulated_fleet import FleetOptions
+from drone_mesh.raspberry.http_options import HttpOptions
 from drone_mesh.raspberry.options import (
     Hardware,
-    HttpOptions,
     Options,
     parse_gateway,
     parse_router,
@@ -37,6 +38,7 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
         location=None,
         flight=FlightOptions(),
         fleet=FleetOptions(),
+        air=AirOptions(),
         emulated=0,
         trace=None,
         log_level="info",
@@ -49,6 +51,20 @@ def test_a_router_answers_over_http_only_if_it_is_asked_to():
     asked = parse_router(["--id", "3", "--http", "--port", "9081"], {})
     assert (asked.gateway, asked.http) == (False, HttpOptions("127.0.0.1", 9081, ""))
     assert parse_gateway([], {}).gateway
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("9100", AirAddress("127.0.0.1", 9100)),
+        ("pi:9100", AirAddress("pi", 9100)),
+        ("[::1]:9100", AirAddress("::1", 9100)),
+    ],
+)
+def test_a_shared_air_is_joined_or_served_at_an_address(text, address):
+    router = parse_router(["--id", "3", "--emulated-air", text], {})
+    assert router.air == AirOptions(join=address)
+    assert parse_gateway(["--emulated-air-serve", text], {}).air == AirOptions(serve=address)
 
 
 def test_each_option_reaches_what_it_is_for():
@@ -86,6 +102,7 @@ def test_each_option_reaches_what_it_is_for():
             Permissions(may_arm=True, may_take_off=True, may_change_mode=True),
         ),
         fleet=FleetOptions(),
+        air=AirOptions(),
         emulated=0,
         trace=None,
         log_level="debug",

@@ -147,11 +147,61 @@ def test_an_emulated_gateway_sends_an_order_over_several_hops_and_ends_on_sigter
             "the gateway found no route to drone 3",
         )
         program.wait_for("node 3: order refused: drone 3 cannot fly: it stands on the ground")
+        wait_until(lambda: last_order(client)["state"] == "refused", "no reply to the order came")
+        assert last_order(client)["reason"] == "drone 3 cannot fly: it stands on the ground"
         assert client.get("/ready", headers={"Authorization": ""}).status_code == 401
         status, seconds = program.end(signal.SIGTERM)
         assert status == 0
         assert seconds < END_WITHIN_S
         assert "Traceback" not in program.said
+
+
+def test_single_nodes_on_a_shared_air_can_be_killed_and_restarted():
+    port, air = free_port(), free_port()
+    serve = f"--emulated-air-serve {air} --port {port} --check-period 2"
+
+    def router(node_id):
+        place = f"--latitude 0 --longitude {60 * node_id}"
+        line = f"--id {node_id} --emulated-air {air} --check-period 2 {place}"
+        return Program("raspberry_router", *line.split())
+
+    with Program("raspberry_gateway", *serve.split()) as gateway:
+        gateway.wait_for("others join it with --emulated-air 127.0.0.1")
+        gateway.wait_for("orders over HTTP")
+        with router(2) as far, httpx.Client(
+            base_url=f"http://127.0.0.1:{port}", headers={"Authorization": f"Bearer {TOKEN}"}
+        ) as client:
+            with router(1) as relay:
+                gateway.wait_for("node 2 joins at x 120, y 0, z 0 m")
+                wait_until(lambda: ask_hops(client).get(2, 0) == 2, "2 did not connect over 1")
+                relay.end(signal.SIGKILL)
+                gateway.wait_for("node 1 is gone")
+                wait_until(lambda: routes(client) == {}, "the loss of node 1 was not noticed")
+            with router(1) as relay:
+                wait_until(lambda: routes(client) == {1: 1, 2: 1}, "2 is not back over 1")
+                assert relay.end(signal.SIGTERM)[0] == 0
+            assert far.end(signal.SIGTERM)[0] == 0
+            assert "Traceback" not in far.said
+        assert gateway.end(signal.SIGTERM)[0] == 0
+        assert "Traceback" not in gateway.said
+
+
+def test_an_air_that_nobody_serves_is_said_in_one_line_with_what_to_do():
+    line = f"--id 3 --emulated-air {free_port()} --log-level error"
+    with Program("raspberry_router", *line.split()) as program:
+        assert program.result() == 1
+        assert program.said.startswith("raspberry_router: no emulated air at 127.0.0.1:")
+        assert "--emulated-air-serve" in program.said
+
+
+def routes(client):
+    """Next hops, of the nodes that the gateway has a route to."""
+    nodes = client.get("/nodes").json()["nodes"]
+    return {node["id"]: node["next_hop"] for node in nodes if node["next_hop"] is not None}
+
+
+def last_order(client):
+    return client.get("/orders").json()["orders"][-1]
 
 
 def ask_hops(client):

@@ -1,0 +1,197 @@
+"""RemoteChip: an emulated chip on an air that another process serves, with its SPI, CE and IRQ.
+
+A lost connection is one to a chip that does not answer: the driver says so and tries again, and
+gets a new chip as soon as the air is served again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from typing import Sequence
+
+from drone_mesh.nrf24.emulator.air import Position
+from drone_mesh.nrf24.emulator.air_protocol import (
+    CHIP_NUMBER,
+    MAKE_CHIP,
+    TIMEOUT_S,
+    Opcode,
+    receive_answer,
+    send_request,
+)
+
+ANSWER_WITHIN_S = 5.0  # our choice: far above what a busy machine takes
+CONNECT_AGAIN_S = 1.0  # our choice
+
+
+class RemoteChip:
+    """Any thread; `_lock` is held during a request, `_irq_lock` while one thread waits for IRQ."""
+
+    def __init__(self, host: str, port: int, name: str, position: Position) -> None:
+        """Connect. Raises OSError if the air is not served there."""
+        self._address = (host, port)
+        self._name = name
+        self._position = position
+        self._lock = threading.Lock()
+        self._irq_lock = threading.Lock()
+        self._number = -1
+        self._connection: socket.socket | None = None
+        self._irq_connection: socket.socket | None = None
+        self._irq_number = -1
+        self._closed = False
+        self._failed_s = 0.0
+        with self._lock:
+            self._connect()
+        self.spi = RemoteSpi(self)
+        self.ce = RemoteCe(self)
+        self.irq = RemoteIrq(self)
+
+    def request(self, opcode: Opcode, data: bytes) -> bytes:
+        """The chip's answer. Raises OSError while the air cannot be reached."""
+        with self._lock:
+            if self._connection is None:
+                if self._closed or time.monotonic() - self._failed_s < CONNECT_AGAIN_S:
+                    raise ConnectionError("the emulated air is gone")
+                self._connect()
+            assert self._connection is not None
+            try:
+                send_request(self._connection, opcode, data)
+                return receive_answer(self._connection)
+            except OSError:
+                self._lose()
+                raise
+
+    def wait_irq(self, timeout_s: float) -> bool:
+        """Whether IRQ is low within this time, or within a second. OSError as for `request`."""
+        with self._irq_lock:
+            if self._closed:
+                raise ConnectionError("the chip was given back")
+            if self._irq_connection is None or self._irq_number != self._number:
+                self._join()
+            assert self._irq_connection is not None
+            try:
+                send_request(self._irq_connection, Opcode.WAIT_IRQ, TIMEOUT_S.pack(timeout_s))
+                return receive_answer(self._irq_connection) == b"\1"
+            except OSError:
+                self._irq_connection.close()
+                self._irq_connection = None
+                raise
+
+    def move(self, position: Position) -> None:
+        """Bring the chip to a place."""
+        if position != self._position:
+            self._position = position
+            with contextlib.suppress(OSError):  # the next chip is made there
+                self.request(Opcode.MOVE, MAKE_CHIP.pack(*position))
+
+    def close(self) -> None:
+        """Give the chip back; it loses its supply."""
+        with self._lock:
+            self._closed = True
+            self._lose()
+        waiting = self._irq_connection
+        if waiting is not None:
+            with contextlib.suppress(OSError):  # ends a wait that is under way
+                waiting.shutdown(socket.SHUT_RDWR)
+        with self._irq_lock:
+            if self._irq_connection is not None:
+                self._irq_connection.close()
+                self._irq_connection = None
+
+    def _connect(self) -> None:
+        try:
+            connection = self._open()
+            place = MAKE_CHIP.pack(*self._position)
+            send_request(connection, Opcode.MAKE_CHIP, place + self._name.encode())
+            (self._number,) = CHIP_NUMBER.unpack(receive_answer(connection))
+        except OSError:
+            self._failed_s = time.monotonic()
+            raise
+        self._connection = connection
+
+    def _join(self) -> None:
+        if self._irq_connection is not None:
+            self._irq_connection.close()
+            self._irq_connection = None
+        number = self._number
+        connection = self._open()
+        try:
+            send_request(connection, Opcode.JOIN_CHIP, CHIP_NUMBER.pack(number))
+            receive_answer(connection)
+        except OSError:
+            connection.close()
+            raise
+        self._irq_connection, self._irq_number = connection, number
+
+    def _open(self) -> socket.socket:
+        connection = socket.create_connection(self._address, ANSWER_WITHIN_S)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return connection
+
+    def _lose(self) -> None:
+        self._failed_s = time.monotonic()
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+
+class RemoteSpi:
+    """A SpiDevice."""
+
+    def __init__(self, chip: RemoteChip) -> None:
+        self._chip = chip
+
+    def xfer2(self, data: Sequence[int]) -> list[int]:
+        """Clock out `data` and return the bytes received. Raises OSError."""
+        return list(self._chip.request(Opcode.TRANSFER, bytes(data)))
+
+    def close(self) -> None:
+        """Give the chip back."""
+        self._chip.close()
+
+
+class RemoteCe:
+    """A CePin."""
+
+    def __init__(self, chip: RemoteChip) -> None:
+        self._chip = chip
+        self._value = False
+
+    @property
+    def value(self) -> bool:
+        """The level of the pin."""
+        return self._value
+
+    @value.setter
+    def value(self, high: bool) -> None:
+        self._value = high
+        with contextlib.suppress(OSError):  # as a pin that is not wired; SPI reports the loss
+            self._chip.request(Opcode.SET_CE, bytes((high,)))
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+class RemoteIrq:
+    """An IrqPin."""
+
+    def __init__(self, chip: RemoteChip) -> None:
+        self._chip = chip
+
+    def wait_low(self, timeout_s: float) -> bool:
+        """Wait until it is low; False if it is still high after the time-out."""
+        until_s = time.monotonic() + timeout_s
+        while True:
+            left_s = until_s - time.monotonic()
+            try:
+                if self._chip.wait_irq(max(0.0, left_s)):
+                    return True
+            except OSError:
+                time.sleep(max(0.0, min(left_s, CONNECT_AGAIN_S)))
+            if left_s <= 0.0:
+                return False
+
+    def close(self) -> None:
+        """Nothing to release."""

@@ -1,0 +1,63 @@
+"""The options for an emulated air that several processes share."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.web.listening import MAX_PORT
+
+LOCAL = "127.0.0.1"
+
+
+class AirAddress(NamedTuple):
+    """Where an emulated air is served."""
+
+    host: str
+    port: int
+
+
+@dataclass(frozen=True)
+class AirOptions:
+    """How a node takes part in such an air; neither: it does not."""
+
+    join: AirAddress | None = None
+    serve: AirAddress | None = None
+
+
+def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
+    """Add them to a parser or a group."""
+    node.add_argument(
+        "--emulated-air",
+        metavar="[HOST:]PORT",
+        help="without hardware: this node's radio is on the emulated air that another process "
+        "serves there; its place is that of --latitude and --longitude, or one in columns by id",
+    )
+    if gateway:
+        node.add_argument(
+            "--emulated-air-serve",
+            metavar="[HOST:]PORT",
+            help="without hardware: serve an emulated air to other processes, and be a node on it",
+        )
+
+
+def air_options(parsed: argparse.Namespace) -> AirOptions:
+    """What was asked for. Raises ConfigurationError."""
+    join = _address("--emulated-air", parsed.emulated_air)
+    serve = _address("--emulated-air-serve", getattr(parsed, "emulated_air_serve", None))
+    if join is not None and serve is not None:
+        raise ConfigurationError("--emulated-air and --emulated-air-serve exclude each other")
+    if (join or serve) and parsed.emulated:
+        raise ConfigurationError("--emulated has an air of its own: leave --emulated-air out")
+    return AirOptions(join, serve)
+
+
+def _address(option: str, text: str | None) -> AirAddress | None:
+    if text is None:
+        return None
+    host, _, port = text.rpartition(":")
+    if not (port.isascii() and port.isdigit() and int(port) <= MAX_PORT):
+        raise ConfigurationError(f"invalid {option} {text!r}: use [HOST:]PORT, as in 9100")
+    return AirAddress(host.strip("[]") or LOCAL, int(port))

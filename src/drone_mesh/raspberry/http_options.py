@@ -1,0 +1,82 @@
+"""The options of a node's HTTP side."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Mapping
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
+from drone_mesh.raspberry.wiring_options import whole
+from drone_mesh.web.access import access_for
+from drone_mesh.web.listening import MAX_PORT
+from drone_mesh.web.tls import Certificate
+
+TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
+
+
+@dataclass(frozen=True)
+class HttpOptions:
+    """The address at which a node answers."""
+
+    address: str
+    port: int
+    token: str  # empty: none
+    names: tuple[str, ...] = ()  # of this machine, beside its host name
+    certificate: Certificate | None = None  # None: plain HTTP
+
+
+def add_http_options(http: argparse._ArgumentGroup) -> None:
+    """Add the group to a parser."""
+    http.add_argument(
+        "--bind",
+        metavar="ADDRESS",
+        default=DEFAULT_ADDRESS,
+        help="address to listen on; an address that other machines can reach needs a token "
+        "(default: %(default)s)",
+    )
+    http.add_argument(
+        "--port",
+        type=whole(1, MAX_PORT),
+        default=DEFAULT_PORT,
+        help="TCP port (default: %(default)s)",
+    )
+    http.add_argument(
+        "--token-file",
+        metavar="FILE",
+        type=Path,
+        help="file with the token that requests must carry, at least 16 characters; without this "
+        f"option the environment variable {TOKEN_VARIABLE} is used",
+    )
+    http.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        help="another name by which clients ask for this machine; may be given several times",
+    )
+    http.add_argument("--cert", metavar="FILE", type=Path, help="certificate (PEM), for HTTPS")
+    http.add_argument("--key", metavar="FILE", type=Path, help="its private key (PEM)")
+
+
+def http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> HttpOptions:
+    """What was asked for. Raises ConfigurationError."""
+    token = environment.get(TOKEN_VARIABLE, "")
+    if parsed.token_file is not None:
+        try:
+            token = parsed.token_file.read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigurationError(f"--token-file {parsed.token_file}: {error}") from error
+        if not token:
+            raise ConfigurationError(
+                f"--token-file {parsed.token_file}: the file contains no token"
+            )
+    try:
+        access_for(parsed.bind, token)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{error} (--token-file, or {TOKEN_VARIABLE})") from error
+    if (parsed.cert is None) != (parsed.key is None):
+        raise ConfigurationError("--cert and --key are needed together")
+    certificate = None if parsed.cert is None else Certificate(parsed.cert, parsed.key)
+    return HttpOptions(parsed.bind, parsed.port, token, tuple(parsed.name), certificate)

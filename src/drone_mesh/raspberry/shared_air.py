@@ -1,0 +1,77 @@
+"""A node on an emulated air that several processes share."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from typing import Callable
+
+from drone_mesh.drone.engines import create_engine
+from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import ConfigurationError, LocationUnknown
+from drone_mesh.nrf24.emulator.remote_chip import RemoteChip
+from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
+from drone_mesh.raspberry.air_options import AirAddress
+from drone_mesh.raspberry.emulated_air import EmulatedAir, column_place
+from drone_mesh.raspberry.node import MakeInternet, RadioNode
+from drone_mesh.raspberry.options import Options
+
+_log = logging.getLogger(__name__)
+
+MoveRadio = Callable[[], None]
+"""Brings the radio to where the drone is."""
+
+
+def joining_node(
+    options: Options, address: AirAddress, make_internet: MakeInternet | None
+) -> tuple[RadioNode, MoveRadio]:
+    """A node on the air served at this address. Raises ConfigurationError."""
+    place = _place(options)
+    try:
+        chip = RemoteChip(*address, f"node {options.node_id}", place.to_vector())
+    except OSError as error:
+        raise ConfigurationError(
+            f"no emulated air at {address.host}:{address.port}: {error.strerror or error}; "
+            "raspberry_gateway --emulated-air-serve PORT serves one"
+        ) from error
+    radio = NRF24LowLevelInterface(
+        chip.spi, chip.ce, chip.irq, node_id=options.node_id, settings=options.radio
+    )
+    node = _node(radio, options, place, make_internet)
+    return node, lambda: _follow(node.engine, lambda here: chip.move(here.to_vector()))
+
+
+def serving_node(
+    options: Options, air: EmulatedAir, address: AirAddress, make_internet: MakeInternet | None
+) -> tuple[RadioNode, MoveRadio]:
+    """A node on `air`, which other processes may join. Raises ConfigurationError."""
+    host, port = air.serve(*address)
+    _log.info("emulated air: others join it with --emulated-air %s:%d", host, port)
+    place = _place(options)
+    radio = air.radio(options.node_id, options.radio, place)
+    node = _node(radio, options, place, make_internet)
+    return node, lambda: _follow(node.engine, lambda here: air.move(options.node_id, here))
+
+
+def _place(options: Options) -> Location:
+    return options.location or column_place(options.node_id, options.radio.data_rate)
+
+
+def _node(
+    radio: NRF24LowLevelInterface,
+    options: Options,
+    place: Location,
+    make_internet: MakeInternet | None,
+) -> RadioNode:
+    with contextlib.ExitStack() as opened:
+        opened.callback(radio.close)
+        engine = create_engine(options.node_id, place, options.flight)
+        opened.callback(engine.close)
+        node = RadioNode(radio, engine, options, make_internet)
+        opened.pop_all()
+    return node
+
+
+def _follow(engine: IDroneEngine, move: Callable[[Location], None]) -> None:
+    with contextlib.suppress(LocationUnknown):
+        move(engine.get_location())
