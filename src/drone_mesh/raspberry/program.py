@@ -97,8 +97,8 @@ def _run(options: Options, request: StopRequest) -> None:
         stack.callback(_stop, nodes)
         if options.keys is None:
             _log.warning(
-                "no key: every radio in range can take part in this mesh and order its drones to fly; "
-                "raspberry_key new makes a key, --key-file uses it"
+                "no key: every radio in range can take part in this mesh and order its drones to "
+                "fly; raspberry_key new makes a key, --key-file uses it"
             )
         if not options.gateway and options.http is not None:
             server = _status_server(nodes[0], options.http)
