@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.errors import ConfigurationError
 
+FLY = "fly"  # in a size on the command line
+
 
 @dataclass(frozen=True)
 class Case:
@@ -16,6 +18,7 @@ class Case:
     drones: int  # the gateway included
     spacing_m: float
     real_time_factor: float = 1.0  # 0: as fast as possible
+    flying: bool = False  # all drones fly while they are measured, and physics moves them
 
     def __post_init__(self) -> None:
         """Raises ConfigurationError for a fleet that the factory would refuse."""
@@ -27,20 +30,24 @@ class Case:
 
     @classmethod
     def parse(cls, text: str) -> Case:
-        """Read DRONES/SPACING or DRONES/SPACING@FACTOR, such as 100/6 or 17/6@0.
+        """Read DRONES/SPACING[@FACTOR][+fly], such as 100/6, 17/6@0 or 100/6+fly.
 
         Raises ConfigurationError for anything else.
         """
-        size, at, factor = text.partition("@")
+        standing, plus, word = text.partition("+")
+        size, at, factor = standing.partition("@")
         drones, slash, spacing = size.partition("/")
         try:
             if not slash:
                 raise ValueError("no spacing")
-            return cls(int(drones), float(spacing), float(factor) if at else 1.0)
+            if plus and word != FLY:
+                raise ValueError("not a word")
+            return cls(int(drones), float(spacing), float(factor) if at else 1.0, bool(plus))
         except ValueError:
             raise ConfigurationError(
                 f"invalid size {text!r}: write DRONES/SPACING, such as 100/6 for 100 drones 6 m "
-                "apart, or DRONES/SPACING@FACTOR, such as 17/6@0 for 17 as fast as possible"
+                "apart, or DRONES/SPACING@FACTOR, such as 17/6@0 for 17 as fast as possible; +fly "
+                "behind it: physics moves the drones, and all of them fly"
             ) from None
 
     @property
@@ -61,15 +68,18 @@ class Case:
             f"gridsize:={self.gridsize}",
             f"spacing:={self.spacing_m:g}",
             f"real_time_factor:={self.real_time_factor:g}",
+            *(["flight:=dynamic"] if self.flying else []),
         ]
 
     def __str__(self) -> str:
         speed = f", real-time factor {self.real_time_factor:g}"
-        return f"{self.drones} drones, {self.spacing_m:g} m" + (
-            speed if self.real_time_factor != 1 else ""
+        return (
+            f"{self.drones} drones, {self.spacing_m:g} m"
+            + (speed if self.real_time_factor != 1 else "")
+            + (", all flying" if self.flying else "")
         )
 
 
-FULL = tuple(map(Case.parse, ("17/6", "100/6", "100/1", "254/6", "254/1", "17/6@0")))
+FULL = tuple(map(Case.parse, ("17/6", "100/6", "100/1", "254/6", "254/1", "17/6@0", "100/6+fly")))
 QUICK = tuple(map(Case.parse, ("17/6", "100/6", "17/6@0")))
 SOAK = Case.parse("100/6@0")

@@ -73,8 +73,9 @@ def make_parser() -> argparse.ArgumentParser:
         "--sizes",
         nargs="+",
         type=_size,
-        metavar="DRONES/SPACING[@FACTOR]",
-        help="fleets to measure; default: " + " ".join(map(_in_short, cases.FULL)),
+        metavar="DRONES/SPACING[@FACTOR][+fly]",
+        help="fleets to measure; +fly: physics moves the drones, and all of them fly; default: "
+        + " ".join(map(_in_short, cases.FULL)),
     )
     parser.add_argument("--only", choices=(ROS, INPROCESS), help="measure only this half")
     parser.add_argument(
@@ -113,7 +114,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 def _in_short(case: Case) -> str:
     factor = "" if case.real_time_factor == 1 else f"@{case.real_time_factor:g}"
-    return f"{case.drones}/{case.spacing_m:g}{factor}"
+    return f"{case.drones}/{case.spacing_m:g}{factor}{f'+{cases.FLY}' if case.flying else ''}"
 
 
 class Benchmark:

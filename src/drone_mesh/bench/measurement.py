@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 from drone_mesh.bench.cases import Case
-from drone_mesh.bench.observation import REST, WATCH, Look, Watch
+from drone_mesh.bench.observation import REST, TAKE_OFF, WATCH, Look, Watch
 from drone_mesh.bench.processes import Use, cores_between
 from drone_mesh.bench.progress import Progress
 from drone_mesh.bench.system import BenchmarkError, System
@@ -26,6 +26,7 @@ class RosResult:
     drones: int
     spacing_m: float
     real_time_factor: float  # as requested; 0: as fast as possible
+    flying: int  # drones, at the end; physics moves them
     on_after_wall_s: float  # from roslaunch to the moment all nodes are on
     connected_after_sim_s: float | None  # from the start of the last node to all connected
     connected_after_wall_s: float | None
@@ -78,6 +79,9 @@ def measure(
             after_s = watch.all_connected.wall_s - watch.all_on.wall_s
             progress.say(f"all connected after {after_s:.1f} s")
         _sleep(system, SETTLE_S, progress, "waiting for the start to settle")
+        if case.flying:
+            system.order(TAKE_OFF)
+            _sleep(system, SETTLE_S, progress, "waiting for the flights to begin")
         first = _take_moment(system)
         system.order(REST)
         _sleep(system, window_s, progress, "measuring")
@@ -132,6 +136,7 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         drones=case.drones,
         spacing_m=case.spacing_m,
         real_time_factor=case.real_time_factor,
+        flying=last.look.flying,
         on_after_wall_s=watch.all_on.wall_s - system.launched_s,
         connected_after_sim_s=watch.connected_after_s(),
         connected_after_wall_s=connected.wall_s - watch.all_on.wall_s if connected else None,

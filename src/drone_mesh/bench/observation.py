@@ -15,7 +15,8 @@ DISCONNECTED = MeshEventKind.DISCONNECTED.value
 
 PROBE = "bench_probe"  # it announces itself with empty figures
 
-WATCH, REST = "watch", "rest"  # orders to the probe: watch the state of the mesh, or rest
+# Orders to the probe: watch the state of the mesh, rest, send all drones on a flight.
+WATCH, REST, TAKE_OFF = "watch", "rest", "take off"
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Look:
     on: int  # nodes with power
     connected: int  # routers with power and a gateway
     messages: int  # sum of total_messages over all nodes
+    flying: int  # drones
     links: int  # pairs of neighbours
 
 

@@ -118,7 +118,8 @@ def ros_tables(results: Sequence[RosResult]) -> str:
 def _fleet(result: RosResult) -> list[str]:
     factor = result.real_time_factor
     speed = "as fast as possible" if factor == 0 else f"{factor:g}"
-    return [str(result.drones), f"{result.spacing_m:g} m", speed]
+    drones = f"{result.drones}, {result.flying} flying" if result.flying else str(result.drones)
+    return [drones, f"{result.spacing_m:g} m", speed]
 
 
 def _seconds_or_how_many(result: RosResult) -> str:

@@ -19,6 +19,7 @@ STANDS_M_S = 0.1
 ON_GROUND_M = 0.02  # of its underside
 LAND_AT_PERCENT = 20.0  # our choice: it comes down while it still can
 MOVED_M = 1e-4  # a smaller movement is not reported
+SETTLED_S = 0.1  # so long after the last movement its place is reported once more
 
 _log = logging.getLogger(__name__)
 
@@ -52,6 +53,7 @@ class DynamicEngine(DroneEngine):
         self._stepped_s = world.now_s
         self._battery_percent = 100.0
         self._was_flat = False
+        self._settled = True
         self._crashed = False
         world.wake(self)
 
@@ -106,7 +108,12 @@ class DynamicEngine(DroneEngine):
         path = self._state.path if self._route is not None else None
         is_news = path is not self._state.path or self.is_flat is not self._was_flat
         self._was_flat = self.is_flat
-        if is_news or math.dist(position, self._state.position) > MOVED_M:
+        has_moved = math.dist(position, self._state.position) > MOVED_M
+        if is_news or has_moved:
+            self._settled = self._settled and not has_moved
+            self._tell(position, path, now_s)
+        elif not self._settled and now_s - self._state.now_s >= SETTLED_S:
+            self._settled = True  # a listener that thins the reports out gets the last one too
             self._tell(position, path, now_s)
         return True
 

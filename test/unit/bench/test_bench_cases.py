@@ -9,6 +9,8 @@ from drone_mesh.errors import ConfigurationError
 def test_a_size_says_how_many_how_far_apart_and_how_fast():
     assert Case.parse("254/1.5") == Case(254, 1.5, 1.0)
     assert Case.parse("17/6@0") == Case(17, 6.0, 0.0)
+    assert Case.parse("17/6@0+fly") == Case(17, 6.0, 0.0, flying=True)
+    assert Case.parse("100/6+fly").launch_args()[-1] == "flight:=dynamic"
 
 
 def test_one_drone_of_a_fleet_is_the_gateway_and_the_others_stand_in_a_square():
@@ -22,7 +24,9 @@ def test_one_drone_of_a_fleet_is_the_gateway_and_the_others_stand_in_a_square():
     assert Case.parse("254/1").gridsize == 16
 
 
-@pytest.mark.parametrize("text", ["17", "17/", "/6", "x/6", "17/6@", "17/6@fast", "1.5/6"])
+@pytest.mark.parametrize(
+    "text", ["17", "17/", "/6", "x/6", "17/6@", "17/6@fast", "1.5/6", "17/6+hop"]
+)
 def test_what_is_no_size_is_refused_with_an_example(text):
     with pytest.raises(ConfigurationError, match="such as 100/6"):
         Case.parse(text)

@@ -17,7 +17,7 @@ from drone_mesh.bench.observation import (
 
 
 def look(sim_s, on, connected, wall_s=0.0):
-    return Look(wall_s=wall_s, sim_s=sim_s, on=on, connected=connected, messages=0, links=0)
+    return Look(wall_s, sim_s, on=on, connected=connected, messages=0, flying=0, links=0)
 
 
 def watch_of(drones, *sights):

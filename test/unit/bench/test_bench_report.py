@@ -9,6 +9,7 @@ from drone_mesh.bench.report import inprocess_table, ros_tables, table
 RESULT = RosResult(
     drones=100,
     spacing_m=6.0,
+    flying=0,
     real_time_factor=1.0,
     on_after_wall_s=8.25,
     connected_after_sim_s=1.5,
@@ -32,6 +33,11 @@ RESULT = RosResult(
     reached_real_time_factor=1.0,
     worst_timer_lag_s=0.012,
 )
+
+
+def test_a_fleet_that_flies_is_named_so() -> None:
+    assert "100, 97 flying" in ros_tables([replace(RESULT, flying=97)])
+    assert "flying" not in ros_tables([RESULT])
 
 
 def rows(text):

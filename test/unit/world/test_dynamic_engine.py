@@ -151,6 +151,23 @@ def test_a_drone_is_flat_when_standing_has_used_the_rest_and_that_is_told_once(w
     assert noted == [MeshEventKind.BATTERY_EMPTY]
 
 
+def test_where_it_comes_to_rest_is_told_even_to_a_listener_that_skips_most_of_it(world):
+    engine = drone(world, z=2.0)  # it falls, and bounces
+    told = []
+
+    def thinned(state):
+        if not told or state.now_s - told[-1].now_s >= 0.05:
+            told.append(state)
+
+    engine.add_listener(thinned)
+    run(world, 3.0)
+    position, _ = world.body_state(engine._box)
+    assert math.dist(told[-1].position, position) < 1e-3
+    count = len(told)
+    run(world, 3.0)
+    assert len(told) == count  # it lies still
+
+
 def test_the_motors_hold_the_weight_and_no_more_at_the_goal():
     force = controller_force(BodyLimits(), (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
     assert force == pytest.approx((0.0, 0.0, 9.81))

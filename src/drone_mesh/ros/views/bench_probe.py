@@ -15,6 +15,7 @@ from drone_mesh.bench.observation import (
     PROBE,
     REST,
     STARTED,
+    TAKE_OFF,
     WATCH,
     Figures,
     Happening,
@@ -22,9 +23,10 @@ from drone_mesh.bench.observation import (
     Sight,
     to_line,
 )
-from drone_mesh.msg import MeshEvent, MeshState, NodeState
+from drone_mesh.msg import Location, MeshEvent, MeshState, NodeState
 from drone_mesh.ros.graph import names
 
+FLIGHT_M = 300.0  # our choice: at 2 m/s it lasts longer than a measurement
 _KINDS = (STARTED, CONNECTED, DISCONNECTED)
 
 
@@ -38,19 +40,33 @@ class Probe:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._watching: rospy.Subscriber | None = None
+        self._seen = MeshState()
+        self._goals: list[rospy.Publisher] = []
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event)
         rospy.Subscriber(names.DIAGNOSTICS_TOPIC, DiagnosticArray, self._diagnostics)
         self._print(Figures(PROBE, time.monotonic()))
 
     def obey(self, order: str) -> None:
-        """Start or stop watching the state."""
+        """Start or stop watching the state, or start the flights."""
         if order == WATCH and self._watching is None:
             self._watching = rospy.Subscriber(names.STATE_TOPIC, MeshState, self._state)
         elif order == REST and self._watching is not None:
             self._watching.unregister()
             self._watching = None
+        elif order == TAKE_OFF:
+            self._take_off()
+
+    def _take_off(self) -> None:
+        """Send all drones far away, side by side, past the DroneManager and the mesh."""
+        for node in self._seen.nodes:
+            topic = names.goal_topic(node.id)
+            goal = rospy.Publisher(topic, Location, queue_size=1, latch=True)
+            x, y, _ = node.position
+            goal.publish(Location(latitude=y + FLIGHT_M, longitude=x, height=0))
+            self._goals.append(goal)
 
     def _state(self, mesh: MeshState) -> None:
+        self._seen = mesh
         on = [node for node in mesh.nodes if node.on]
         routers = [node for node in on if node.role == NodeState.ROUTER]
         self._print(
@@ -60,6 +76,7 @@ class Probe:
                 on=len(on),
                 connected=sum(node.connected for node in routers),
                 messages=sum(node.total_messages for node in mesh.nodes),
+                flying=sum(len(node.path) > 0 for node in mesh.nodes),
                 links=sum(len(node.neighbours) for node in on) // 2,
             )
         )

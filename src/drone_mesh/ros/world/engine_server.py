@@ -79,7 +79,9 @@ class EngineServer:
         self._node_id = drone.node_id
         self._engine = drone.engine
         self._reporter = reporter
-        self._reported_s = -math.inf  # the world's thread
+        # The world's thread:
+        self._reported_s = -math.inf
+        self._reported = (False, False)  # whether it flew, whether it was flat
         self._complaints = ThrottledLog(_log)
         self._engine.add_listener(self._moved)
         self._engine.observe(self._observed)
@@ -102,7 +104,8 @@ class EngineServer:
         return gps_response(self._engine.get_location())
 
     def _moved(self, state: DroneState) -> None:
-        landed = not state.is_flying
-        if landed or state.now_s - self._reported_s >= INFO_PERIOD_S - _ROUNDING_S:
-            self._reported_s = state.now_s
+        kind = (state.is_flying, self._engine.is_flat)
+        is_due = state.now_s - self._reported_s >= INFO_PERIOD_S - _ROUNDING_S
+        if is_due or kind != self._reported:
+            self._reported_s, self._reported = state.now_s, kind
             self._reporter.report(engine_info(self._node_id, state.position, self._engine.is_flat))
