@@ -18,12 +18,38 @@ from typing import Callable, Protocol
 
 FAILURE_PERIOD_S = 30.0  # our choice: one traceback per kind of failure in this time
 RETRY_AFTER_S = 1.0  # our choice: pause before failed work that is still due runs again
+MOST_WAITING = 1000  # our choice: packets for one node; four of each other node
 _WAKE = None  # in the queue: no function, only check the deadlines again
 
 _log = logging.getLogger(__name__)
 
 Work = Callable[[float], None]
 """A function of the time at which it runs."""
+
+
+class Inbox:
+    """Packets that wait for one node. When too many do, new ones are dropped, as on the air.
+
+    Any thread may `put`; what is put runs where `submit` has it run.
+    """
+
+    def __init__(self, submit: Callable[[Work], None], most: int = MOST_WAITING) -> None:
+        self._submit = submit
+        self._free = threading.BoundedSemaphore(most)
+        self.dropped = 0  # written by the threads that put; a lost count does no harm
+
+    def put(self, function: Work) -> bool:
+        """Have `function(now_s)` run. False: too many wait, and it is dropped."""
+        if not self._free.acquire(blocking=False):
+            self.dropped += 1
+            return False
+
+        def run(now_s: float) -> None:
+            self._free.release()
+            function(now_s)
+
+        self._submit(run)
+        return True
 
 
 class Driven(Protocol):

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from drone_mesh.execution import MeshExecutor
+from drone_mesh.execution import Inbox, MeshExecutor
 
 PATIENCE_S = 5.0  # for threads; nothing here takes a hundredth of it
 
@@ -214,3 +214,17 @@ def test_a_clock_that_runs_by_itself_needs_no_poke():
     executor.call_every(0.01, lambda _now_s: called.set())
     assert called.wait(PATIENCE_S), "call_every was not called"
     executor.stop()
+
+
+def test_an_inbox_holds_a_bounded_number_of_packets():
+    waiting, handled = [], []
+    inbox = Inbox(waiting.append, most=3)
+    for packet in range(5):
+        inbox.put(lambda now_s, packet=packet: handled.append((packet, now_s)))
+    assert len(waiting) == 3
+    assert inbox.dropped == 2
+    waiting.pop(0)(1.0)
+    inbox.put(lambda now_s: handled.append(("new", now_s)))
+    for function in waiting:
+        function(2.0)
+    assert handled == [(0, 1.0), (1, 2.0), (2, 2.0), ("new", 2.0)]

@@ -12,6 +12,7 @@ from typing import Callable, Sequence
 from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
+from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
@@ -51,6 +52,8 @@ class Delivery:
         self._on_neighbour_lost = on_neighbour_lost
         self._told_s: dict[int, float] = {}  # on a shared medium: when a node was announced missing
         self._gave_up: set[int] = set()  # neighbours that took nothing lately, though heard
+        self._strangers = Strangers()
+        self._announced = RateLimit(REPEATS)
         self._missing_to_tell: deque[tuple[int, int, int]] = deque()
         self._telling = False
         self.total_sent = 0
@@ -63,6 +66,9 @@ class Delivery:
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
         """
+        if self._strangers.ignores(to, self._deadlines.now_s):
+            self._ignore(to)
+            return False
         if self._shared:
             return self._hand_over(payload, to)
         antenna, transmissions, attempts = self._antenna, failures, self._attempts
@@ -86,6 +92,7 @@ class Delivery:
 
     def delivered(self, to: int, tries: int) -> None:
         """The antenna has delivered a packet that it had queued."""
+        self._strangers.took_packet(to)
         self._routing.sent(to, True, tries)
 
     def undelivered(self, payload: bytes, tries: int) -> bool:
@@ -150,6 +157,7 @@ class Delivery:
 
     def _sent(self, to: int, transmissions: int) -> None:
         self.total_sent += 1
+        self._strangers.took_packet(to)
         self._routing.sent(to, True, transmissions)
 
     # Lost nodes ------------------------------------------------------------------------------
@@ -183,6 +191,8 @@ class Delivery:
         """
         if self._antenna.medium.shared:
             self._announce_missing(missing)
+            return
+        if not self._announced.count(missing, self._deadlines.now_s):
             return
         self._missing_to_tell.append((missing, first, told_by))
         if self._telling:
@@ -226,7 +236,13 @@ class Delivery:
         """A neighbour is about to fly out of reach: other routes are needed from now on."""
         self._neighbour_lost(node, NO_ROUTE)
 
+    def _ignore(self, node: int) -> None:
+        """Too many nodes that never took a packet were lost: this one is dropped without a word."""
+        self._neighbours.lost(node, self._deadlines.now_s)
+        self._routing.cant_communicate_with_node(node)
+
     def _neighbour_lost(self, node: int, came_from: int) -> None:
+        self._strangers.gave_up(node, self._deadlines.now_s)
         if self._neighbours.lost(node, self._deadlines.now_s):
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)
         if self._routing.cant_communicate_with_node(node):

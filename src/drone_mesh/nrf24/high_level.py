@@ -17,6 +17,7 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import is_data, readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.execution import Inbox
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.medium_access import ALL_NODES, Priority
 from drone_mesh.nrf24.pace import medium_of
@@ -55,6 +56,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         """`on_payload` is shown each payload as the mesh gets it, in the receiving thread."""
         self._radio = radio
         self._submit = submit
+        self._inbox = Inbox(submit)
         self._runtime = runtime or SystemRuntime()
         self._sender = Sender(radio, self._runtime, self._delivered, self._given_up)
         self._medium = medium_of(radio.settings)
@@ -205,7 +207,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
             payload = readdressed(payload, self._radio.node_id)
         if self._on_payload is not None:
             self._on_payload(payload)
-        self._submit(lambda now_s: mesh.on_msg(payload, now_s))
+        self._inbox.put(lambda now_s: mesh.on_msg(payload, now_s))
 
     def _note(self, payload: bytes) -> None:
         """Count duplicates; they are still delivered, since a repeated packet is normal."""

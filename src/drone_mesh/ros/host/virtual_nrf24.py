@@ -12,7 +12,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.execution import Seat
+from drone_mesh.execution import Inbox, Seat
 from drone_mesh.msg import NRF24
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.host.announcements import probe_of
@@ -39,6 +39,7 @@ class VirtualNRF24(IWirelessCommunication):
         self._probe = probe_of(node_id)
         self._link = link
         self._seat = seat
+        self._inbox = Inbox(seat.submit)
         self._on = False
         self._switching = threading.Lock()
         self._mesh: IMeshNetwork | None = None
@@ -93,8 +94,8 @@ class VirtualNRF24(IWirelessCommunication):
         payload = message.payload
         if payload == self._probe:
             self._link.antennas.probe_returned(self.node_id)
-        else:
-            self._seat.submit(lambda now_s: self._receive(payload, now_s))
+        elif not self._inbox.put(lambda now_s: self._receive(payload, now_s)):
+            self._link.worked_off()  # too many wait: it is lost
 
     def _receive(self, payload: bytes, now_s: float) -> None:
         try:

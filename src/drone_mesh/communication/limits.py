@@ -1,0 +1,50 @@
+"""Limits of what a node spends on others that may not exist (docs/security.md, "Limits")."""
+
+from __future__ import annotations
+
+LIMIT_PERIOD_S = 10.0  # our choice: one check period
+STRANGERS = 16  # our choice: losses per period of nodes that never took a packet
+REPEATS = 8  # our choice: announcements per period that the same node is missing
+
+
+class RateLimit:
+    """So many times per period and node. One entry per node id at most."""
+
+    def __init__(self, times: int, period_s: float = LIMIT_PERIOD_S) -> None:
+        self._times = times
+        self._period_s = period_s
+        self._counted: dict[int, tuple[float, int]] = {}  # by node: start of the period, how often
+
+    def count(self, node: int, now_s: float) -> bool:
+        """Count one more; False if that is too many."""
+        since_s, times = self._counted.get(node, (now_s, 0))
+        if now_s - since_s >= self._period_s:
+            since_s, times = now_s, 0
+        self._counted[node] = (since_s, times + 1)
+        return times < self._times
+
+    def reached(self, node: int, now_s: float) -> bool:
+        """Whether one more would be too many."""
+        since_s, times = self._counted.get(node, (now_s, 0))
+        return times >= self._times and now_s - since_s < self._period_s
+
+
+class Strangers:
+    """Nodes that never took a packet. When too many of those are lost, others get none."""
+
+    def __init__(self) -> None:
+        self._known: set[int] = set()
+        self._losses = RateLimit(STRANGERS)
+
+    def took_packet(self, node: int) -> None:
+        """It exists."""
+        self._known.add(node)
+
+    def gave_up(self, node: int, now_s: float) -> None:
+        """It took no packet."""
+        if node not in self._known:
+            self._losses.count(0, now_s)
+
+    def ignores(self, node: int, now_s: float) -> bool:
+        """Whether no packet is to be spent on it now."""
+        return node not in self._known and self._losses.reached(0, now_s)
