@@ -13,9 +13,10 @@ from typing import Callable, Sequence
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.attacks import ATTACKS
 from drone_mesh.lab.campaign import Campaign
-from drone_mesh.lab.damage import table
+from drone_mesh.lab.damage import KEY, table
 from drone_mesh.lab.estimate import estimate
 from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.fuzz import NODES, fuzz
 from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
@@ -132,6 +133,15 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     attack.add_argument("--runs", type=_count, default=12, metavar="N", help="seeds (default: 12)")
     attack.set_defaults(run=_attack)
 
+    fuzzing = commands.add_parser(
+        "fuzz", help="let a small mesh hear mutated packets, without and with a key"
+    )
+    fuzzing.add_argument(
+        "--packets", type=_count, default=1_000_000, metavar="N", help="(default: %(default)s)"
+    )
+    fuzzing.add_argument("--seed", type=int, default=1, help="(default: %(default)s)")
+    fuzzing.set_defaults(run=_fuzz)
+
     metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
     metrics.set_defaults(run=_metrics)
 
@@ -173,6 +183,22 @@ def _attack(options: argparse.Namespace) -> int:
     logging.disable(logging.WARNING)  # an attacked mesh has much to say
     for line in table(options.attacks or list(ATTACKS), options.runs):
         print(line, flush=True)
+    return 0
+
+
+def _fuzz(options: argparse.Namespace) -> int:
+    logging.disable(logging.WARNING)
+
+    def progress(done: int) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{done} of {options.packets} packets", end="\r", file=sys.stderr, flush=True)
+
+    for case, key in (("without a key", None), ("with a key", KEY)):
+        result = fuzz(options.packets, options.seed, key, progress)
+        print(
+            f"{case}: {result.packets} packets, no exception; {result.moved} drones moved, "
+            f"{result.connected} of {NODES - 1} routers connected a minute later"
+        )
     return 0
 
 

@@ -23,33 +23,33 @@ class Recorded(NamedTuple):
     payload: bytes
 
 
-class _Tap(IMeshNetwork):
+class Tap(IMeshNetwork):
     """Hears what a node hears, without changing it."""
 
     def __init__(self, network: Network, node_id: int, record: list[Recorded]) -> None:
         self._network = network
         self._node_id = node_id
         self._record = record
-        self._tapped = network.nodes[node_id].receiver
+        self.tapped = network.nodes[node_id].receiver
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         self._record.append(Recorded(now_s, self._node_id, payload))
-        self._tapped.on_msg(payload, now_s)
+        self.tapped.on_msg(payload, now_s)
 
     def get_node_id(self) -> int:
         return self._node_id
 
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        self._tapped.on_delivered(neighbour, tries, now_s)
+        self.tapped.on_delivered(neighbour, tries, now_s)
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
-        self._tapped.on_undelivered(payload, tries, now_s)
+        self.tapped.on_undelivered(payload, tries, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
-        self._tapped.on_antenna_power(on, now_s)
+        self.tapped.on_antenna_power(on, now_s)
 
     def on_antenna_registered(self, now_s: float) -> None:
-        self._tapped.on_antenna_registered(now_s)
+        self.tapped.on_antenna_registered(now_s)
 
 
 class Stranger(IMeshNetwork):
@@ -87,7 +87,7 @@ class Stranger(IMeshNetwork):
     def listen(self) -> None:
         """Record what the nodes in its range hear, from now on."""
         for node_id in self.in_range():
-            self.network.nodes[node_id].receiver = _Tap(self.network, node_id, self.record)
+            self.network.nodes[node_id].receiver = Tap(self.network, node_id, self.record)
 
     def in_range(self) -> list[int]:
         """The nodes that hear it."""

@@ -8,7 +8,8 @@ import pytest
 
 from drone_mesh.lab.attacks import ATTACKS, RECORDING
 from drone_mesh.lab.command import main
-from drone_mesh.lab.damage import Case, table, trial
+from drone_mesh.lab.damage import KEY, Case, table, trial
+from drone_mesh.lab.fuzz import fuzz
 
 # Of what an attack may not have effects: what the scenario costs by itself differs a little with
 # the moments at which packets travel.
@@ -72,3 +73,11 @@ def test_the_table_has_a_cell_for_each_case():
 def test_an_unknown_attack_is_an_error_in_one_line(capsys):
     assert main(["attack", "tickling"]) == 1
     assert "unknown attack 'tickling': use one of forged order" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["without key", "with key"])
+def test_no_mutated_packet_stops_a_node(key):
+    result = fuzz(10_000, seed=1, key=key)
+    assert result.packets == 10_000
+    if key is not None:
+        assert (result.moved, result.connected) == (0, 5)
