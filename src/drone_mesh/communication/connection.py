@@ -21,6 +21,9 @@ _HOPS_UNTIL_KNOWN = 10  # our choice: for how many hops to wait for the first an
 MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
 
 
+AVOIDED_S = 60.0  # our choice: a neighbour whose shortcut brought no answer
+
+
 class Shortcut(NamedTuple):
     """A neighbour that presented itself with fewer hops than the route in use."""
 
@@ -47,6 +50,8 @@ class GatewayConnection:
         self._answered_s = -math.inf
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
+        self._tried = NO_ROUTE  # the neighbour over which the latest heartbeat took a shortcut
+        self._swallowed_s: dict[int, float] = {}  # neighbours whose shortcut brought no answer
         self._unanswered = 0  # heartbeats in a row
         self._asked_neighbour_s = -math.inf  # for its gateway
 
@@ -100,10 +105,24 @@ class GatewayConnection:
         if its_gateway == NO_ROUTE:
             its_gateway = self.gateway
         packet = self._parts.heartbeat(to, its_gateway, connected, self.gateway)
-        return self._parts.delivery.send(packet, to) and its_gateway == self.gateway
+        if not self._parts.delivery.send(packet, to) or its_gateway != self.gateway:
+            return False
+        self._tried = to
+        return True
 
     def answer_missed(self) -> None:
-        """The time for the gateway's answer is over; it is asked again if the medium is lossy."""
+        """The time for the gateway's answer is over.
+
+        It is asked again if the medium is lossy, or if the heartbeat took a shortcut: a neighbour
+        over which no answer comes is avoided for a while, and the route in use still works.
+        """
+        tried, self._tried = self._tried, NO_ROUTE
+        if tried != NO_ROUTE:
+            self._swallowed_s[tried] = self._parts.now_s
+            if self._states.connected:
+                self._heartbeat_sent_s = -math.inf
+                self.send_heartbeat()
+                return
         self._unanswered += 1
         if self._states.connected and self._unanswered < self._parts.antenna.medium.heartbeats:
             self._heartbeat_sent_s = -math.inf
@@ -138,6 +157,7 @@ class GatewayConnection:
             and self._parts.routing.TAKES_SHORTCUTS
             and hops + 1 < self.hops
             and (self._shortcut is None or hops < self._shortcut.hops)
+            and self._parts.now_s - self._swallowed_s.get(neighbour, -math.inf) >= AVOIDED_S
             and self._parts.routing.get_direction_to_node(neighbour) == neighbour
         ):
             self._shortcut = Shortcut(neighbour, hops)
@@ -156,6 +176,7 @@ class GatewayConnection:
         self.hops = min(hops, NO_ROUTE)
         self._answered_s = now_s
         self._unanswered = 0
+        self._tried = NO_ROUTE
         self._show()
         if is_new:
             self._introduce()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import abc
 import math
 
+from drone_mesh.communication.bid_credit import BidCredit, highest_plausible
 from drone_mesh.communication.election import (
     IN_VAIN,
     NO_BID,
@@ -41,6 +42,7 @@ class GroupRepair(IRepairStrategy):
         super().start(mesh)
         self._election = Election(mesh.check_period_s)
         self._news = FlightNews()
+        self._credit = BidCredit()
         self._asked_s = -math.inf
         self._rounds_without_flier = 0
 
@@ -63,6 +65,7 @@ class GroupRepair(IRepairStrategy):
         self._election.clear()
         self._rounds_without_flier = 0
         self._news.clear()
+        self._credit.clear()
 
     def on_stopped(self) -> None:
         """The election goes on without this node."""
@@ -170,6 +173,9 @@ class GroupRepair(IRepairStrategy):
         if score == IN_VAIN:
             self._on_in_vain(node, from_, about)
             score = NO_BID
+        most = highest_plausible(mesh.own_place(), mesh.gateway_place, mesh.range_m)
+        if not self._credit.believes(node, score, from_, most):
+            score = NO_BID
         is_best = self._election.heard(node, score, mesh.now_s)
         if mesh.connected or mesh.state is Repair.FLYING or self._news.is_quiet(mesh.now_s):
             return
@@ -260,6 +266,7 @@ class GroupRepair(IRepairStrategy):
 
     def _pass_over_winner(self) -> None:
         """The winner did not take off: the next best flies."""
+        self._credit.did_not_fly(self.winner)
         self._election.pass_over(self.winner)
         self.mesh.happened(RouterEvent.WINNER_MISSED)
         self._begin_election()

@@ -26,7 +26,7 @@ OUTAGE_S = 90.0
 BIDDING_S = 300.0
 FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
 HERE, THERE = Location(-5.0, 2.0, 0.0), Location(-2.0, -4.0, 0.0)  # of two orders of the owner
-LARGEST_BID = 1e9
+LARGEST_BID, PLAUSIBLE_BID = 1e9, 100.0
 
 Attack = Callable[[Stranger], Dict[int, Location]]
 
@@ -108,8 +108,17 @@ def far_place(stranger: Stranger) -> dict[int, Location]:
 
 def highest_bid(stranger: Stranger) -> dict[int, Location]:
     """The drones behind node 1 are cut off for good; a bid each 3 s is higher than theirs."""
+    return _bid(stranger, LARGEST_BID)
+
+
+def plausible_bid(stranger: Stranger) -> dict[int, Location]:
+    """The same with bids that a real drone could make."""
+    return _bid(stranger, PLAUSIBLE_BID)
+
+
+def _bid(stranger: Stranger, score: float) -> dict[int, Location]:
     stranger.network.power(1, False)
-    body = MovementNegotiationMessage.BODY.pack(LARGEST_BID)
+    body = MovementNegotiationMessage.BODY.pack(score)
     for bid, _ in enumerate(stranger.every(3.0, BIDDING_S)):
         for node in stranger.in_range():
             nobody = 100 + bid % 100
@@ -148,6 +157,7 @@ ATTACKS: Mapping[str, Attack] = {
     "MISSING storm": missing_storm,
     "far place and an outage": far_place,
     "bids of 1e9": highest_bid,
+    "bids of 100 m": plausible_bid,
     "black hole": black_hole,
     "heartbeats of invented ids": invented_ids,
 }

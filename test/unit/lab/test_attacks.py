@@ -50,6 +50,7 @@ def test_without_a_key_a_stranger_sends_drones_kilometres_away(name):
         "false gateway",
         "MISSING storm",
         "far place and an outage",
+        "black hole",
     ],
 )
 def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):
@@ -57,6 +58,13 @@ def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):
     attacked = trial(name, Case.CAPTURED, seed=0)
     assert attacked.lured == 0
     assert attacked.cut_off <= quiet.cut_off + SLACK
+
+
+@pytest.mark.parametrize("name", ["bids of 1e9", "bids of 100 m"])
+def test_the_bids_of_a_captured_node_delay_a_repair_and_do_not_prevent_it(name):
+    attacked = trial(name, Case.CAPTURED, seed=0)
+    assert attacked.cut_off < 0.5
+    assert attacked.later == 0.0
 
 
 def test_the_table_has_a_cell_for_each_case():
