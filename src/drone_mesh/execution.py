@@ -36,12 +36,14 @@ class Inbox:
     def __init__(self, submit: Callable[[Work], None], most: int = MOST_WAITING) -> None:
         self._submit = submit
         self._free = threading.BoundedSemaphore(most)
-        self.dropped = 0  # written by the threads that put; a lost count does no harm
+        self._counting = threading.Lock()
+        self.dropped = 0
 
     def put(self, function: Work) -> bool:
         """Have `function(now_s)` run. False: too many wait, and it is dropped."""
         if not self._free.acquire(blocking=False):
-            self.dropped += 1
+            with self._counting:
+                self.dropped += 1
             return False
 
         def run(now_s: float) -> None:

@@ -40,6 +40,7 @@ class VirtualNRF24(IWirelessCommunication):
         self._link = link
         self._seat = seat
         self._inbox = Inbox(seat.submit)
+        self._dropped = 0  # packets that the inbox did not take, as far as the worker knows
         self._on = False
         self._switching = threading.Lock()
         self._mesh: IMeshNetwork | None = None
@@ -94,8 +95,8 @@ class VirtualNRF24(IWirelessCommunication):
         payload = message.payload
         if payload == self._probe:
             self._link.antennas.probe_returned(self.node_id)
-        elif not self._inbox.put(lambda now_s: self._receive(payload, now_s)):
-            self._link.worked_off()  # too many wait: it is lost
+        else:
+            self._inbox.put(lambda now_s: self._receive(payload, now_s))
 
     def _receive(self, payload: bytes, now_s: float) -> None:
         try:
@@ -103,6 +104,9 @@ class VirtualNRF24(IWirelessCommunication):
                 self._mesh.on_msg(payload, now_s)
         finally:
             self._link.worked_off()
+            while self._dropped < self._inbox.dropped:
+                self._dropped += 1
+                self._link.worked_off()
 
     def _switch_power(self, on: bool) -> None:
         mesh = self._mesh
