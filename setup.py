@@ -32,6 +32,6 @@ setup(
     version=ElementTree.parse(str(HERE / "package.xml")).findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
-    package_data={"": ["*.csv", "*.html", "*.pyi", "*.service", "py.typed", "static/*"]},
+    package_data={"": ["*.csv", "*.html", "*.lua", "*.pyi", "*.service", "py.typed", "static/*"]},
     extras_require={extra: requirements(extra) for extra in EXTRAS},
 )

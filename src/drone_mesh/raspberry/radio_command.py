@@ -8,11 +8,12 @@ import platform
 import sys
 import time
 from pathlib import Path
-from typing import Iterator, Sequence
+from typing import Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
@@ -24,6 +25,7 @@ from drone_mesh.raspberry.emulated_bench import PARTNER_ID, EmulatedPartner
 from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
 
 REPORT_ROUNDS = 20
+DISSECTOR = Path(__file__).with_name("drone_mesh.lua")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,8 +52,23 @@ def _tool(options: argparse.Namespace, radio: BenchRadio, irq: IrqPin | None) ->
         return radio_tests.measure_range(radio, options.to, options.packets, options.distance)
     if options.tool == "listen":
         until_s = time.monotonic() + options.seconds
-        return radio_tests.listen(radio, lambda: time.monotonic() >= until_s)
+        return _listen(radio, lambda: time.monotonic() >= until_s, options.pcapng)
     return _report(radio, irq, options.file)
+
+
+def _listen(radio: BenchRadio, ended: Callable[[], bool], file: Path | None) -> Iterator[str]:
+    if file is None:
+        yield from radio_tests.listen(radio, ended)
+        return
+    try:
+        writer = PcapngWriter(file, LINKTYPE_PAYLOADS, "nRF24L01+")
+    except OSError as error:
+        raise ConfigurationError(f"--pcapng {file}: {error.strerror or error}") from error
+    with contextlib.closing(writer):
+        yield f"for Wireshark: wireshark -X lua_script:{DISSECTOR} {file}"
+        yield from radio_tests.listen(
+            radio, ended, lambda payload: writer.write(CapturedPacket(time.time_ns(), payload, ""))
+        )
 
 
 def _report(radio: BenchRadio, irq: IrqPin | None, file: Path) -> Iterator[str]:
@@ -154,6 +171,9 @@ def _parser() -> argparse.ArgumentParser:
     reach.add_argument("--distance", type=float, help="metres, to compare with 2019")
     ear = tools.add_parser("listen", help="packets to all nodes, and to --id, decoded")
     ear.add_argument("--seconds", type=float, default=float("inf"), help="(default: until Ctrl-C)")
+    ear.add_argument(
+        "--pcapng", type=Path, metavar="FILE", help="also write what arrives to FILE, for Wireshark"
+    )
     report = tools.add_parser("report", help="check and scan into one file, to send to us")
     report.add_argument("file", type=Path)
     return parser

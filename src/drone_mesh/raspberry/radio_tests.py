@@ -84,7 +84,9 @@ def scan(radio: BenchRadio, rounds: int, suggest: int = 3) -> Lines:
         wifi = [f"Wi-Fi {number}" for number, middle in WIFI if abs(channel - middle) <= 10]
         note = f"  {wifi[0]}" if wifi and channel % 10 == 2 else ""
         yield f"{channel:3d} {2400 + channel} MHz {count / rounds:5.0%} {bar}{note}"
-    yield f"quietest in the licence-free band: {' '.join(map(str, quietest(heard, suggest)))}"
+    quiet = quietest(heard, suggest)
+    yield f"quietest in the licence-free band: {' '.join(map(str, quiet))}"
+    yield f"for all nodes of a mesh alike: --channel {quiet[0]}"
 
 
 def quietest(heard: list[int], count: int) -> list[int]:
@@ -123,8 +125,12 @@ def measure_range(radio: BenchRadio, to: int, packets: int, distance_m: float | 
         )
 
 
-def listen(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
-    """What arrives at the broadcast address and at this node's own, decoded."""
+def listen(
+    radio: BenchRadio,
+    ended: Callable[[], bool],
+    keep: Callable[[bytes], None] = lambda _payload: None,
+) -> Lines:
+    """What arrives at the broadcast address and at this node's own, decoded; `keep` gets it too."""
     radio.set_up()
     started_s = radio.runtime.now_s()
     while not ended():
@@ -132,6 +138,7 @@ def listen(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
         if payload is None:
             radio.runtime.sleep(1e-3)
         else:
+            keep(payload)
             yield f"{radio.runtime.now_s() - started_s:9.3f}  {decoded(payload)}"
 
 

@@ -5,11 +5,14 @@ Our own because it is short and the libraries mainly read (docs/decisions/own-co
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from pathlib import Path
 from typing import Iterable, NamedTuple
 
-LINKTYPE_USER0 = 147  # there is no link type for this radio; user 0..15 are for private use
+# There is no link type for this radio; user 0..15 are for private use.
+LINKTYPE_FRAMES = 147  # USER0: bits on the air
+LINKTYPE_PAYLOADS = 148  # USER1: payloads of 32 bytes
 _SECTION_HEADER, _INTERFACE, _ENHANCED_PACKET = 0x0A0D0D0A, 1, 6
 _BYTE_ORDER_MAGIC = 0x1A2B3C4D
 _LENGTH_NOT_KNOWN = -1
@@ -41,17 +44,35 @@ def _block(kind: int, body: bytes) -> bytes:
     return struct.pack("<I", kind) + length + body + length
 
 
-def write_pcapng(path: Path, packets: Iterable[CapturedPacket]) -> None:
-    """One section with one interface."""
-    with path.open("wb") as file:
+class PcapngWriter:
+    """A file with one section and one interface; each packet is in it when `write` returns."""
+
+    def __init__(self, path: Path, link_type: int, interface: str) -> None:
+        """Raises OSError."""
+        self._file = path.open("wb", buffering=0)
         section = struct.pack("<IHHq", _BYTE_ORDER_MAGIC, 1, 0, _LENGTH_NOT_KNOWN)
-        file.write(_block(_SECTION_HEADER, section + _options((_OPT_APPLICATION, b"drone_mesh"))))
-        interface = struct.pack("<HHI", LINKTYPE_USER0, 0, 0)
-        name = _options((_OPT_NAME, b"emulated air"), (_OPT_RESOLUTION, _NANOSECONDS))
-        file.write(_block(_INTERFACE, interface + name))
+        application = _options((_OPT_APPLICATION, b"drone_mesh"))
+        name = _options((_OPT_NAME, interface.encode()), (_OPT_RESOLUTION, _NANOSECONDS))
+        self._file.write(
+            _block(_SECTION_HEADER, section + application)
+            + _block(_INTERFACE, struct.pack("<HHI", link_type, 0, 0) + name)
+        )
+
+    def write(self, packet: CapturedPacket) -> None:
+        """Append a packet. Raises OSError."""
+        length = len(packet.data)
+        high, low = divmod(packet.time_ns, 1 << 32)
+        head = struct.pack("<IIIII", 0, high, low, length, length)
+        comment = _options((_OPT_COMMENT, packet.comment.encode()))
+        self._file.write(_block(_ENHANCED_PACKET, head + _padded(packet.data) + comment))
+
+    def close(self) -> None:
+        """No more packets follow."""
+        self._file.close()
+
+
+def write_pcapng(path: Path, packets: Iterable[CapturedPacket]) -> None:
+    """A file of frames on the emulated air. Raises OSError."""
+    with contextlib.closing(PcapngWriter(path, LINKTYPE_FRAMES, "emulated air")) as writer:
         for packet in packets:
-            length = len(packet.data)
-            high, low = divmod(packet.time_ns, 1 << 32)
-            head = struct.pack("<IIIII", 0, high, low, length, length)
-            comment = _options((_OPT_COMMENT, packet.comment.encode()))
-            file.write(_block(_ENHANCED_PACKET, head + _padded(packet.data) + comment))
+            writer.write(packet)

@@ -1,0 +1,156 @@
+-- Wireshark dissector for the frames of an nRF24L01+ and the packets of drone_mesh.
+--
+-- USER0 (pcapng link type 147): frames on the air, as --trace writes them. Preamble 8 bits, address
+-- 40, packet control field 9 (none in plain ShockBurst), payload 0 or 256, CRC 8 or 16.
+-- USER1 (148): payloads of 32 bytes, as `raspberry_radio listen --pcapng` writes them.
+--
+-- wireshark -X lua_script:drone_mesh.lua FILE
+
+local PAYLOAD_BYTES = 32
+local HEADER_BYTES = 5
+
+local types = {
+  [0] = "NOTDEFINED", [1] = "LOCATION", [2] = "REQUESTLOCATION", [3] = "PRESENT",
+  [4] = "HEARTBEAT", [5] = "MISSING", [6] = "MOVE_TO_LOCATION", [7] = "MOVEMENT_NEGOTIATION",
+  [64] = "ORDER_REPLY", [65] = "ORDER_QUERY", [66] = "NODE_REPORT", [67] = "NODE_WORDS",
+  [125] = "GATEWAY_PLACE", [126] = "SEAL_CHALLENGE", [127] = "SEAL_ANSWER",
+}
+local outcomes = {
+  [1] = "accepted", [2] = "refused", [3] = "arrived", [4] = "given up", [5] = "unknown",
+}
+
+local mesh = Proto("drone_mesh", "Drone mesh")
+local f = {
+  creator = ProtoField.uint8("drone_mesh.creator", "Creator"),
+  from = ProtoField.uint8("drone_mesh.from", "From"),
+  type = ProtoField.uint8("drone_mesh.type", "Type", base.DEC, types),
+  to = ProtoField.uint8("drone_mesh.to", "To"),
+  forward = ProtoField.uint8("drone_mesh.forward", "Forward"),
+  latitude = ProtoField.float("drone_mesh.latitude", "Latitude (m)"),
+  longitude = ProtoField.float("drone_mesh.longitude", "Longitude (m)"),
+  height = ProtoField.int16("drone_mesh.height", "Height (m)"),
+  time = ProtoField.uint32("drone_mesh.time", "Time of the creator (s)"),
+  hops = ProtoField.uint8("drone_mesh.hops", "Hops"),
+  know_gateway = ProtoField.bool("drone_mesh.know_gateway", "Knows a gateway"),
+  gateway = ProtoField.uint8("drone_mesh.gateway", "Preferred gateway"),
+  missing = ProtoField.uint8("drone_mesh.missing", "Missing"),
+  cost = ProtoField.float("drone_mesh.cost", "Cost (m)"),
+  order = ProtoField.uint16("drone_mesh.order", "Order"),
+  outcome = ProtoField.uint8("drone_mesh.outcome", "Outcome", base.DEC, outcomes),
+  part = ProtoField.uint8("drone_mesh.part", "Part", base.DEC, nil, 0x0f),
+  last_part = ProtoField.uint8("drone_mesh.last_part", "Last part", base.DEC, nil, 0xf0),
+  text = ProtoField.string("drone_mesh.text", "Text"),
+  neighbours = ProtoField.uint8("drone_mesh.neighbours", "Neighbours"),
+  next_hop = ProtoField.uint8("drone_mesh.next_hop", "Next hop"),
+  place = ProtoField.int16("drone_mesh.place", "Latitude, longitude or height (0.2 m)"),
+  battery = ProtoField.uint8("drone_mesh.battery", "Battery (%)"),
+  flying = ProtoField.bool("drone_mesh.flying", "In flight", 8, nil, 0x01),
+  can_fly = ProtoField.bool("drone_mesh.can_fly", "Can fly", 8, nil, 0x02),
+  tries = ProtoField.uint8("drone_mesh.tries", "Tries per packet (0.1)"),
+  data = ProtoField.bytes("drone_mesh.data", "Data"),
+  rest = ProtoField.bytes("drone_mesh.rest", "Behind the body"),
+}
+mesh.fields = f
+
+-- Fields of the body by type: {field, bytes}; the order is that on the air, little-endian.
+local bodies = {
+  [1] = { { f.latitude, 4 }, { f.longitude, 4 }, { f.height, 2 }, { f.time, 4 } },
+  [3] = { { f.hops, 1 }, { f.know_gateway, 1 } },
+  [4] = { { f.know_gateway, 1 }, { f.gateway, 1 }, { f.hops, 1 } },
+  [5] = { { f.missing, 1 } },
+  [6] = { { f.latitude, 4 }, { f.longitude, 4 }, { f.height, 2 }, { f.order, 2 } },
+  [7] = { { f.cost, 4 } },
+  [64] = { { f.order, 2 }, { f.outcome, 1 }, { f.last_part, 1, f.part }, { f.text, 10 } },
+  [65] = { { f.order, 2 } },
+  [66] = {
+    { f.neighbours, 1 }, { f.hops, 1 }, { f.next_hop, 1 }, { f.place, 2 }, { f.place, 2 },
+    { f.place, 2 }, { f.battery, 1 }, { f.flying, 1, f.can_fly }, { f.tries, 1 },
+  },
+  [67] = { { f.last_part, 1, f.part }, { f.text, 13 } },
+}
+
+function mesh.dissector(tvb, pinfo, root)
+  if tvb:len() < PAYLOAD_BYTES then
+    return 0
+  end
+  local kind = tvb(2, 1):uint()
+  local name = types[kind] or (kind >= 128 and "users' data" or "type " .. kind)
+  pinfo.cols.protocol = "DRONE_MESH"
+  pinfo.cols.src = tostring(tvb(1, 1):uint())
+  pinfo.cols.dst = tvb(3, 1):uint() == 254 and "all" or tostring(tvb(3, 1):uint())
+  pinfo.cols.info = string.format(
+    "%s made by %d, for %d", name, tvb(0, 1):uint(), tvb(4, 1):uint()
+  )
+  local tree = root:add(mesh, tvb(0, PAYLOAD_BYTES), "Drone mesh, " .. name)
+  for index, field in ipairs({ f.creator, f.from, f.type, f.to, f.forward }) do
+    tree:add(field, tvb(index - 1, 1))
+  end
+  local at = HEADER_BYTES
+  for _, entry in ipairs(bodies[kind] or {}) do
+    local range = tvb(at, entry[2])
+    tree:add_le(entry[1], range)
+    if entry[3] then
+      tree:add_le(entry[3], range)
+    end
+    at = at + entry[2]
+  end
+  tree:add(kind >= 128 and f.data or f.rest, tvb(at, PAYLOAD_BYTES - at))
+  return PAYLOAD_BYTES
+end
+
+local nrf24 = Proto("nrf24", "nRF24L01+")
+local g = {
+  address = ProtoField.bytes("nrf24.address", "Address"),
+  length = ProtoField.uint16("nrf24.length", "Length field", base.DEC, nil, 0xfc00),
+  pid = ProtoField.uint16("nrf24.pid", "PID", base.DEC, nil, 0x0300),
+  no_ack = ProtoField.bool("nrf24.no_ack", "No acknowledgement wanted", 16, nil, 0x0080),
+}
+nrf24.fields = g
+
+local ADDRESS_AT, CONTROL_AT = 1, 6
+-- By the bytes of the frame: whether it has a packet control field, and a payload.
+local shapes = {
+  [42] = { true, true }, [41] = { true, true }, -- CRC of 16 and 8 bits
+  [40] = { false, true }, [39] = { false, true }, -- plain ShockBurst
+  [10] = { true, false }, [9] = { true, false }, -- acknowledgements
+}
+
+-- The payload behind 9 bits of control is not on a byte boundary.
+local function payload_of(tvb, enhanced)
+  if not enhanced then
+    return tvb(CONTROL_AT, PAYLOAD_BYTES):tvb()
+  end
+  local bytes = ByteArray.new()
+  bytes:set_size(PAYLOAD_BYTES)
+  for index = 0, PAYLOAD_BYTES - 1 do
+    local pair = tvb(CONTROL_AT + 1 + index, 2):uint()
+    bytes:set_index(index, math.floor(pair / 128) % 256)
+  end
+  return bytes:tvb("Payload")
+end
+
+function nrf24.dissector(tvb, pinfo, root)
+  local shape = shapes[tvb:len()]
+  if not shape then
+    return 0
+  end
+  local enhanced, has_payload = shape[1], shape[2]
+  pinfo.cols.protocol = "NRF24"
+  pinfo.cols.info = has_payload and "frame" or "acknowledgement"
+  local tree = root:add(nrf24, tvb(), has_payload and "nRF24L01+ frame" or "nRF24L01+ acknowledgement")
+  tree:add(g.address, tvb(ADDRESS_AT, 5))
+  if enhanced then
+    local control = tvb(CONTROL_AT, 2)
+    tree:add(g.length, control)
+    tree:add(g.pid, control)
+    tree:add(g.no_ack, control)
+  end
+  if has_payload then
+    mesh.dissector(payload_of(tvb, enhanced), pinfo, root)
+  end
+  return tvb:len()
+end
+
+local by_link = DissectorTable.get("wtap_encap")
+by_link:add(wtap.USER0, nrf24)
+by_link:add(wtap.USER1, mesh)
