@@ -14,7 +14,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused, MeshError
-from drone_mesh.yaml_file import YamlFile, read_mapping
+from drone_mesh.yaml_file import YamlFile, read_mapping, read_mapping_text
 
 FIELD_CASE = 0
 GRID_CASE = 100
@@ -79,12 +79,7 @@ class Layouts:
     @classmethod
     def load(cls, path: str | Path) -> Layouts:
         """Read a file like config/casus.yaml. ConfigurationError: file, line and what is wrong."""
-        file = read_mapping(path)
-        try:
-            cases = _LayoutFile.model_validate(file.content).cases
-        except ValidationError as error:
-            raise _refusal(file, error.errors()) from None
-        return cls({case: _layout(file, case, places) for case, places in cases.items()})
+        return cls(_cases(read_mapping(path)))
 
     @property
     def cases(self) -> list[int]:
@@ -100,6 +95,26 @@ class Layouts:
         if case not in self._cases:
             raise UnknownCase(f"unknown case {case}: use one of {_ranges(self.cases)}")
         return [Order(*item) for item in sorted(self._cases[case].items(), reverse=True)]
+
+
+def read_places(text: str, name: str = "the file") -> list[Order]:
+    """The orders of a layout file with one case, from the highest id down.
+
+    Raises ConfigurationError: `name`, line and what is wrong.
+    """
+    cases = _cases(read_mapping_text(text, name))
+    if len(cases) != 1:
+        raise ConfigurationError(f"{name}: has {len(cases)} cases: keep the one to fly to")
+    (layout,) = cases.values()
+    return [Order(*item) for item in sorted(layout.items(), reverse=True)]
+
+
+def _cases(file: YamlFile) -> dict[int, Layout]:
+    try:
+        cases = _LayoutFile.model_validate(file.content).cases
+    except ValidationError as error:
+        raise _refusal(file, error.errors()) from None
+    return {case: _layout(file, case, places) for case, places in cases.items()}
 
 
 def _field_layout() -> Layout:

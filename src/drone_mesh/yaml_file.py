@@ -45,14 +45,19 @@ class YamlFile:
 
 
 def read_mapping(path: str | Path) -> YamlFile:
-    """Read this file; an empty file is an empty mapping.
+    """Read this file, as read_mapping_text; also raises ConfigurationError if it cannot be read."""
+    return read_mapping_text(_read_text(path), path)
 
-    Raises ConfigurationError (one line: file, line, what is wrong) for a file that cannot be read,
+
+def read_mapping_text(text: str, path: str | Path) -> YamlFile:
+    """The mapping that this text of a file consists of; an empty file is an empty mapping.
+
+    `path` is for messages. Raises ConfigurationError (one line: file, line, what is wrong) for what
     is not YAML, has a duplicate key, exceeds the limits above or contains anything but a mapping.
     Aliases (*name) are refused: a few lines of them can stand for gigabytes.
     """
     try:
-        loader = _Loader(_read_text(path))
+        loader = _Loader(text)
         root = loader.get_single_node()
         lines: dict[KeyPath, int] = {}
         if root is not None:

@@ -8,7 +8,7 @@ import pytest
 
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.layouts import Layouts, UnknownCase, read_places
 
 SHIPPED = Path(__file__).parents[2] / "config" / "casus.yaml"
 
@@ -161,3 +161,22 @@ def test_a_refusal_names_the_line(load, place, why):
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match="nowhere.yaml: No such file"):
         Layouts.load(tmp_path / "nowhere.yaml")
+
+
+def test_a_layout_is_read_from_text_from_the_highest_id_down():
+    orders = read_places("cases:\n  7:\n    1: [1, 2, 3]\n    4: [5, 6, 0]\n")
+    assert [order.node_id for order in orders] == [4, 1]
+    assert orders[1].goal == Location(latitude=2.0, longitude=1.0, height=3.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("cases: {1: {1: [0, 0, 0]}, 2: {1: [0, 0, 0]}}", "the file: has 2 cases: keep the one"),
+        ("cases:\n  1:\n    1: [far, 0, 0]\n", "the file, line 3: case 1, drone 1: invalid place"),
+        ("nothing", "the file: expected 'key: value' lines"),
+    ],
+)
+def test_a_text_that_is_no_layout_is_refused(text, why):
+    with pytest.raises(ConfigurationError, match=why):
+        read_places(text)

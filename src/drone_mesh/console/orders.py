@@ -11,9 +11,10 @@ from typing_extensions import Annotated
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
-from drone_mesh.errors import MeshError
-from drone_mesh.layouts import MAX_CASE
+from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.layouts import MAX_CASE, read_places
 
+MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
 RECORDED = "this is a recording: it cannot be changed"
 LIMITS = {"coordinate": MAX_COORDINATE_M, "height": MAX_HEIGHT_M}  # metres; for the page's form
@@ -93,6 +94,29 @@ class _Speed(PageOrder):
         return controls.speed(self.paused, self.factor)
 
 
+class _Places(PageOrder):
+    """Send drones to the places of a layout file."""
+
+    do: Literal["places"]
+    text: str = Field(max_length=MAX_FILE_CHARACTERS)
+
+    def carry_out(self, controls: MeshControls) -> str:
+        try:
+            layout = read_places(self.text)
+        except ConfigurationError as error:
+            raise OrderRefused(str(error)) from error
+        refused = []
+        for node, goal in layout:
+            try:
+                controls.fly(node, goal.longitude, goal.latitude, goal.height)
+            except OrderRefused as error:
+                refused.append(f"drone {node}: {error}")
+        if len(refused) == len(layout):
+            raise OrderRefused(refused[0])
+        missing = f"; {len(refused)} stay, {refused[0]}" if refused else ""
+        return f"ordered {len(layout) - len(refused)} of {len(layout)} drones{missing}"
+
+
 class NeighbourWatch(_Request):
     """The page requests details of one node's neighbours; None: no longer."""
 
@@ -144,7 +168,7 @@ Request = Union[PageOrder, NeighbourWatch, Demonstrate, TimeLine]
 
 _REQUESTS: TypeAdapter[Request] = TypeAdapter(
     Annotated[
-        Union[_Power, _Fly, _Layout, _Speed, NeighbourWatch, Demonstrate, TimeLine],
+        Union[_Power, _Fly, _Layout, _Places, _Speed, NeighbourWatch, Demonstrate, TimeLine],
         Field(discriminator="do"),
     ]
 )

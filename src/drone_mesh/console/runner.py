@@ -5,7 +5,7 @@ from __future__ import annotations
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.web.server_thread import ServerThread
 
-LARGEST_REQUEST_BYTES = 4096
+LARGEST_REQUEST_BYTES = 65_536  # a layout file with escaped line ends
 PING_PERIOD_S = 10.0  # a page that disappeared silently is noticed after two of these
 
 

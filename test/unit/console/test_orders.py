@@ -105,3 +105,34 @@ def test_anything_else_is_refused_with_a_reason(text, why):
 )
 def test_a_refusal_goes_back_under_the_number_of_the_request(text, number):
     assert number_of(text) == number
+
+
+class FewRoutes:
+    """A MeshControls that has a route to drone 1 only."""
+
+    def __init__(self) -> None:
+        self.flown: list[tuple[int, float, float, float]] = []
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:
+        if node != 1:
+            raise OrderRefused(f"no gateway has a route to drone {node}")
+        self.flown.append((node, x, y, z))
+        return "ordered"
+
+
+def carry_out_places(text: str, controls: FewRoutes) -> str:
+    return parse_request(json.dumps({"do": "places", "number": 1, "text": text})).carry_out(
+        controls
+    )
+
+
+def test_a_layout_file_orders_each_drone_and_says_which_stay():
+    controls = FewRoutes()
+    said = carry_out_places("cases: {5: {1: [1, 2, 3], 2: [4, 5, 6]}}", controls)
+    assert controls.flown == [(1, 1.0, 2.0, 3.0)]
+    assert said == "ordered 1 of 2 drones; 1 stay, drone 2: no gateway has a route to drone 2"
+
+
+def test_a_layout_file_of_which_no_drone_has_a_route_is_refused():
+    with pytest.raises(OrderRefused, match="drone 2: no gateway"):
+        carry_out_places("cases: {5: {2: [4, 5, 6]}}", FewRoutes())

@@ -2,6 +2,8 @@
 
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
+import { chartsCsv, chartsPicture, nodesCsv, placesYaml, save } from "./files.js";
+import { Flights } from "./flights.js";
 import { EventLog } from "./log.js";
 import { MapView } from "./map.js";
 import { Mesh } from "./mesh.js";
@@ -38,20 +40,26 @@ async function order(request, button) {
   }
 }
 
-function fly(id, x, y, z) {
+const flights = new Flights(mesh, (request) => connection.order(request), toast);
+
+/** The height of a drone's goal, or where it is, in whole metres. */
+function heightOf(id) {
   const node = mesh.nodes.get(id);
-  const height =
-    z ??
-    Math.round(node?.path.length ? node.path[node.path.length - 1] : (node?.position?.[2] ?? 0));
-  order({ do: "fly", node: id, x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), z: height });
+  return Math.round(node?.path.length ? node.path.at(-1) : (node?.position?.[2] ?? 0));
 }
 
-const map = new MapView(mesh, byId("map-card"), (id, x, y) => fly(id, x, y));
+const map = new MapView(mesh, byId("map-card"), (moves) =>
+  flights.hold(moves.map((move) => ({ ...move, z: heightOf(move.id) }))),
+);
+flights.addEventListener("change", () => {
+  map.held = flights.held;
+  map.redraw();
+});
 new NodeTable(mesh, byId("nodes"));
 const panel = new NodePanel(
   mesh,
   (id, on) => order({ do: "power", node: id, on }, byId("power")),
-  fly,
+  (id, x, y, z) => flights.send([{ id, x, y, z }]),
 );
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
@@ -124,6 +132,59 @@ byId("layout-form").addEventListener("submit", (event) => {
   order({ do: "layout", case: Number(byId("layout").value) }, event.submitter);
 });
 
+byId("load-places").addEventListener("change", async (event) => {
+  const [file] = event.target.files;
+  event.target.value = "";
+  if (!file) return;
+  byId("files").close();
+  order({ do: "places", text: await file.text() });
+});
+
+// Several drones
+
+function showGroup() {
+  const ids = [...mesh.group].sort((a, b) => a - b);
+  byId("group").hidden = ids.length < 2;
+  setText(
+    "group-count",
+    `${ids.length} drones: ${ids.slice(0, 8).join(", ")}${ids[8] ? " …" : ""}`,
+  );
+}
+mesh.addEventListener("select", showGroup);
+mesh.addEventListener("frame", showGroup);
+
+async function switchGroup(on, button) {
+  button.disabled = true;
+  const failed = [];
+  for (const id of mesh.group)
+    await connection
+      .order({ do: "power", node: id, on })
+      .catch((error) => failed.push(error.message));
+  const done = mesh.group.size - failed.length;
+  toast(failed[0] ?? `${done} nodes are ${on ? "on" : "off"}`, failed.length > 0);
+  button.disabled = false;
+}
+byId("group-off").addEventListener("click", (event) => switchGroup(false, event.target));
+byId("group-on").addEventListener("click", (event) => switchGroup(true, event.target));
+byId("group-clear").addEventListener("click", () => mesh.select(null));
+
+// Files
+
+const PLACES_CASE = 900; // in a file that was saved; any other number would do
+byId("files-button").addEventListener("click", () => byId("files").showModal());
+byId("save-nodes").addEventListener("click", () => save("nodes.csv", nodesCsv(mesh), "text/csv"));
+byId("save-charts").addEventListener("click", () =>
+  save("charts.csv", chartsCsv(mesh), "text/csv"),
+);
+byId("save-picture").addEventListener("click", async () => {
+  const figures = [...document.querySelectorAll("#charts-card figure")];
+  const shown = figures.filter((figure) => figure.querySelector("canvas").width);
+  save("charts.png", await chartsPicture(shown, charts.colours), "image/png");
+});
+byId("save-places").addEventListener("click", () =>
+  save("places.yaml", placesYaml(mesh, PLACES_CASE), "application/yaml"),
+);
+
 // The view
 
 byId("zoom-in").addEventListener("click", () => map.zoom(1.3));
@@ -145,6 +206,29 @@ byId("find-form").addEventListener("submit", (event) => {
   byId("find").value = "";
   byId("map").focus();
 });
+byId("follow").addEventListener("click", () => {
+  map.following = !map.following;
+  byId("follow").setAttribute("aria-pressed", map.following);
+  map.redraw();
+});
+mesh.addEventListener("select", () => {
+  const link = mesh.selected === null ? location.pathname : `#node=${mesh.selected}`;
+  if (location.hash !== link) history.replaceState(null, "", link);
+});
+
+/** A link like #node=3 selects that node, as soon as it is known. */
+function selectLinked() {
+  const id = Number(/^#node=(\d+)$/.exec(location.hash)?.[1] ?? NaN);
+  if (mesh.nodes.has(id)) {
+    mesh.select(id);
+    map.show(id);
+  }
+  return Number.isNaN(id) || mesh.nodes.has(id);
+}
+window.addEventListener("hashchange", selectLinked);
+const untilLinked = () => selectLinked() && mesh.removeEventListener("frame", untilLinked);
+mesh.addEventListener("frame", untilLinked);
+
 byId("help-button").addEventListener("click", () => byId("help").showModal());
 
 for (const tab of document.querySelectorAll("nav button")) {
@@ -184,7 +268,7 @@ const KEYS = {
   g: () => panel.focusGoal(),
   f: () => map.fit(),
   "?": () => byId("help").showModal(),
-  Escape: () => map.cancelDrag() || mesh.select(null),
+  Escape: () => map.cancelDrag() || flights.undo() || mesh.select(null),
 };
 
 document.addEventListener("keydown", (event) => {

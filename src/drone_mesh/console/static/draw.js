@@ -77,9 +77,9 @@ export function drawingOrder(mesh) {
 
 /**
  * Returns the counts {drones, links, linksDrawn, routeLinks, lostLinks} and the radius of drones, px; links are the known and the route links.
- * `drag` is {id, x, y} of a drone that is being dragged, in metres, or null.
+ * `goals` are [{id, x, y}] of drones that are dragged or about to leave, in metres.
  */
-export function drawMesh(context, camera, mesh, colours, options, drag) {
+export function drawMesh(context, camera, mesh, colours, options, goals) {
   context.clearRect(0, 0, camera.width, camera.height);
   context.lineCap = "round";
   drawGrid(context, camera, colours, options.covered);
@@ -152,12 +152,13 @@ export function drawMesh(context, camera, mesh, colours, options, drag) {
       context,
       camera,
       node,
-      mesh.selected,
+      node.id === mesh.selected || mesh.group.has(node.id),
       colours,
       radius,
       mesh.clock.shape,
     );
-  if (drag) drawDrag(context, camera, mesh.nodes.get(drag.id), drag, colours, radius);
+  for (const goal of goals)
+    drawGoal(context, camera, mesh.nodes.get(goal.id), goal, colours, radius);
   return drawn;
 }
 
@@ -314,7 +315,7 @@ function drawDrone(context, camera, node, selected, colours, radius, shape) {
   const arms = hasArms(shape, radius);
   const r = arms ? HULL * radius : radius;
   if (arms) drawArms(context, px, py, node, colours, radius);
-  if (node.id === selected) {
+  if (selected) {
     context.strokeStyle = colours.accent;
     context.lineWidth = 2.5;
     context.beginPath();
@@ -345,9 +346,9 @@ export function idSize(id, r) {
   return Math.min(0.95 * r, (1.6 * r) / (DIGIT_WIDTH * String(id).length));
 }
 
-function drawDrag(context, camera, node, drag, colours, r) {
+function drawGoal(context, camera, node, goal, colours, r) {
   if (!node?.position) return;
-  const [px, py] = camera.toScreen(drag.x, drag.y);
+  const [px, py] = camera.toScreen(goal.x, goal.y);
   context.strokeStyle = colours.accent;
   context.lineWidth = 2;
   context.setLineDash([6, 4]);
@@ -365,5 +366,5 @@ function drawDrag(context, camera, node, drag, colours, r) {
   context.fillStyle = colours.ink;
   context.font = "600 12px system-ui, sans-serif";
   context.textAlign = "center";
-  context.fillText(`${drag.x.toFixed(1)}, ${drag.y.toFixed(1)} m`, px, py - r - 8);
+  context.fillText(`${goal.x.toFixed(1)}, ${goal.y.toFixed(1)} m`, px, py - r - 8);
 }

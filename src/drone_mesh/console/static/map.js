@@ -11,7 +11,7 @@ const TURN_PERIOD_MS = 50; // between two pictures of turning rotors
 const IN_VIEW_PX = 24; // a node closer to the edge is not in view
 
 export class MapView {
-  /** `fly(id, x, y)` is called when a drone was dragged to (x, y). */
+  /** `fly([{id, x, y}])` is called when drones were dragged there. */
   constructor(mesh, card, fly) {
     this.mesh = mesh;
     this.canvas = card.querySelector("canvas");
@@ -22,6 +22,8 @@ export class MapView {
     this.legendObstacle = card.querySelector("#legend-obstacle");
     this.fly = fly;
     this.camera = new Camera();
+    this.following = false; // keeps the selected node in the middle
+    this.held = []; // [{id, x, y}] that are about to leave
     this.options = { known: true, ranges: false };
     this.colours = readColours();
     this.drag = null;
@@ -103,13 +105,30 @@ export class MapView {
       this.fitted = true;
       this.fit();
     }
+    if (this.following) this.#centre(this.mesh.nodes.get(this.mesh.selected));
     const context = this.canvas.getContext("2d");
     const ratio = window.devicePixelRatio;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const options = { ...this.options, covered: this.#covered() };
-    const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.drag);
+    const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.#goals());
     this.#describe(drawn);
     this.#keepTurning(drawn);
+  }
+
+  /** Where drones that are dragged, or about to leave, would fly. */
+  #goals() {
+    return [
+      ...this.held,
+      ...(this.drag ? this.#moves(this.drag.id, this.drag.x, this.drag.y) : []),
+    ];
+  }
+
+  #centre(node) {
+    if (!node?.position) return;
+    this.moved = true;
+    const [x, y] = this.camera.toScreen(node.position[0], node.position[1]);
+    const { top, bottom } = this.#covered();
+    this.camera.pan(this.camera.width / 2 - x, (this.camera.height + top - bottom) / 2 - y);
   }
 
   /** Draws again in a moment while a rotor is to be seen turning. */
@@ -228,9 +247,25 @@ export class MapView {
     if (this.drag) {
       const { id, x, y } = this.drag;
       this.drag = null;
-      this.fly(id, x, y);
-    } else if (!pointer.moved) this.mesh.select(pointer.node);
+      this.fly(this.#moves(id, x, y));
+    } else if (!pointer.moved && event.shiftKey && pointer.node !== null)
+      this.mesh.toggle(pointer.node);
+    else if (!pointer.moved) this.mesh.select(pointer.node);
     this.redraw();
+  }
+
+  /** A drag of one drone of a group moves all of them by as much. */
+  #moves(id, x, y) {
+    const start = this.mesh.nodes.get(id)?.position;
+    const ids = this.mesh.group.has(id) && start ? [...this.mesh.group] : [id];
+    return ids
+      .filter((one) => one === id || this.mesh.nodes.get(one).position)
+      .map((one) => {
+        const from = this.mesh.nodes.get(one).position;
+        return one === id
+          ? { id, x, y }
+          : { id: one, x: from[0] + x - start[0], y: from[1] + y - start[1] };
+      });
   }
 
   #cancel(event) {

@@ -35,6 +35,7 @@ export class Mesh extends EventTarget {
     this.marks = []; // on the time line: [{t, kind, node}]
     this.hasPresent = false; // whether there is a present to return to
     this.selected = null;
+    this.group = new Set(); // of several selected nodes
     this.detail = null; // {node, neighbours: [[id, age]]} of the selected node
   }
 
@@ -67,6 +68,7 @@ export class Mesh extends EventTarget {
     if (frame.samples) this.samples = this.samples.concat(frame.samples).slice(-SAMPLES_KEPT);
     if (frame.story) this.story = frame.story;
     if (frame.full || frame.story) this.#notify("story");
+    for (const id of this.group) if (!this.nodes.has(id)) this.group.delete(id);
     if (this.selected !== null && !this.nodes.has(this.selected)) this.select(null);
     this.#notify("frame", {
       changed,
@@ -106,10 +108,23 @@ export class Mesh extends EventTarget {
     this.#notify("layouts");
   }
 
-  select(id) {
-    if (id === this.selected) return;
+  select(id, keepGroup = false) {
+    const hadGroup = !keepGroup && this.group.size > 0 && !this.group.has(id);
+    if (hadGroup) this.group.clear();
+    if (id === this.selected) {
+      if (hadGroup) this.#notify("select");
+      return;
+    }
     this.selected = id;
     this.detail = null;
+    this.#notify("select");
+  }
+
+  /** Adds a node to the group or takes it out; the node that was selected before belongs to it. */
+  toggle(id) {
+    if (!this.group.size && this.selected !== null) this.group.add(this.selected);
+    if (!this.group.delete(id)) this.group.add(id);
+    this.select(this.group.size ? [...this.group].at(-1) : null, true);
     this.#notify("select");
   }
 

@@ -50,7 +50,7 @@ export class NodePanel {
         node.fallback === 255 ? "–" : [node.fallback],
         { before: "node ", after: "’s" },
       ],
-      ...(node.battery == null ? [] : [["Battery", `${node.battery} %`]]),
+      ...((node.battery ?? null) === null ? [] : [["Battery", `${node.battery} %`]]),
       ...(node.why_not_fly ? [["Cannot fly", node.why_not_fly]] : []),
       ["Known nodes", String(node.known_nodes ?? "–")],
       ["Messages sent", String(node.total_messages ?? "–")],

@@ -145,7 +145,7 @@ export class NodeTable {
 
   #mark(scroll) {
     for (const [id, row] of this.rows) {
-      const selected = id === this.mesh.selected;
+      const selected = id === this.mesh.selected || this.mesh.group.has(id);
       if (row.hasAttribute("aria-selected") === selected) continue;
       if (selected) row.setAttribute("aria-selected", "true");
       else row.removeAttribute("aria-selected");
@@ -157,7 +157,9 @@ export class NodeTable {
 
   #choose(event) {
     const row = event.target.closest("tr");
-    if (row) this.mesh.select(Number(row.dataset.id));
+    if (!row) return;
+    if (event.shiftKey || event.ctrlKey || event.metaKey) this.mesh.toggle(Number(row.dataset.id));
+    else this.mesh.select(Number(row.dataset.id));
   }
 
   #key(event) {

@@ -1,0 +1,79 @@
+// Saves what the page shows: the table and the charts as CSV, the charts as a picture.
+
+import { orDash } from "./mesh.js";
+
+const NODE_COLUMNS = {
+  node: (n) => n.id,
+  role: (n) => (n.role === 1 ? "gateway" : "router"),
+  condition: (n) => n.condition,
+  gateway: (n) => orDash(n.gateway),
+  hops: (n) => orDash(n.hops),
+  next_hop: (n) => orDash(n.next_hop),
+  neighbours: (n) => n.neighbours,
+  known_nodes: (n) => n.known_nodes,
+  total_messages: (n) => n.total_messages,
+  fallback: (n) => orDash(n.fallback),
+  x_m: (n) => n.position?.[0] ?? "",
+  y_m: (n) => n.position?.[1] ?? "",
+  z_m: (n) => n.position?.[2] ?? "",
+};
+
+/** The table of nodes. */
+export function nodesCsv(mesh) {
+  const nodes = [...mesh.nodes.values()].sort((a, b) => a.id - b.id);
+  const rows = nodes.map((node) => Object.values(NODE_COLUMNS).map((value) => value(node)));
+  return csv(Object.keys(NODE_COLUMNS), rows);
+}
+
+/** The numbers of the charts. */
+export function chartsCsv(mesh) {
+  const columns = Object.keys(mesh.samples[0] ?? { stamp_s: 0 });
+  return csv(
+    columns,
+    mesh.samples.map((sample) => columns.map((column) => sample[column])),
+  );
+}
+
+/** The present places, as a file that `casus:=` and "Fly to the places of a file" read. */
+export function placesYaml(mesh, number) {
+  const lines = [...mesh.nodes.values()]
+    .filter((node) => node.role === 0 && node.position)
+    .sort((a, b) => a.id - b.id)
+    .map(({ id, position: [x, y, z] }) => `    ${id}: [${x}, ${y}, ${Math.round(Math.max(0, z))}]`);
+  return `cases:\n  ${number}:\n${lines.join("\n")}\n`;
+}
+
+/** The charts below each other, in the colours of the page. */
+export function chartsPicture(figures, colours) {
+  const canvases = figures.map((figure) => figure.querySelector("canvas"));
+  const titleHeight = 24 * window.devicePixelRatio;
+  const picture = document.createElement("canvas");
+  picture.width = Math.max(...canvases.map((canvas) => canvas.width));
+  picture.height = canvases.reduce((sum, canvas) => sum + canvas.height + titleHeight, 0);
+  const context = picture.getContext("2d");
+  context.fillStyle = colours.card;
+  context.fillRect(0, 0, picture.width, picture.height);
+  context.fillStyle = colours.ink;
+  context.font = `${13 * window.devicePixelRatio}px system-ui, sans-serif`;
+  let top = 0;
+  canvases.forEach((canvas, index) => {
+    const title = figures[index].querySelector("figcaption").textContent;
+    context.fillText(title.replace(/\s+/g, " ").trim(), 10, top + titleHeight * 0.7);
+    context.drawImage(canvas, 0, top + titleHeight);
+    top += canvas.height + titleHeight;
+  });
+  return new Promise((resolve) => picture.toBlob(resolve, "image/png"));
+}
+
+/** Hands a file to the person. */
+export function save(name, content, type) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+function csv(columns, rows) {
+  return [columns, ...rows].map((row) => row.join(",")).join("\n") + "\n";
+}

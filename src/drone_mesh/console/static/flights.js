@@ -1,0 +1,101 @@
+// Sends drones away: asks before a long flight, and holds a drag for a moment, so that it can be undone.
+// A drone in flight may be out of reach, so an order that has left cannot be taken back.
+
+const HOLD_MS = 5000;
+const FAR_M = 50;
+
+const byId = (id) => document.getElementById(id);
+
+export class Flights extends EventTarget {
+  #timer = null;
+
+  /** `order(request)` resolves with a few words, or throws; `toast(text, bad)` shows them. */
+  constructor(mesh, order, toast) {
+    super();
+    this.mesh = mesh;
+    this.order = order;
+    this.toast = toast;
+    this.held = []; // [{id, x, y, z}] that leave in a moment
+    byId("held-undo").addEventListener("click", () => this.undo());
+    byId("held-now").addEventListener("click", () => this.#release());
+  }
+
+  /** Sends these drones [{id, x, y, z}] after a moment, or not, if the person changes their mind. */
+  async hold(moves) {
+    this.#release();
+    if (!(await this.#agreed(moves))) return;
+    this.#set(moves);
+    const goal = moves.length > 1 ? "" : ` to ${metres(moves[0].x)}, ${metres(moves[0].y)}`;
+    byId("held-text").textContent = `${names(moves)} will leave${goal}`;
+    this.#timer = setTimeout(() => this.#release(), HOLD_MS);
+  }
+
+  /** Sends these drones at once. */
+  async send(moves) {
+    if (await this.#agreed(moves)) await this.#send(moves);
+  }
+
+  /** True if there was something to undo. */
+  undo() {
+    const held = this.held.length > 0;
+    this.#set([]);
+    return held;
+  }
+
+  #set(moves) {
+    clearTimeout(this.#timer);
+    this.held = moves;
+    byId("held").hidden = !moves.length;
+    this.dispatchEvent(new Event("change"));
+  }
+
+  #release() {
+    const moves = this.held;
+    this.#set([]);
+    if (moves.length) this.#send(moves);
+  }
+
+  /** The drones farthest from the gateway first, so that relays leave last. */
+  async #send(moves) {
+    const hops = ({ id }) => this.mesh.nodes.get(id)?.hops ?? 0;
+    const failed = [];
+    let text = "";
+    for (const { id, x, y, z } of [...moves].sort((a, b) => hops(b) - hops(a))) {
+      try {
+        text = await this.order({ do: "fly", node: id, x: metres(x), y: metres(y), z });
+      } catch (error) {
+        failed.push(`${id}: ${error.message}`);
+      }
+    }
+    if (moves.length > 1)
+      text = `ordered ${moves.length - failed.length} of ${moves.length} drones`;
+    if (failed.length) this.toast(failed.slice(0, 3).join("; "), true);
+    if (failed.length < moves.length) this.toast(text, false);
+  }
+
+  /** Whether none flies far, or the person agrees. */
+  async #agreed(moves) {
+    const far = Math.max(...moves.map((move) => this.#distance(move)));
+    if (far <= FAR_M) return true;
+    byId("confirm-text").textContent =
+      `${names(moves)} would fly ${far.toFixed(0)} m` + (moves.length > 1 ? " at most." : ".");
+    const dialog = byId("confirm");
+    dialog.returnValue = "";
+    dialog.showModal();
+    await new Promise((resolve) => dialog.addEventListener("close", resolve, { once: true }));
+    return dialog.returnValue === "send";
+  }
+
+  #distance({ id, x, y, z }) {
+    const place = this.mesh.nodes.get(id)?.position;
+    return place ? Math.hypot(x - place[0], y - place[1], z - place[2]) : 0;
+  }
+}
+
+function metres(value) {
+  return Number(value.toFixed(2));
+}
+
+function names(moves) {
+  return moves.length > 1 ? `${moves.length} drones` : `Drone ${moves[0].id}`;
+}

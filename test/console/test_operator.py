@@ -1,0 +1,142 @@
+"""What an operator needs beyond one order at a time."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from conftest import Visit
+from test_page import PLACES, STATE, on_screen
+
+FAST = ("--skip", "25")
+
+
+@pytest.fixture
+def page(start_console, visit) -> Visit:
+    opened = visit(start_console(*FAST).url)
+    opened.wait_for_drones(len(PLACES))
+    opened.wait_for("all routes", lambda: opened.drawn("route-links") == 17)
+    return opened
+
+
+def drag(page: Visit, node: int, x: float, y: float) -> None:
+    start, goal = on_screen(page, *PLACES[node]), on_screen(page, x, y)
+    page.page.mouse.move(*start)
+    page.page.mouse.down()
+    page.page.mouse.move((start[0] + goal[0]) / 2, start[1], steps=4)
+    page.page.mouse.move(*goal, steps=4)
+    page.page.mouse.up()
+
+
+def test_a_drag_can_be_undone(page):
+    drag(page, 17, 27.0, 9.0)
+    page.wait_for("the offer", lambda: page.page.is_visible("#held-undo"))
+    assert "Drone 17 will leave to 27" in page.page.inner_text("#held-text")
+    page.page.click("#held-undo")
+    page.wait_for("the offer is gone", lambda: not page.page.is_visible("#held"))
+    page.page.wait_for_timeout(5500)  # as long as it would have been held
+    assert page.row(17, STATE) == "connected"
+    assert page.page.locator(".toast").count() == 0
+
+
+def test_a_drag_can_be_sent_at_once(page):
+    drag(page, 17, 27.0, 9.0)
+    page.page.click("#held-now")
+    page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
+
+
+def test_a_flight_of_more_than_fifty_metres_is_confirmed(page):
+    page.page.click("#nodes tr[data-id='13']")
+    page.page.fill("#fly-x", "0")
+    page.page.fill("#fly-y", "70")
+    page.page.click("#fly-form button")
+    page.wait_for("the question", lambda: page.page.is_visible("#confirm"))
+    assert page.page.inner_text("#confirm-text") == "Drone 13 would fly 58 m."
+    page.page.click("#confirm >> text=Cancel")
+    page.page.wait_for_timeout(500)
+    assert page.row(13, STATE) == "connected"
+    page.page.click("#fly-form button")
+    page.page.click("#confirm >> text=Send")
+    page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
+
+
+def test_several_drones_are_switched_together(page):
+    page.page.click("#nodes tr[data-id='6']")
+    for node in (12, 17):
+        page.page.click(f"#nodes tr[data-id='{node}']", modifiers=["Shift"])
+    assert page.page.inner_text("#group-count") == "3 drones: 6, 12, 17"
+    page.page.click("#group-off")
+    page.wait_for("all are off", lambda: all(page.row(n, STATE) == "off" for n in (6, 12, 17)))
+    page.page.click("#group-on")
+    page.wait_for("none is off", lambda: all(page.row(n, STATE) != "off" for n in (6, 12, 17)))
+    page.page.click("#group-clear")
+    assert not page.page.is_visible("#group")
+
+
+def test_several_drones_are_moved_together(page):
+    page.page.mouse.click(*on_screen(page, *PLACES[16]))
+    page.page.keyboard.down("Shift")
+    page.page.mouse.click(*on_screen(page, *PLACES[17]))
+    page.page.keyboard.up("Shift")
+    drag(page, 17, 27.0, 15.0)
+    page.page.click("#held-now")
+    page.wait_for(
+        "both fly", lambda: all(page.row(n, STATE) == "flying" for n in (16, 17)), within_s=15.0
+    )
+    page.wait_for("the outcome", lambda: "ordered 2 of 2" in page.page.inner_text("#toasts"))
+
+
+def test_a_link_selects_a_node_and_a_selection_makes_a_link(start_console, visit):
+    page = visit(f"{start_console(*FAST).url}#node=3")
+    page.wait_for("node 3", lambda: page.page.inner_text("#node-name") == "Router 3")
+    page.page.click("#nodes tr[data-id='5']")
+    page.wait_for("the link of 5", lambda: page.page.url.endswith("#node=5"))
+
+
+def test_the_map_follows_a_drone(page):
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.click("#follow")
+    page.wait_for(
+        "17 in the middle",
+        lambda: abs(float(page.page.get_attribute("#map-note", "data-x")) - PLACES[17][0]) < 0.5,
+    )
+
+
+def saved(page: Visit, button: str, folder: Path) -> Path:
+    if not page.page.is_visible("#files"):
+        page.page.click("#files-button")
+    with page.page.expect_download() as download:
+        page.page.click(button)
+    path = folder / download.value.suggested_filename
+    download.value.save_as(path)
+    return path
+
+
+def test_table_and_charts_are_saved_as_csv_and_png(page, tmp_path):
+    page.wait_for("a chart", lambda: page.page.inner_text("#share-now") == "100 %")
+    nodes = saved(page, "#save-nodes", tmp_path).read_text().splitlines()
+    assert nodes[0].startswith("node,role,condition,gateway,hops")
+    assert len(nodes) == 1 + len(PLACES)
+    assert nodes[1].startswith("0,gateway,connected,0,0")
+    charts = saved(page, "#save-charts", tmp_path).read_text().splitlines()
+    assert "routers_connected" in charts[0]
+    assert len(charts) > 2
+    assert saved(page, "#save-picture", tmp_path).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_places_are_saved_and_flown_to_again(page, tmp_path):
+    path = saved(page, "#save-places", tmp_path)
+    text = path.read_text()
+    assert re.search(r"^    17: \[24, 12, 0\]$", text, re.MULTILINE)
+    path.write_text("cases:\n  1:\n    17: [26, 14, 0]\n")
+    page.page.set_input_files("#load-places", str(path))
+    page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
+
+
+def test_a_file_that_is_no_layout_is_refused_with_its_line(page, tmp_path):
+    path = tmp_path / "wrong.yaml"
+    path.write_text("cases:\n  1:\n    17: [far, 14, 0]\n")
+    page.page.click("#files-button")
+    page.page.set_input_files("#load-places", str(path))
+    page.wait_for("the reason", lambda: "line 3" in page.page.inner_text("#toasts"))
