@@ -9,8 +9,8 @@ import rospy
 import rostest
 from rostest_support import LogWatch, MeshWatch, call
 
-from drone_mesh.msg import Location, MeshState
-from drone_mesh.srv import AreaScan
+from drone_mesh.msg import Location, MeshEvent, MeshState
+from drone_mesh.srv import AreaScan, RequestDroneFlight
 
 WALL_TOP_M = 5.0
 
@@ -41,7 +41,21 @@ class ObstaclesTest(unittest.TestCase):
         mesh.wait("drone 2 on this side of the wall", 60, has_arrived)
         self.assertGreaterEqual(highest_m, WALL_TOP_M)
         mesh.wait("all connected", 60, mesh.connected)
+
+        events: list[tuple[int, str, str]] = []
+        rospy.Subscriber(
+            "/mesh/events", MeshEvent, lambda e: events.append((e.node, e.kind, e.detail))
+        )
+        call("/DroneManager/requestDroneMovement", RequestDroneFlight, 2, 0.0, 3.0, 0)
+        mesh.wait("the refusal of a goal inside the wall", 60, lambda: self._is_refused(events))
         self.assertEqual(log.failures(), [])
+
+    @staticmethod
+    def _is_refused(events: list[tuple[int, str, str]]) -> bool:
+        return any(
+            (node, kind) == (0, "order refused") and "obstacles leave no way" in detail
+            for node, kind, detail in events
+        )
 
 
 if __name__ == "__main__":

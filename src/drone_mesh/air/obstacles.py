@@ -14,6 +14,7 @@ from drone_mesh.drone.goal import MAX_HEIGHT_M
 # external walls in ns-3's building model, after COST 231.
 CUT_DB = {"brick": 9.0, "wood": 4.0, "window": 7.0, "stone": 12.0, "concrete": 15.0}
 METRE_DB = 0.4  # dB per metre inside, the same source as brick
+NO_WAY = "obstacles leave no way there"  # why a goal is refused
 CLEARANCE_M = 0.5  # our choice: a flight keeps so far from a box, above it and beside it
 
 

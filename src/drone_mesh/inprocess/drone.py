@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, Callable, Protocol
 
+from drone_mesh.air.obstacles import NO_WAY
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.errors import GoalRefused
 
 
 class Time(Protocol):
@@ -46,7 +48,7 @@ class InProcessDrone(IDroneEngine):
         return self._path
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there, if it can. Raises GoalRefused for a place out of bounds."""
+        """Fly there, if it can. Raises GoalRefused for a place out of bounds or without a way."""
         check_goal(latitude, longitude, height)
         if self._why_not_fly:
             return
@@ -56,7 +58,7 @@ class InProcessDrone(IDroneEngine):
             return
         plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
         if plan is None:
-            return
+            raise GoalRefused(NO_WAY)
         if self._path is None:
             self._on_flight(True)
         else:

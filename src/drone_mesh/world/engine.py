@@ -6,6 +6,7 @@ import logging
 from collections import deque
 from typing import Callable, NamedTuple
 
+from drone_mesh.air.obstacles import NO_WAY
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
@@ -107,9 +108,7 @@ class DroneEngine(IDroneEngine):
         check_goal(latitude, longitude, height)
         goal = Location(latitude, longitude, height + self._half_height_m).to_vector()
         if self._plan(self._state.position, goal, self._world.now_s) is None:
-            raise GoalRefused(
-                f"obstacles leave no way to x {longitude:g} m, y {latitude:g} m, z {height:g} m"
-            )
+            raise GoalRefused(f"{NO_WAY}: x {longitude:g} m, y {latitude:g} m, z {height:g} m")
         self._goals.append(goal)
         self._world.wake(self)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drone_mesh.air.obstacles import Box, Obstacles
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 
@@ -77,3 +78,15 @@ def test_on_a_lossy_medium_each_order_is_flown_once_and_its_end_is_known():
             assert ordered or state != "arrived"
     assert set(states) <= {"arrived", "no route", "given up"}
     assert states.count("arrived") >= 6
+
+
+def test_a_drone_whose_goal_is_inside_an_obstacle_refuses_and_stays():
+    network = line()
+    box = Obstacles([Box((18.0, 9.0, 3.0), (4.0, 4.0, 6.0))])
+    network.nodes[3].drone.plan_flight = box.plan_flight
+    assert network.order(3, 18.0, 9.0)
+    network.run_for(0.5)
+    ((drone, state, reason),) = ends(network)
+    assert (drone, state) == (3, "refused")
+    assert "obstacles leave no way" in reason
+    assert network.nodes[3].drone.path is None

@@ -9,6 +9,8 @@ from typing import Callable
 
 import rospy
 
+from drone_mesh.air.obstacles import NO_WAY, Obstacles
+from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
 from drone_mesh.msg import Location as LocationMsg
@@ -29,8 +31,15 @@ class RosDroneEngineConnector(IDroneEngine):
     Belongs to the executor's worker. The connection is kept, and reopened when needed.
     """
 
-    def __init__(self, node_id: int, why_not_fly: Callable[[], str] = lambda: "") -> None:
-        """`why_not_fly` gives what the world says of this drone."""
+    def __init__(
+        self, node_id: int, why_not_fly: Callable[[], str], obstacles: Obstacles | None = None
+    ) -> None:
+        """`why_not_fly` gives what the world says of this drone; the `obstacles` are the world's.
+
+        The engine itself decides: the topic of its goals has no answer, so that what it will refuse
+        is refused here too.
+        """
+        self._obstacles = obstacles
         self._node_id = node_id
         self._why_not_fly = why_not_fly
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
@@ -55,12 +64,22 @@ class RosDroneEngineConnector(IDroneEngine):
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there (metres); the height is rounded to whole metres, as its field requires.
 
-        Raises GoalRefused if the drone cannot fly.
+        Raises GoalRefused if the drone cannot fly, or obstacles leave it no way.
         """
         why_not = self._why_not_fly()
         if why_not:
             raise GoalRefused(f"the drone cannot fly: {why_not}")
+        if self._obstacles is not None:
+            self._check_way(self._obstacles, Location(latitude, longitude, height))
         self._goal.publish(location_msg(latitude, longitude, height))
+
+    def _check_way(self, obstacles: Obstacles, goal: Location) -> None:
+        try:
+            start = self.get_location().to_vector()
+        except LocationUnknown:
+            return
+        if obstacles.plan_flight(start, goal.to_vector(), 0.0, SPEED_M_S) is None:
+            raise GoalRefused(NO_WAY)
 
     def get_location(self) -> Location:
         """The position that the engine reports. Raises LocationUnknown when it does not answer."""

@@ -9,6 +9,7 @@ from typing import Callable
 
 import rospy
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ros.graph import names
@@ -17,7 +18,7 @@ from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
-from drone_mesh.ros.graph.parameters import or_stop
+from drone_mesh.ros.graph.parameters import configured_obstacles, or_stop
 from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone
 from drone_mesh.ros.host.followed_clock import FollowedClock
 from drone_mesh.ros.host.mesh_host import MeshHost
@@ -56,6 +57,15 @@ def _is_served(node_id: int) -> bool:
         return False
     switch.close()
     return True
+
+
+def _obstacles_of(fleet: FactoryConfiguration) -> Obstacles | None:
+    """The boxes of the world; None, with a warning, if this machine does not have their file."""
+    try:
+        return configured_obstacles(fleet)
+    except ConfigurationError as error:
+        _log.warning("%s; the world refuses orders into obstacles, the nodes do not", error)
+        return None
 
 
 def ids_to_serve(fleet: FactoryConfiguration) -> range:
@@ -102,7 +112,7 @@ def main() -> None:
         fleet = get_fleet_parameter()
         ids = or_stop(lambda: ids_to_serve(fleet))
         _log.info("serving %s", f"drones {ids.start}..{ids.stop - 1}" if ids else "no drones")
-        settings = or_stop(lambda: MeshSettings.of(fleet))
+        settings = or_stop(lambda: MeshSettings.of(fleet, _obstacles_of(fleet)))
         host = MeshHost(settings, lambda: clock.now_s, stop.fail)
         # The world waits for declared hosts only.
         rospy.set_param(names.host_param(rospy.get_name()), [ids.start, ids.stop - 1])

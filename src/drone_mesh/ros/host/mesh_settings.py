@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.key_file import read_key_file
 from drone_mesh.communication.keys import MeshKey
 from drone_mesh.communication.observer import MeshObserver, ignore_events
@@ -30,13 +31,19 @@ class MeshSettings:
     seed: int
     debug: bool
     observer: MeshObserver
+    obstacles: Obstacles | None
     internet: str  # "mock", "http" or "mqtt"
     broker: Broker  # with "mqtt"
     key: MeshKey | None  # None: nothing is sealed
 
     @classmethod
-    def of(cls, configuration: FactoryConfiguration) -> MeshSettings:
-        """The part of the configuration that concerns the nodes. Raises ConfigurationError."""
+    def of(
+        cls, configuration: FactoryConfiguration, obstacles: Obstacles | None = None
+    ) -> MeshSettings:
+        """The part of the configuration that concerns the nodes. Raises ConfigurationError.
+
+        `obstacles`: by which nodes refuse orders that no way leads to.
+        """
         create_routing_technique(configuration.routing)  # one error now instead of one per node
         create_repair_strategy(configuration.repair)
         return cls(
@@ -52,6 +59,7 @@ class MeshSettings:
             seed=configuration.seed,
             debug=configuration.debug,
             observer=ignore_events,
+            obstacles=obstacles,
             internet=configuration.internet,
             key=_mesh_key(configuration.key),
             broker=parse_broker(configuration.broker, os.environ.get(PASSWORD_VARIABLE, "")),

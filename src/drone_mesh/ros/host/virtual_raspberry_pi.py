@@ -39,7 +39,7 @@ class VirtualRaspberryPi(abc.ABC):
         Raises ConfigurationError for a routing technique that does not exist."""
         self.node_id = node_id
         self.settings = settings
-        self.engine = RosDroneEngineConnector(node_id, why_not_fly)
+        self.engine = RosDroneEngineConnector(node_id, why_not_fly, settings.obstacles)
         self.antenna = antenna
         self.seat = seat
         self.users = UsersDesk(node_id, seat.submit)

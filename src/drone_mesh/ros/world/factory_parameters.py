@@ -53,7 +53,8 @@ class FactoryParameters:
             )
         if configuration.radio == "nrf24":
             _check_emulated_radio(configuration, int(hosts))
-        return cls(configuration, MeshSettings.of(configuration), obstacles, int(hosts))
+        settings = MeshSettings.of(configuration, obstacles)
+        return cls(configuration, settings, obstacles, int(hosts))
 
 
 def _check_emulated_radio(configuration: FactoryConfiguration, hosts: int) -> None:
