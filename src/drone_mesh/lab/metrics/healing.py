@@ -1,0 +1,152 @@
+"""Metrics of healing: whether, when, and what the routers missed meanwhile."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from typing import Sequence
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.record import RunRecord
+
+
+@metric("0/1", "all live routers are served again before the end", better="more", is_share=True)
+def healed(run: RunRecord) -> float:
+    return float(run.healed_at_s is not None)
+
+
+@metric("0/1", "the fault left a live router without any path to a gateway", is_share=True)
+def split(run: RunRecord) -> float:
+    return NAN if run.after_fault is None else float(cut_off(run) > 0)
+
+
+@metric("drones", "live routers without any path to a gateway right after the fault")
+def cut_off(run: RunRecord) -> float:
+    if run.after_fault is None:
+        return NAN
+    return float(len(run.after_fault.near) - len(run.after_fault.hops_from(sorted(run.gateways))))
+
+
+@metric("drones", "drones that faults switched off during the run")
+def victims(run: RunRecord) -> float:
+    deadly = ("kill", "gateway_off", "battery empty", "death")
+    return float(len({n for item in run.happened if item.action in deadly for n in item.nodes}))
+
+
+@metric(
+    "s", "from the fault until all live routers are served for 5 s; empty: not healed",
+    better="less", censored=True,
+)  # fmt: skip
+def t_total_s(run: RunRecord) -> float:
+    if run.healed_at_s is None or run.fault_s is None:
+        return NAN
+    return run.healed_at_s - run.fault_s
+
+
+@metric("s", "t_total_s, or observed_s if not healed; only for tables that average caps in")
+def t_capped_s(run: RunRecord) -> float:
+    total_s = t_total_s(run)
+    return observed_s(run) if math.isnan(total_s) else total_s
+
+
+@metric("s", "of t_total_s: until the first router notices that it has lost its gateway")
+def t_detect_s(run: RunRecord) -> float:
+    return _phases(run)[0]
+
+
+@metric("s", "of t_total_s: from there until the first drone decides to fly; 0 without flight")
+def t_decide_s(run: RunRecord) -> float:
+    return _phases(run)[1]
+
+
+@metric("s", "of t_total_s: from there until the last landing; 0 without flight")
+def t_fly_s(run: RunRecord) -> float:
+    return _phases(run)[2]
+
+
+@metric("s", "of t_total_s: the rest")
+def t_reroute_s(run: RunRecord) -> float:
+    return _phases(run)[3]
+
+
+@metric("s", "from the fault to the end of the run: where an unhealed run is censored")
+def observed_s(run: RunRecord) -> float:
+    return NAN if run.fault_s is None else run.end_s - run.fault_s
+
+
+@metric("s", "from the start until all routers are served for the first time", better="less")
+def connected_s(run: RunRecord) -> float:
+    return next((look.now_s for look in run.looks if look.share == 1.0), NAN)
+
+
+@metric("share", "live routers that are served at the end", better="more")
+def connected_share(run: RunRecord) -> float:
+    return run.looks[-1].share
+
+
+@metric("share", "served routers, mean over the time since the fault", better="more")
+def uptime(run: RunRecord) -> float:
+    begin_s = 0.0 if run.fault_s is None else run.fault_s
+    looks = [look for look in run.looks if look.now_s >= begin_s]
+    area = sum(
+        (after.now_s - before.now_s) * (before.share + after.share) / 2
+        for before, after in zip(looks, looks[1:])
+    )
+    seconds = looks[-1].now_s - looks[0].now_s
+    return area / seconds if seconds else looks[-1].share
+
+
+def _phases(run: RunRecord) -> tuple[float, float, float, float]:
+    """(detect, decide, fly, re-route) in seconds; they add up to t_total_s."""
+    start_s, end_s = run.fault_s, run.healed_at_s
+    if start_s is None or end_s is None:
+        return (NAN, NAN, NAN, NAN)
+    between = [event for event in run.events if start_s <= event.stamp_s <= end_s]
+    if start_s == end_s:
+        return (0.0, 0.0, 0.0, 0.0)
+    noticed = _first(between, MeshEventKind.DISCONNECTED)
+    decided = _first(between, MeshEventKind.FLIGHT_DECIDED)
+    landings = [event.stamp_s for event in between if event.kind == MeshEventKind.LANDED.value]
+    decided_s = end_s if decided is None else decided
+    noticed_s = min(decided_s, end_s if noticed is None else noticed)
+    if decided is None:
+        return (noticed_s - start_s, 0.0, 0.0, end_s - noticed_s)
+    landed_s = max([decided_s, *landings])
+    return (noticed_s - start_s, decided_s - noticed_s, landed_s - decided_s, end_s - landed_s)
+
+
+def _first(events: Sequence[object], kind: MeshEventKind) -> float | None:
+    return next(
+        (event.stamp_s for event in events if event.kind == kind.value),  # type: ignore[attr-defined]
+        None,
+    )
+
+
+# Outages of single routers ---------------------------------------------------------------------
+
+
+@metric("", "times that a live router was without service since the fault", better="less")
+def outages(run: RunRecord) -> float:
+    return float(len(run.gaps()))
+
+
+@metric("s", "median length of these outages; one that lasts counts up to the end", better="less")
+def outage_median_s(run: RunRecord) -> float:
+    lengths = _outage_lengths(run)
+    return statistics.median(lengths) if lengths else 0.0
+
+
+@metric("s", "95th percentile of their lengths", better="less")
+def outage_p95_s(run: RunRecord) -> float:
+    lengths = _outage_lengths(run)
+    return lengths[math.ceil(0.95 * len(lengths)) - 1] if lengths else 0.0
+
+
+@metric("s", "the longest of them", better="less")
+def outage_max_s(run: RunRecord) -> float:
+    return max(_outage_lengths(run), default=0.0)
+
+
+def _outage_lengths(run: RunRecord) -> list[float]:
+    return sorted(gap.seconds(run.end_s) for gap in run.gaps())

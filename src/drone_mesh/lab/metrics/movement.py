@@ -1,0 +1,108 @@
+"""Metrics of movement: distances, flights, and drones that came too near."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from drone_mesh.lab.graph import Graph
+from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.record import RunRecord, Scene
+
+STACKED_M = 0.3  # nearer than this two drones stand on one another
+
+
+def _flown(run: RunRecord) -> dict[int, float]:
+    metres: dict[int, float] = {}
+    for leg in run.legs:
+        metres[leg.node] = metres.get(leg.node, 0.0) + leg.metres_until(run.end_s)
+    return metres
+
+
+@metric("m", "distance over ground flown by all drones", better="less")
+def distance_total_m(run: RunRecord) -> float:
+    return sum(_flown(run).values())
+
+
+@metric("m", "the longest distance that one drone flew", better="less")
+def distance_max_m(run: RunRecord) -> float:
+    return max(_flown(run).values(), default=0.0)
+
+
+@metric("m", "mean distance of the drones that moved; 0 when none did", better="less")
+def distance_mean_m(run: RunRecord) -> float:
+    flown = _flown(run)
+    return sum(flown.values()) / len(flown) if flown else 0.0
+
+
+@metric("drones", "drones that flew", better="less")
+def moved(run: RunRecord) -> float:
+    return float(len(_flown(run)))
+
+
+@metric("", "take-offs", better="less")
+def flights(run: RunRecord) -> float:
+    return float(sum(leg.is_start for leg in run.legs))
+
+
+@metric("", "flights that a router decided on although it had a path to a gateway", better="less")
+def false_flights(run: RunRecord) -> float:
+    return float(sum(leg.had_path for leg in run.legs))
+
+
+@metric("s", "time in flight of all drones", better="less")
+def flight_time_s(run: RunRecord) -> float:
+    return sum(min(leg.end_s, run.end_s) - leg.path.start_s for leg in run.legs)
+
+
+@metric("m", "mean distance of a live drone from where it started", better="less")
+def displacement_mean_m(run: RunRecord) -> float:
+    moved_m = _displacements(run)
+    return sum(moved_m) / len(moved_m) if moved_m else 0.0
+
+
+@metric("m", "the largest of these", better="less")
+def displacement_max_m(run: RunRecord) -> float:
+    return max(_displacements(run), default=0.0)
+
+
+def _displacements(run: RunRecord) -> list[float]:
+    return [
+        math.dist(run.start.places[node][:2], run.end.places[node][:2])
+        for node in sorted(run.end.graph.near)
+    ]
+
+
+@metric(
+    "", "pairs of live drones nearer than 0.3 m at some time, one of them in flight", better="less"
+)
+def collisions(run: RunRecord) -> float:
+    return float(run.collisions)
+
+
+@metric("m", "smallest distance of a drone in flight to another; empty: no flight", better="more")
+def min_distance_m(run: RunRecord) -> float:
+    return run.min_distance_m if math.isfinite(run.min_distance_m) else NAN
+
+
+@metric(
+    "drones", "live drones within 0.3 m of another at the end, and not at the start", better="less"
+)
+def stacked(run: RunRecord) -> float:
+    return float(len(_stacked(run.end, run.end.graph) - _stacked(run.start, run.end.graph)))
+
+
+def _stacked(scene: Scene, alive: Graph) -> set[int]:
+    nodes = sorted(alive.near)
+    points = np.array([scene.places[node] for node in nodes])
+    if len(nodes) < 2:
+        return set()
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) < STACKED_M
+    np.fill_diagonal(near, False)
+    return {nodes[index] for index in np.flatnonzero(near.any(axis=1))}
+
+
+@metric("", "flights that an obstacle did not allow", better="less")
+def flights_blocked(run: RunRecord) -> float:
+    return float(run.refused_flights)

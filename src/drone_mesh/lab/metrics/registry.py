@@ -1,0 +1,40 @@
+"""All metrics by name, and how a function becomes one."""
+
+from __future__ import annotations
+
+import math
+from typing import Callable, NamedTuple
+
+from drone_mesh.lab.record import RunRecord
+
+NAN = math.nan
+Measure = Callable[[RunRecord], float]
+
+
+class Metric(NamedTuple):
+    """One column of runs.csv."""
+
+    unit: str
+    definition: str
+    measure: Measure  # NaN: not defined for this run, an empty cell
+    better: str = ""  # "less", "more" or neither
+    is_share: bool = False  # every run yields 0 or 1
+    censored: bool = False  # a time that is empty where the run did not get there
+
+
+METRICS: dict[str, Metric] = {}  # in the order of the columns
+
+
+def measure_all(record: RunRecord) -> dict[str, float]:
+    """Every metric of a run, by name."""
+    return {name: metric.measure(record) for name, metric in METRICS.items()}
+
+
+def metric(unit: str, definition: str, **about: object) -> Callable[[Measure], Measure]:
+    """The decorated function is the metric of its name; `about`: more fields of Metric."""
+
+    def note(measure: Measure) -> Measure:
+        METRICS[measure.__name__] = Metric(unit, definition, measure, **about)  # type: ignore[arg-type]
+        return measure
+
+    return note

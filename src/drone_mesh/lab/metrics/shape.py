@@ -1,0 +1,90 @@
+"""Metrics of the shape of the mesh: parts, hops, degree, coverage."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+import numpy as np
+
+from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.record import RunRecord, Scene
+
+
+@metric("parts", "connected parts right before the fault (or at the start)")
+def parts_before(run: RunRecord) -> float:
+    return float(len(_before(run).graph.parts()))
+
+
+@metric("parts", "connected parts at the end", better="less")
+def parts_after(run: RunRecord) -> float:
+    return float(len(run.end.graph.parts()))
+
+
+@metric("hops", "mean length of the routes in use right before the fault")
+def hops_mean_before(run: RunRecord) -> float:
+    return _mean(_before(run).route_hops.values())
+
+
+@metric("hops", "mean length of the routes in use at the end", better="less")
+def hops_mean_after(run: RunRecord) -> float:
+    return _mean(run.end.route_hops.values())
+
+
+@metric("hops", "longest route in use right before the fault")
+def hops_max_before(run: RunRecord) -> float:
+    return float(max(_before(run).route_hops.values(), default=0))
+
+
+@metric("hops", "longest route in use at the end", better="less")
+def hops_max_after(run: RunRecord) -> float:
+    return float(max(run.end.route_hops.values(), default=0))
+
+
+@metric(
+    "ratio", "route in use by shortest path, mean of the served routers at the end", better="less"
+)
+def stretch(run: RunRecord) -> float:
+    shortest = run.end.graph.hops_from(sorted(run.gateways))
+    return _mean(
+        hops / shortest[node] for node, hops in run.end.route_hops.items() if shortest.get(node)
+    )
+
+
+@metric("neighbours", "mean number of drones in range of a live drone at the end")
+def degree_after(run: RunRecord) -> float:
+    return run.end.graph.mean_degree()
+
+
+@metric(
+    "share", "ground within range of a drone at the end, by that before the fault", better="more"
+)
+def coverage(run: RunRecord) -> float:
+    before = _before(run)
+    range_m = run.scenario.range_m
+    points_before = [before.places[n][:2] for n in sorted(before.graph.near)]
+    points_after = [run.end.places[n][:2] for n in sorted(run.end.graph.near)]
+    if not points_before or not points_after:
+        return 0.0
+    return covered(points_after, range_m) / covered(points_before, range_m)
+
+
+def covered(points: Sequence[Sequence[float]], range_m: float) -> int:
+    """Cells of a grid, an eighth of the range wide, whose middle a drone reaches."""
+    cell = range_m / 8
+    offsets = np.arange(-8, 9)
+    dx, dy = np.meshgrid(offsets, offsets)
+    corners = np.floor(np.asarray(points) / cell).astype(np.int64)
+    cells = corners[:, None, :] + np.stack([dx.ravel(), dy.ravel()], axis=1)[None]
+    middles = (cells + 0.5) * cell
+    inside = ((middles - np.asarray(points)[:, None, :]) ** 2).sum(axis=2) < range_m**2
+    reached = cells[inside]
+    return len(np.unique(reached[:, 0] * 10_000_019 + reached[:, 1]))
+
+
+def _before(run: RunRecord) -> Scene:
+    return run.start if run.before is None else run.before
+
+
+def _mean(values: object) -> float:
+    found = list(values)  # type: ignore[call-overload]
+    return sum(found) / len(found) if found else NAN

@@ -1,0 +1,96 @@
+"""Metrics of traffic: packets by type, load of the air, orders."""
+
+from __future__ import annotations
+
+import statistics
+
+from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.lab.metrics.registry import METRICS, NAN, Metric, metric
+from drone_mesh.lab.record import RunRecord
+
+DELIVERED_WITHIN_S = 10.0  # an order that comes later counts as lost
+
+
+@metric(
+    "packets",
+    "packets handed to the radio; on the disc all tries, broadcasts once per receiver",
+    better="less",
+)
+def packets(run: RunRecord) -> float:
+    return float(sum(one.own + one.forwarded for one in run.traffic.values()))
+
+
+@metric("1/s", "packets per drone and second", better="less")
+def packet_rate(run: RunRecord) -> float:
+    return packets(run) / run.end_s / len(run.start.places)
+
+
+@metric("bytes", "32 bytes for each of these packets", better="less")
+def payload_bytes(run: RunRecord) -> float:
+    return 32.0 * packets(run)
+
+
+@metric("share", "time with frames on the air, those at one time added; shared radio only")
+def air_load(run: RunRecord) -> float:
+    return NAN if run.airtime_s is None else run.airtime_s / run.end_s
+
+
+@metric("frames", "receptions that another frame destroyed; shared radio only", better="less")
+def frames_destroyed(run: RunRecord) -> float:
+    return NAN if run.frames_destroyed is None else float(run.frames_destroyed)
+
+
+@metric("", "flight orders that were given")
+def orders(run: RunRecord) -> float:
+    return float(len(run.orders))
+
+
+@metric("share", "orders whose drone set out within 10 s; empty: no orders", better="more")
+def order_delivery(run: RunRecord) -> float:
+    return sum(d is not None for d in _order_delays(run)) / len(run.orders) if run.orders else NAN
+
+
+@metric("ms", "median time from an order to its drone's departure", better="less")
+def order_delay_ms(run: RunRecord) -> float:
+    delays = [delay for delay in _order_delays(run) if delay is not None]
+    return 1000.0 * statistics.median(delays) if delays else NAN
+
+
+def _order_delays(run: RunRecord) -> list[float | None]:
+    departures: dict[int, list[float]] = {}
+    for event in run.events:
+        if event.kind == MeshEventKind.FLIGHT_ORDERED.value:
+            departures.setdefault(event.node, []).append(event.stamp_s)
+    return [
+        next(
+            (
+                stamp_s - order.at_s
+                for stamp_s in departures.get(order.node, ())
+                if 0.0 <= stamp_s - order.at_s <= DELIVERED_WITHIN_S
+            ),
+            None,
+        )
+        for order in run.orders
+    ]
+
+
+def _note_traffic() -> None:
+    """Two columns per message type: sent by its creator, and forwarded."""
+    for kind in MessageType:
+        word = kind.name.lower()
+        for attribute, name, words in (
+            ("own", "own", "sent by their creators"),
+            ("forwarded", "fwd", "forwarded for others"),
+        ):
+
+            def count(run: RunRecord, kind: int = int(kind), attribute: str = attribute) -> float:
+                traffic = run.traffic.get(kind)
+                return 0.0 if traffic is None else float(getattr(traffic, attribute))
+
+            METRICS[f"{name}_{word}"] = Metric(
+                "packets", f"{kind.name} packets {words}, tries included", count, "less"
+            )
+
+
+_note_traffic()
