@@ -1,22 +1,23 @@
 """An experiment file: read, overridden from the command line, checked, and expanded into cells."""
 
 import copy
-import difflib
 import hashlib
 import itertools
 import json
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from typing_extensions import Annotated, Literal, get_args
+from typing_extensions import Annotated, Literal
 
 from drone_mesh.air import obstacle_file
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab import extensions, places
+from drone_mesh.lab.dotted_path import NoSuchPlace, put
+from drone_mesh.lab.experiment_source import Source, nearest_name
 from drone_mesh.lab.expression import ExpressionError, Where
-from drone_mesh.lab.marked_yaml import Lines, Place, nearest_line, read_marked
+from drone_mesh.lab.marked_yaml import Place, read_marked
 from drone_mesh.lab.scenario import Fault, Part, Scenario
 
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # it becomes a folder
@@ -100,7 +101,7 @@ def load_experiment(
     `folder`: where the files and modules that it names are, if not beside it.
     """
     content, lines = read_marked(path)
-    source = _Source(path, lines, folder or path.parent)
+    source = Source(path, lines, folder or path.parent)
     for override in overrides:
         _override(content, override, source)
     extensions.search_in(source.folder)
@@ -125,67 +126,7 @@ def as_text(value: Any) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
-class _Source:
-    """Makes errors that point into the file, or at the argument that overrode it."""
-
-    def __init__(self, path: Path, lines: Lines, folder: Path) -> None:
-        self.path = path
-        self.folder = folder
-        self.lines = lines
-        self.overrides: Dict[Place, str] = {}
-
-    def error(self, place: Place, message: str) -> ConfigurationError:
-        for end in range(len(place), 0, -1):
-            if place[:end] in self.overrides:
-                return ConfigurationError(f"argument {self.overrides[place[:end]]}: {message}")
-        line = nearest_line(self.lines, place)
-        where = f"{self.path}, line {line}" if line else f"{self.path}"
-        return ConfigurationError(f"{where}: {message}")
-
-    def error_of(
-        self, error: ValidationError, before: Place, model: Any, shown: Place = ()
-    ) -> ConfigurationError:
-        """The first thing that pydantic found, as one line. `shown`: where to point instead."""
-        first = error.errors()[0]
-        inside: Place = tuple(first["loc"])
-        key = ".".join(map(str, (*before, *inside))) or "the file"
-        kind = first["type"]
-        if kind == "extra_forbidden":
-            name, known = str(inside[-1]), _keys_at(model, inside[:-1])
-            message = f"unknown key {key}; {_nearest(name, known)}"
-        elif kind == "missing":
-            message = f"missing key {key}"
-        else:
-            words = str(first["msg"]).replace("Value error, ", "")
-            value = first.get("input")
-            tail = f", not {value!r}" if isinstance(value, (str, int, float, bool)) else ""
-            message = f"{key}: {words[:1].lower()}{words[1:]}{tail}"
-        return self.error(shown or (*before, *inside), message)
-
-
-def _nearest(name: str, known: Sequence[str]) -> str:
-    close = difflib.get_close_matches(name, known, n=1)
-    return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
-
-
-def _keys_at(model: Any, place: Place) -> List[str]:
-    """The keys that a model has at this place."""
-    for step in place:
-        if isinstance(step, int):
-            continue
-        fields = getattr(model, "model_fields", {})
-        model = _model_in(fields[step].annotation) if step in fields else None
-    return list(getattr(model, "model_fields", {}))
-
-
-def _model_in(annotation: Any) -> Any:
-    """The model class inside Optional[...] or List[...]."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next(filter(None, map(_model_in, get_args(annotation))), None)
-
-
-def _override(content: Dict[str, Any], override: str, source: _Source) -> None:
+def _override(content: Dict[str, Any], override: str, source: Source) -> None:
     """Put the value of `a.b=c` into the content."""
     path, equals, text = override.partition("=")
     if not equals or not path:
@@ -196,7 +137,7 @@ def _override(content: Dict[str, Any], override: str, source: _Source) -> None:
         raise ConfigurationError(f"argument {override}: the value is not valid YAML") from None
     head, _, rest = path.partition(".")
     if head not in Experiment.model_fields:
-        hint = _nearest(head, list(Experiment.model_fields))
+        hint = nearest_name(head, list(Experiment.model_fields))
         raise ConfigurationError(f"argument {override}: unknown key {head}; {hint}")
     if head == "sweep" and rest:
         content.setdefault("sweep", {})[rest] = value
@@ -207,55 +148,13 @@ def _override(content: Dict[str, Any], override: str, source: _Source) -> None:
             f"argument {override}: {rest} is swept; use sweep.{rest}=[{text}] instead"
         )
     try:
-        place = _put(content, path, value)
-    except _NoSuchPlace as error:
+        place = put(content, path, value)
+    except NoSuchPlace as error:
         raise ConfigurationError(f"argument {override}: {error}") from None
     source.overrides[place] = override
 
 
-class _NoSuchPlace(Exception):
-    """A dotted path that leads nowhere."""
-
-
-def _put(content: Any, path: str, value: Any) -> Place:
-    """Set the value at a dotted path. A step into the faults is an index or the action's name."""
-    place: List[Union[str, int]] = []
-    steps = path.split(".")
-    for index, step in enumerate(steps):
-        last = index == len(steps) - 1
-        key: Union[str, int] = step
-        if isinstance(content, list):
-            try:
-                key = _index_of(content, step)
-            except _NoSuchPlace:
-                raise _NoSuchPlace(f"{'.'.join(steps[:index])} has no entry {step}") from None
-            if not step.isdigit():  # the action's name leads into the fault and into the action
-                place.append(key)
-                content, key = content[int(key)], step
-        elif not isinstance(content, dict):
-            raise _NoSuchPlace(f"{'.'.join(steps[:index])} is a value and has no key {step}")
-        place.append(key)
-        if last:
-            content[key] = value
-        elif isinstance(content, dict):
-            content = content.setdefault(str(key), {})
-        else:
-            content = content[int(key)]
-    return tuple(place)
-
-
-def _index_of(entries: Sequence[Any], step: str) -> int:
-    if step.isdigit():
-        if int(step) >= len(entries):
-            raise _NoSuchPlace
-        return int(step)
-    for index, entry in enumerate(entries):
-        if isinstance(entry, dict) and step in entry:
-            return index
-    raise _NoSuchPlace
-
-
-def _cells(experiment: Experiment, source: _Source) -> Iterator[Cell]:
+def _cells(experiment: Experiment, source: Source) -> Iterator[Cell]:
     axes: List[List[Dict[str, Any]]] = []
     named: Dict[str, Place] = {}
     for axis, values in experiment.sweep.items():
@@ -281,7 +180,7 @@ def _cells(experiment: Experiment, source: _Source) -> Iterator[Cell]:
             yield Cell(point, _scenario(experiment, point, named, source))
 
 
-def _where(experiment: Experiment, axes: Sequence[str], source: _Source) -> Optional[Where]:
+def _where(experiment: Experiment, axes: Sequence[str], source: Source) -> Optional[Where]:
     if experiment.where is None:
         return None
     try:
@@ -291,14 +190,14 @@ def _where(experiment: Experiment, axes: Sequence[str], source: _Source) -> Opti
 
 
 def _scenario(
-    experiment: Experiment, values: Mapping[str, Any], named: Mapping[str, Place], source: _Source
+    experiment: Experiment, values: Mapping[str, Any], named: Mapping[str, Place], source: Source
 ) -> Scenario:
     content = json.loads(json.dumps(experiment.base))
     placed: Dict[Place, str] = {}
     for axis, value in values.items():
         try:
-            placed[_put(content, axis, copy.deepcopy(value))] = axis
-        except _NoSuchPlace as error:
+            placed[put(content, axis, copy.deepcopy(value))] = axis
+        except NoSuchPlace as error:
             raise source.error(named[axis], f"axis {axis}: {error}") from None
     _read_files(content, source)
     try:
@@ -318,7 +217,7 @@ def _scenario(
     return scenario
 
 
-def _read_files(content: Dict[str, Any], source: _Source) -> None:
+def _read_files(content: Dict[str, Any], source: Source) -> None:
     """Put what other files say into the scenario: its id has to depend on that, not on a path."""
     for part, key, read in (
         ("layout", "places", places.rows_of_file),
@@ -333,7 +232,7 @@ def _read_files(content: Dict[str, Any], source: _Source) -> None:
             raise source.error(("base", part, "path"), f"{part}.path: {error}") from None
 
 
-def _check_ids(scenario: Scenario, source: _Source) -> None:
+def _check_ids(scenario: Scenario, source: Source) -> None:
     if scenario.layout.kind in ("casus", "file"):
         return
     for index, fault in enumerate(scenario.faults):
@@ -356,7 +255,7 @@ def _ids_of(fault: Fault) -> List[int]:
     ]
 
 
-def _check_metrics(experiment: Experiment, source: _Source) -> None:
+def _check_metrics(experiment: Experiment, source: Source) -> None:
     wanted: List[Tuple[Place, str]] = [
         (("metrics", index), name) for index, name in enumerate(experiment.metrics)
     ]
@@ -373,7 +272,7 @@ def _check_metrics(experiment: Experiment, source: _Source) -> None:
         raise source.error(("stop",), "stop: give either half_width or relative_half_width")
 
 
-def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: _Source) -> None:
+def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: Source) -> None:
     compare = experiment.compare
     if compare is None:
         return
@@ -381,7 +280,7 @@ def _check_compare(experiment: Experiment, cells: Sequence[Cell], source: _Sourc
     if compare.over not in axes:
         raise source.error(
             ("compare", "over"),
-            f"compare.over: no axis {compare.over}; {_nearest(compare.over, axes)}",
+            f"compare.over: no axis {compare.over}; {nearest_name(compare.over, axes)}",
         )
     if all(cell.values[compare.over] != compare.baseline for cell in cells):
         raise source.error(

@@ -1,0 +1,47 @@
+"""Sets the value at a dotted path, as in `faults.kill.share`, within the content of a file."""
+
+from typing import Any, List, Sequence, Union
+
+from drone_mesh.lab.marked_yaml import Place
+
+
+class NoSuchPlace(Exception):
+    """A dotted path that leads nowhere."""
+
+
+def put(content: Any, path: str, value: Any) -> Place:
+    """Set the value at a dotted path. A step into the faults is an index or the action's name."""
+    place: List[Union[str, int]] = []
+    steps = path.split(".")
+    for index, step in enumerate(steps):
+        last = index == len(steps) - 1
+        key: Union[str, int] = step
+        if isinstance(content, list):
+            try:
+                key = _index_of(content, step)
+            except NoSuchPlace:
+                raise NoSuchPlace(f"{'.'.join(steps[:index])} has no entry {step}") from None
+            if not step.isdigit():  # the action's name leads into the fault and into the action
+                place.append(key)
+                content, key = content[int(key)], step
+        elif not isinstance(content, dict):
+            raise NoSuchPlace(f"{'.'.join(steps[:index])} is a value and has no key {step}")
+        place.append(key)
+        if last:
+            content[key] = value
+        elif isinstance(content, dict):
+            content = content.setdefault(str(key), {})
+        else:
+            content = content[int(key)]
+    return tuple(place)
+
+
+def _index_of(entries: Sequence[Any], step: str) -> int:
+    if step.isdigit():
+        if int(step) >= len(entries):
+            raise NoSuchPlace
+        return int(step)
+    for index, entry in enumerate(entries):
+        if isinstance(entry, dict) and step in entry:
+            return index
+    raise NoSuchPlace

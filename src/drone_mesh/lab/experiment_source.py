@@ -1,0 +1,73 @@
+"""Where an experiment's content comes from: errors that point into the file or at an argument."""
+
+import difflib
+from pathlib import Path
+from typing import Any, Dict, List, Sequence
+
+from pydantic import BaseModel, ValidationError
+from typing_extensions import get_args
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.marked_yaml import Lines, Place, nearest_line
+
+
+class Source:
+    """Makes errors that point into the file, or at the argument that overrode it."""
+
+    def __init__(self, path: Path, lines: Lines, folder: Path) -> None:
+        self.path = path
+        self.folder = folder
+        self.lines = lines
+        self.overrides: Dict[Place, str] = {}
+
+    def error(self, place: Place, message: str) -> ConfigurationError:
+        """The error to raise about what stands at `place`."""
+        for end in range(len(place), 0, -1):
+            if place[:end] in self.overrides:
+                return ConfigurationError(f"argument {self.overrides[place[:end]]}: {message}")
+        line = nearest_line(self.lines, place)
+        where = f"{self.path}, line {line}" if line else f"{self.path}"
+        return ConfigurationError(f"{where}: {message}")
+
+    def error_of(
+        self, error: ValidationError, before: Place, model: Any, shown: Place = ()
+    ) -> ConfigurationError:
+        """The first thing that pydantic found, as one line. `shown`: where to point instead."""
+        first = error.errors()[0]
+        inside: Place = tuple(first["loc"])
+        key = ".".join(map(str, (*before, *inside))) or "the file"
+        kind = first["type"]
+        if kind == "extra_forbidden":
+            name, known = str(inside[-1]), _keys_at(model, inside[:-1])
+            message = f"unknown key {key}; {nearest_name(name, known)}"
+        elif kind == "missing":
+            message = f"missing key {key}"
+        else:
+            words = str(first["msg"]).replace("Value error, ", "")
+            value = first.get("input")
+            tail = f", not {value!r}" if isinstance(value, (str, int, float, bool)) else ""
+            message = f"{key}: {words[:1].lower()}{words[1:]}{tail}"
+        return self.error(shown or (*before, *inside), message)
+
+
+def nearest_name(name: str, known: Sequence[str]) -> str:
+    """A hint for an unknown name: the nearest one, or all of them."""
+    close = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
+
+
+def _keys_at(model: Any, place: Place) -> List[str]:
+    """The keys that a model has at this place."""
+    for step in place:
+        if isinstance(step, int):
+            continue
+        fields = getattr(model, "model_fields", {})
+        model = _model_in(fields[step].annotation) if step in fields else None
+    return list(getattr(model, "model_fields", {}))
+
+
+def _model_in(annotation: Any) -> Any:
+    """The model class inside Optional[...] or List[...]."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(_model_in, get_args(annotation))), None)
