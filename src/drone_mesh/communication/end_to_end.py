@@ -135,6 +135,14 @@ class EndToEnd:
         self._sequences[forward] = sequence = (before + 1) % _SEQUENCES
         return sequence
 
+    def proof_of(self, creator: int, to: int, message: bytes) -> bytes:
+        """The tag of a user's message between this node and another one; none for all nodes."""
+        key = self._keys.pair(creator, to) if to <= MAX_NODE_ID else None
+        if key is None:
+            return b""
+        made = bytes((creator, to)) + message
+        return hashlib.blake2s(made, key=key, digest_size=TAG_BYTES, person=b"message").digest()
+
     # Packets of others -----------------------------------------------------------------------
 
     def open(self, payload: bytes) -> bytes:

@@ -130,6 +130,10 @@ class IWirelessCommunication(abc.ABC):
         """How many of the 27 bytes behind the header of a packet the antenna itself needs."""
         return 0
 
+    def proof_of(self, creator: int, to: int, message: bytes) -> bytes:
+        """What shows that `creator` made a message of a user for `to`; empty without a key."""
+        return b""
+
     def patience(self) -> float:
         """For how many check periods the mesh should not probe again what is known to work.
 

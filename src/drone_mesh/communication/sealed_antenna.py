@@ -86,6 +86,9 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def reserved_bytes(self, kind: int) -> int:
         return reserved_bytes(kind)
 
+    def proof_of(self, creator: int, to: int, message: bytes) -> bytes:
+        return self._end_to_end.proof_of(creator, to, message)
+
     def channel_use(self) -> ChannelUse:
         return self._antenna.channel_use()
 

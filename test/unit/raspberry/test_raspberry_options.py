@@ -6,6 +6,8 @@ import re
 
 import pytest
 
+from drone_mesh.communication.key_file import write_key_file
+from drone_mesh.communication.keys import MeshKey
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone import Location
@@ -51,6 +53,45 @@ def test_a_router_answers_over_http_only_if_it_is_asked_to():
     asked = parse_router(["--id", "3", "--http", "--port", "9081"], {})
     assert (asked.gateway, asked.http) == (False, HttpOptions("127.0.0.1", 9081, ""))
     assert parse_gateway([], {}).gateway
+
+
+@pytest.fixture
+def key_files(tmp_path):
+    """A mesh key and the keys of node 5."""
+    key = MeshKey(bytes(range(16)))
+    write_key_file(tmp_path / "mesh.key", key)
+    write_key_file(tmp_path / "node5.key", key.for_node(5))
+    return tmp_path
+
+
+def test_a_node_gets_the_keys_in_its_file(key_files):
+    gateway = parse_gateway(["--key-file", str(key_files / "mesh.key")], {})
+    assert isinstance(gateway.keys, MeshKey)
+    router = parse_router(["--id", "5", "--key-file", str(key_files / "node5.key")], {})
+    assert router.keys.authority_over(5) == gateway.keys.authority_over(5)
+    assert parse_router(["--id", "5"], {}).keys is None
+
+
+@pytest.mark.parametrize(
+    ("parse", "arguments", "error"),
+    [
+        (parse_gateway, "--key-file node5.key", "a gateway needs the mesh key"),
+        (parse_router, "--emulated 3 --key-file node5.key", "emulated nodes need the mesh key"),
+        (parse_router, "--id 4 --key-file node5.key", "the keys are those of node 5, not 4"),
+        (parse_router, "--id 4 --key-file none.key", "No such file"),
+        (parse_router, "--id 4 --key-file open.key", "other users can access it"),
+    ],
+)
+def test_keys_that_a_node_cannot_use_are_refused(
+    key_files, monkeypatch, capsys, parse, arguments, error
+):
+    monkeypatch.chdir(key_files)
+    (key_files / "open.key").write_text("")
+    (key_files / "open.key").chmod(0o644)
+    with pytest.raises(SystemExit) as ended:
+        parse(arguments.split(), {})
+    assert ended.value.code == 2
+    assert error in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from typing import Callable
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
-from drone_mesh.communication.data.reassembly import Reassembly, Whole
+from drone_mesh.communication.data.reassembly import Prove, Reassembly, Whole, no_proof
 
 ACK_DELAY_S = 0.02  # our choice: messages that are complete within this time share an ACK
 ACK_AT = 32  # our choice: fragments of complete messages that make an ACK leave at once
@@ -21,13 +21,16 @@ FORMER_SESSION_S = 30.0  # our choice: longer than a packet can wait on its way
 class Inbox:
     """Puts together what one sender sends, and says when to acknowledge what."""
 
-    def __init__(self, room: int, acknowledge: Callable[[Ack], None]) -> None:
-        """`acknowledge` sends an ACK to the sender; `room`: bytes of a body."""
+    def __init__(
+        self, room: int, acknowledge: Callable[[Ack], None], prove: Prove = no_proof
+    ) -> None:
+        """`acknowledge` sends an ACK to the sender; `room`: bytes of a body; `prove`: see Prove."""
         self._room = room
+        self._prove = prove
         self._acknowledge = acknowledge
         self._session = -1
         self._former = (-1, -math.inf)  # the session before, and when it ended
-        self._reassembly = Reassembly(room)
+        self._reassembly = Reassembly(room, prove)
         self._ports: OrderedDict[tuple[int, bool], PortOrder] = OrderedDict()
         self._unacknowledged = 0  # fragments of complete messages
         self._complete = 0  # number of the latest complete reliable message
@@ -82,7 +85,7 @@ class Inbox:
         if self._session != -1:
             self._former = self._session, now_s
         self._session = session
-        self._reassembly = Reassembly(self._room)
+        self._reassembly = Reassembly(self._room, self._prove)
         self._ports.clear()
         self._unacknowledged, self.ack_due_s = 0, math.inf
         return True

@@ -14,6 +14,7 @@ from typing import Callable, Iterator, NamedTuple
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll
+from drone_mesh.communication.data.reassembly import Prove, no_proof
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
 
@@ -37,13 +38,14 @@ class Outgoing:
     """One message on its way."""
 
     __slots__ = (
-        "asked_s", "asks", "expires_s", "head", "known", "nonce", "payload", "sent", "ticket",
-        "to_send", "whole",
+        "asked_s", "asks", "expires_s", "head", "known", "nonce", "payload", "sealed", "sent",
+        "ticket", "to_send", "whole",
     )  # fmt: skip
 
     def __init__(self, ticket: Ticket, payload: bytes, now_s: float) -> None:
         self.ticket = ticket
         self.payload = payload
+        self.sealed = b""  # the payload and its proof, once it is on its way
         self.expires_s = now_s + LIFETIME_S
         self.head: Head | None = None  # once it is on its way
         self.to_send: deque[int] = deque()  # indices of fragments
@@ -72,9 +74,18 @@ class Lane:
     """The messages of one node to one destination, in the order in which they were handed in."""
 
     def __init__(
-        self, to: int, session: int, room: int, ended: Callable[[TicketState], None]
+        self,
+        to: int,
+        session: int,
+        room: int,
+        ended: Callable[[TicketState], None],
+        prove: Prove = no_proof,
     ) -> None:
-        """`room`: bytes of a body; `ended` is called with the last state of each message."""
+        """`room`: bytes of a body; `ended` is called with the last state of each message.
+
+        `prove`: see Prove.
+        """
+        self._prove = prove
         self.to = to
         self._ended = ended
         self._session = session
@@ -215,19 +226,21 @@ class Lane:
         ticket, payload = message.ticket, message.payload
         key = (ticket.port, ticket.reliable)
         order = self._orders.get(key, 0)
-        check = packets.checksum(self._session, ticket.port, order, payload)
+        proof = self._prove(packets.identified(self._session, ticket.port, order, payload))
+        message.sealed = payload + proof
+        check = packets.checksum(self._session, ticket.port, order, message.sealed)
         message.head = Head(
             self._number,
             self._session,
             ticket.port,
-            len(payload),
+            len(message.sealed),
             ticket.reliable,
             0,
             order,
             check,
         )
         self._orders[key] = (order + 1) & 0xFFFF
-        count = packets.count_of(len(payload), self._room)
+        count = packets.count_of(len(message.sealed), self._room)
         message.to_send.extend(range(count))
         self._open[self._number] = message
         self._number = (self._number + 1) & 0xFF
@@ -248,8 +261,8 @@ class Lane:
         assert head is not None
         if index == 0:
             head = head._replace(behind=self._behind(message.ticket, head.order))
-            return packets.first_body(head, message.payload, self._room)
-        return packets.further_body(head.number, index, message.payload, self._room)
+            return packets.first_body(head, message.sealed, self._room)
+        return packets.further_body(head.number, index, message.sealed, self._room)
 
     def _poll(self, message: Outgoing) -> DataPacket:
         assert message.head is not None

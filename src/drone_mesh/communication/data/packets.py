@@ -16,6 +16,7 @@ from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RE
 from drone_mesh.errors import PacketError
 
 MAX_MESSAGE_BYTES = 1024
+PROOF_BYTES = 4  # behind the payload of a message in a mesh with a key
 FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
 ACK = 192  # what its creator has of a message
 POLL = 193  # asks for an ACK
@@ -74,10 +75,14 @@ COMPLETE = (1 << len(FRAGMENTS)) - 1  # as Ack.has
 DONE_BITS = 32  # of Ack.done
 
 
+def identified(session: int, port: int, order: int, payload: bytes) -> bytes:
+    """A message behind what tells it from others with the same number."""
+    return struct.pack("<HBHH", session, port, order, len(payload)) + payload
+
+
 def checksum(session: int, port: int, order: int, payload: bytes) -> int:
-    """CRC-16/CCITT over a message and what tells it from others with the same number."""
-    prefix = struct.pack("<HBHH", session, port, order, len(payload))
-    return binascii.crc_hqx(prefix + payload, 0xFFFF)
+    """CRC-16/CCITT over an identified message."""
+    return binascii.crc_hqx(identified(session, port, order, payload), 0xFFFF)
 
 
 def count_of(length: int, room: int) -> int:
@@ -102,7 +107,7 @@ def head_of(body: bytes) -> Head:
     """What the body of fragment 0 says. Raises PacketError for an impossible length."""
     number, session, port, meta, order, check = _HEAD.unpack_from(body)
     length = meta & (1 << _LENGTH_BITS) - 1
-    if length > MAX_MESSAGE_BYTES:
+    if length > MAX_MESSAGE_BYTES + PROOF_BYTES:
         raise PacketError(f"a message of {length} bytes: at most {MAX_MESSAGE_BYTES} are allowed")
     return Head(
         number, session, port, length, bool(meta & _RELIABLE), meta >> _BEHIND_SHIFT, order, check

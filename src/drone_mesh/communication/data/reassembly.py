@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hmac
 from collections import OrderedDict
-from typing import NamedTuple
+from typing import Callable, NamedTuple
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.packets import COMPLETE, Head
@@ -11,6 +12,15 @@ from drone_mesh.communication.data.packets import COMPLETE, Head
 EXPIRES_S = 60.0  # our choice: a message of which nothing more came for so long is dropped
 MOST_PARTIAL = 24  # messages of one sender in the making; it has at most 16 on their way
 _LIVE = 64  # numbers: an older message than this is not on its way any more
+
+
+Prove = Callable[[bytes], bytes]
+"""From a message to the proof that its sender made it for its receiver; empty without a key."""
+
+
+def no_proof(_message: bytes) -> bytes:
+    """For a mesh without a key."""
+    return b""
 
 
 class Whole(NamedTuple):
@@ -33,9 +43,10 @@ class _Partial:
 class Reassembly:
     """Puts the messages of one sender together. Memory: MOST_PARTIAL messages at most."""
 
-    def __init__(self, room: int) -> None:
-        """`room`: bytes of a body."""
+    def __init__(self, room: int, prove: Prove = no_proof) -> None:
+        """`room`: bytes of a body; `prove`: what must stand behind each message."""
         self._room = room
+        self._prove = prove
         self._partial: OrderedDict[int, _Partial] = OrderedDict()  # by number, oldest first
         self._done: OrderedDict[int, None] = OrderedDict()  # numbers of the latest complete ones
 
@@ -64,8 +75,17 @@ class Reassembly:
         payload = packets.joined(
             [partial.bodies[n] for n in range(count)], head_now.length, self._room
         )
-        right = packets.checksum(head_now.session, head_now.port, head_now.order, payload)
-        return Whole(head_now, payload) if right == head_now.checksum else None
+        return self._checked(head_now, payload)
+
+    def _checked(self, head: Head, sealed: bytes) -> Whole | None:
+        """The message without its proof; None if it is damaged, or its sender did not make it."""
+        if packets.checksum(head.session, head.port, head.order, sealed) != head.checksum:
+            return None
+        payload = sealed[: len(sealed) - len(self._prove(b""))]
+        proof = self._prove(packets.identified(head.session, head.port, head.order, payload))
+        if not hmac.compare_digest(proof, sealed[len(payload) :]):
+            return None
+        return Whole(head, payload) if len(payload) <= packets.MAX_MESSAGE_BYTES else None
 
     def __len__(self) -> int:
         """Messages that are incomplete."""

@@ -7,6 +7,7 @@ per sender. Packets leave a few at a time, so that the mesh's own are handled in
 
 from __future__ import annotations
 
+import functools
 import math
 import random
 from collections import OrderedDict
@@ -276,7 +277,8 @@ class Transport:
             self._session = self._rng.randrange(1 << 16)
         lane = self._lanes.get(to)
         if lane is None:
-            lane = self._lanes[to] = Lane(to, self._session, self._room, self._ended)
+            prove = functools.partial(self._parts.antenna.proof_of, self._parts.node_id, to)
+            lane = self._lanes[to] = Lane(to, self._session, self._room, self._ended, prove)
         return lane
 
     def _ended(self, state: TicketState) -> None:
@@ -328,7 +330,9 @@ class Transport:
             def acknowledge(ack: Ack) -> None:
                 self._send_packet(packets.ACK, sender, packets.ack_body(ack))
 
-            inbox = self._inboxes[key] = Inbox(self._room, acknowledge)
+            receiver = TO_ALL if to_all else self._parts.node_id
+            prove = functools.partial(self._parts.antenna.proof_of, sender, receiver)
+            inbox = self._inboxes[key] = Inbox(self._room, acknowledge, prove)
         self._inboxes.move_to_end(key)
         return inbox
 

@@ -5,6 +5,7 @@ import logging
 import pytest
 from seal_rig import KEY, OTHER_KEY, packet
 
+from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.inprocess import Network
@@ -70,6 +71,37 @@ def test_orders_get_replies_and_messages_arrive():
     network.run_for(30.0)
     ticket = network.send(0, 3, b"x" * 1000)
     assert network.run_until(lambda: ticket.state.name == "DELIVERED", within_s=10.0)
+
+
+def test_the_longest_message_still_has_room_for_its_proof():
+    network = line(3, node_keys)
+    network.run_for(30.0)
+    ticket = network.send(0, 2, bytes(1024))
+    assert network.run_until(lambda: ticket.state.name == "DELIVERED", within_s=10.0)
+    message = network.received[2][-1]
+    assert message.payload == bytes(1024)
+
+
+@pytest.mark.parametrize("changes", [False, True])
+def test_a_relay_cannot_change_a_message(changes):
+    network = line(3, node_keys)
+    network.run_for(30.0)
+    relay = network.nodes[1].component
+
+    def on_msg(payload, now_s):
+        if changes and payload[2] == 128 and payload[4] == 2:
+            head = packets.head_of(payload[5:])
+            sealed = b"o" + payload[16 : 15 + head.length]  # the right checksum, no right proof
+            check = packets.checksum(head.session, head.port, head.order, sealed)
+            head = head._replace(checksum=check)
+            payload = payload[:5] + packets.first_body(head, sealed, 20) + payload[25:]
+        return receive(payload, now_s)
+
+    receive, relay.on_msg = relay.on_msg, on_msg
+    network.send(0, 2, b"close")
+    network.run_for(5.0)
+    arrived = [message.payload for message in network.received.get(2, [])]
+    assert arrived == ([] if changes else [b"close"])
 
 
 def test_two_keys_are_two_meshes(caplog):
