@@ -19,6 +19,7 @@ class Due(enum.IntEnum):
     ORDERS = 7  # what a gateway does about orders under way
     DATA = 8  # what users' messages wait for
     NODE_REPORT = 9  # the next report to the gateway
+    GOAL = 10  # a drone that took off says again where to
 
 
 class Deadlines:

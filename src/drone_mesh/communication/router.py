@@ -5,6 +5,7 @@ docs/protocol.md, "Connection" to "Flight". Its states and transitions are in `r
 
 from __future__ import annotations
 
+import math
 import random
 from typing import Sequence
 
@@ -32,6 +33,7 @@ from drone_mesh.communication.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 
+GOAL_AGAIN_S = 0.15  # our choice: no one acknowledges a broadcast, and it is soon out of reach
 SHORT_FLIGHT = 0.25  # of the range, our choice: the discs before and after share 84 % of their area
 
 
@@ -73,6 +75,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if now_s >= self._deadlines.get(Due.ANSWER):
             self._connection.answer_missed()
         super().tick(now_s)
+        if now_s >= self._deadlines.get(Due.GOAL):
+            self._deadlines.set(Due.GOAL, math.inf)
+            goal = self._pilot.goal
+            if goal is not None:
+                self._repair.tell_place(goal)
         if now_s >= self._deadlines.get(Due.REPAIR) and self._repair.on_due():
             self._landed()
         self._repair_status = self._repair.status()
@@ -218,6 +225,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         goal = self._pilot.goal
         if self._antenna.medium.shared and goal is not None:
             self._repair.tell_place(goal)
+            self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
             for neighbour in sorted(self._neighbours.ids()):
                 heard = self._neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:

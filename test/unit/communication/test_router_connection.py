@@ -562,6 +562,10 @@ def test_a_router_that_takes_off_says_where_to():
     rig.connect_through(2)
     rig.hear("00 02 06 01 01 00 00 80 3f")  # latitude 1
     assert rig.broadcasts() == [packet("01 01 01 fe fe 00 00 80 3f")]
+    rig.wait(0.2)
+    assert rig.broadcasts() == [packet("01 01 01 fe fe 00 00 80 3f")]
+    rig.wait(0.2)
+    assert rig.broadcasts() == []
 
 
 @pytest.mark.parametrize(("latitude", "stays"), [("00 00 00 41", True), ("00 00 10 41", False)])
