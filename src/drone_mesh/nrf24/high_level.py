@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import Callable
+from typing import Callable, Mapping
 
 from drone_mesh.communication.interfaces import (
     BROADCAST,
@@ -18,6 +18,7 @@ from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import is_data, readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import Inbox
+from drone_mesh.nrf24.link_quality import LinkQuality, Quality
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.medium_access import ALL_NODES, Priority
 from drone_mesh.nrf24.pace import medium_of
@@ -61,6 +62,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._sender = Sender(radio, self._runtime, self._delivered, self._given_up)
         self._medium = medium_of(radio.settings)
         self._meter = ChannelMeter(self._runtime.now_s())
+        self._quality = LinkQuality()
         self._on_payload = on_payload
         self._mesh: IMeshNetwork | None = None
         self._receiving: Task | None = None
@@ -161,12 +163,19 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         """Counters of the radio, and the duplicates that were seen."""
         return replace(self._radio.statistics(), duplicates=self._duplicates)
 
+    def link_quality(self) -> Mapping[int, Quality]:
+        """How well packets reach each neighbour. Any thread."""
+        return self._quality.figures()
+
     def _delivered(self, node: int, tries: int) -> None:
+        self._quality.packet(node, tries, delivered=True)
         mesh = self._mesh
         if mesh is not None and self._powered and not self._silent:
             self._submit(lambda now_s: mesh.on_delivered(node, tries, now_s))
 
     def _given_up(self, payload: bytes, tries: int) -> None:
+        if receiver(payload) <= MAX_NODE_ID:
+            self._quality.packet(receiver(payload), tries, delivered=False)
         mesh = self._mesh
         if mesh is not None and self._powered and not self._silent:
             self._submit(lambda now_s: mesh.on_undelivered(payload, tries, now_s))

@@ -107,6 +107,7 @@ class RadioNode:
             self.component,
             self.engine,
             self._antenna.statistics(),
+            self._antenna.link_quality(),
             self._antenna.on(),
             now_s - self._started_s,
             now_s,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from importlib import metadata
-from typing import Any
+from typing import Any, Mapping
 
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.errors import LocationUnknown
+from drone_mesh.nrf24.link_quality import Quality
 from drone_mesh.nrf24.statistics import RadioStatistics
 
 
@@ -16,13 +17,19 @@ def node_status(
     component: MeshnetworkComponent,
     engine: IDroneEngine,
     radio: RadioStatistics,
+    links: Mapping[int, Quality],
     on: bool,
     uptime_s: float,
     now_s: float,
 ) -> dict[str, Any]:
     """Everything, as JSON values. Reads snapshots, so any thread may call it."""
     neighbours = [
-        {"id": node, "heard_s_ago": round(max(0.0, now_s - heard_s), 1)}
+        {
+            "id": node,
+            "heard_s_ago": round(max(0.0, now_s - heard_s), 1),
+            "tries_per_packet": round(links[node].tries, 2) if node in links else None,
+            "delivered": round(links[node].delivered, 3) if node in links else None,
+        }
         for node, heard_s in sorted(component.get_neighbours().items())
     ]
     return {
@@ -77,11 +84,21 @@ def table(status: dict[str, Any]) -> str:
         if isinstance(value, dict):
             rows.extend((f"{key}.{name}", inner) for name, inner in value.items())
         elif isinstance(value, list):
-            words = ", ".join(f"{one['id']} ({one['heard_s_ago']:g} s ago)" for one in value)
+            words = ", ".join(_link(one) for one in value)
             rows.append((key, words or "none"))
         else:
             rows.append((key, value))
     return "\n".join(f"{key:24} {'-' if value is None else value}" for key, value in rows)
+
+
+def _link(neighbour: dict[str, Any]) -> str:
+    """A neighbour in words: when it was heard, and how well packets reach it."""
+    words = f"{neighbour['heard_s_ago']:g} s ago"
+    if neighbour.get("tries_per_packet") is not None:
+        words += (
+            f", {neighbour['tries_per_packet']:g} tries, {neighbour['delivered']:.0%} delivered"
+        )
+    return f"{neighbour['id']} ({words})"
 
 
 def _flight(engine: IDroneEngine) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import random
+import re
 import socket
 import time
 from pathlib import Path
@@ -95,6 +96,10 @@ def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
             lambda: all(n.component.get_connected_to_gateway() for n in mesh.nodes),
         )
         wait_for("it has neighbours", lambda: len(mesh.nodes[0].status()["neighbours"]) == 2)
+        wait_for(
+            "it has sent packets to both",
+            lambda: all(n["tries_per_packet"] for n in mesh.nodes[0].status()["neighbours"]),
+        )
         status = httpx.get(f"http://127.0.0.1:{port}/status", verify=False).json()
         assert main([f"http://127.0.0.1:{port}"]) == 0
         whole = httpx.get(f"http://127.0.0.1:{port}/mesh?after=1", verify=False).json()
@@ -113,6 +118,10 @@ def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
     assert (status["gateway"], status["hops"]) == (0, 0)
     assert [neighbour["id"] for neighbour in status["neighbours"]] == [1, 2]
     assert all(neighbour["heard_s_ago"] < 20.0 for neighbour in status["neighbours"])
+    for neighbour in status["neighbours"]:
+        assert neighbour["tries_per_packet"] >= 1.0
+        assert 0.0 <= neighbour["delivered"] <= 1.0
+    assert re.search(r"neighbours +1 \(.* s ago, .* tries, \d+% delivered\), 2", table(status))
     assert status["flight"]["why_not"] == "it stands on the ground"
     assert status["flight"]["latitude_longitude_height"] == [0.0, 0.0, 0.0]
     assert status["radio"]["received"] > 0
