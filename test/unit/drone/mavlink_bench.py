@@ -11,7 +11,8 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.drone.mavlink.pilot import MavlinkPilot, Phase
+from drone_mesh.drone.mavlink.pilot import MavlinkPilot
+from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 

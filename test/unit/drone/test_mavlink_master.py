@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
-from drone_mesh.drone.mavlink.pilot import Phase
+from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.drone.mavlink_vehicle.modes import Mode
 from drone_mesh.errors import GoalRefused
 

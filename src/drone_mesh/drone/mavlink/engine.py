@@ -11,7 +11,8 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.link import MavlinkLink
-from drone_mesh.drone.mavlink.pilot import MavlinkPilot, PilotStatus
+from drone_mesh.drone.mavlink.pilot import MavlinkPilot
+from drone_mesh.drone.mavlink.pilot_status import PilotStatus
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 TICK_S = 0.05  # our choice: four looks for each target

@@ -1,26 +1,24 @@
 """MavlinkPilot: flies one drone by talking to its autopilot, as far as the human pilot allows.
 
-The human pilot is the master. This program follows only while the autopilot is in the mode that is
-meant for it, and lets go as soon as that mode ends for any reason. It never resumes a flight
+It lets go as soon as its authority ends for any reason (`authority.py`), and never resumes a flight
 that it let go of.
 """
 
 from __future__ import annotations
 
-import enum
 import logging
 import math
-from dataclasses import dataclass
 from typing import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from drone_mesh.drone.geodesy import EarthPlace, Origin
-from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import Location
-from drone_mesh.drone.mavlink.autopilots import Autopilot
+from drone_mesh.drone.mavlink.authority import Authority
 from drone_mesh.drone.mavlink.commander import Commander, ParameterCheck
+from drone_mesh.drone.mavlink.flight_area import FlightArea
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.drone.mavlink.pilot_status import UNDER_WAY, Phase, PilotStatus
 from drone_mesh.drone.mavlink.telemetry import Message, Telemetry
 from drone_mesh.drone.route import Route
 from drone_mesh.errors import GoalRefused
@@ -34,44 +32,6 @@ TAKE_OFF_WITHIN_S = 20.0  # our choice; armed and not risen by then, it gives up
 _log = logging.getLogger(__name__)
 
 
-class Phase(enum.Enum):
-    """What the drone is doing for this program."""
-
-    IDLE = "idle"
-    CHANGING_MODE = "changing mode"
-    ARMING = "arming"
-    TAKING_OFF = "taking off"
-    FLYING = "flying"
-    HOLDING = "holding"
-    LANDING = "landing"
-
-
-UNDER_WAY = frozenset(Phase) - {Phase.IDLE, Phase.HOLDING}
-
-
-@dataclass(frozen=True)
-class PilotStatus:
-    """One look at the drone. Never changes, so any thread may keep it."""
-
-    phase: Phase = Phase.IDLE
-    location: Location | None = None
-    location_trouble: str = "no heartbeat from an ArduPilot or PX4 autopilot yet"
-    home: Location | None = None
-    why_not_fly: str = "no heartbeat from an ArduPilot or PX4 autopilot yet"
-    autopilot: str = ""
-    mode: str = ""
-    armed: bool = False
-    on_ground: bool | None = None
-    battery_percent: float | None = None
-    complaints: tuple[str, ...] = ()  # parameters that are not safe
-    goal: Location | None = None
-
-    @property
-    def is_flying(self) -> bool:
-        """Whether a flight to a goal is under way."""
-        return self.phase in UNDER_WAY
-
-
 class MavlinkPilot:
     """Driven from outside: messages and ticks come in, messages go out through `send`."""
 
@@ -83,12 +43,12 @@ class MavlinkPilot:
         permissions: Permissions,
         send: Callable[[Message], None],
     ) -> None:
-        self._origin = origin
         self._limits = limits
-        self._permissions = permissions
         self._cruise_m = limits.layer_height_m(node_id)
         self._node_id = node_id
         self._telemetry = Telemetry()
+        self._area = FlightArea(self._telemetry, origin, limits)
+        self._authority = Authority(self._telemetry, self._area, limits, permissions)
         self._commander = Commander(self._telemetry, send)
         self._parameters = ParameterCheck(self._commander, self._telemetry)
         self._phase = Phase.IDLE
@@ -97,7 +57,6 @@ class MavlinkPilot:
         self._lands = False
         self._route: Route | None = None
         self._hold: Location | None = None
-        self._we_landed = False  # the autopilot is in its landing mode because we said so
         self._target_due_s = -math.inf
         self._last_tick_s = -math.inf
 
@@ -114,10 +73,10 @@ class MavlinkPilot:
         """Fly there. Raises GoalRefused for a place outside the limits, or if it cannot fly."""
         if (goal, lands) == (self._goal, self._lands):
             return
-        reason = self._why_not(now_s)
+        reason = self._authority.why_not(now_s, self._phase)
         if reason:
             raise GoalRefused(f"the drone cannot fly: {reason}")
-        home = self._home()
+        home = self._area.home()
         assert home is not None  # else there was a reason
         self._limits.check(goal, home)
         self._goal, self._lands = goal, lands
@@ -140,7 +99,7 @@ class MavlinkPilot:
         self._commander.tick(now_s)
         self._parameters.tick(now_s)
         if self._phase is not Phase.IDLE:
-            reason = self._why_let_go(now_s)
+            reason = self._authority.why_let_go(now_s, self._phase)
             if reason:
                 self._let_go(reason, now_s)
         self._act(passed_s, now_s)
@@ -152,10 +111,10 @@ class MavlinkPilot:
         autopilot = telemetry.autopilot
         return PilotStatus(
             phase=self._phase,
-            location=None if trouble else self._here(now_s),
+            location=None if trouble else self._area.here(now_s),
             location_trouble=trouble,
-            home=self._home(),
-            why_not_fly=self._why_not(now_s),
+            home=self._area.home(),
+            why_not_fly=self._authority.why_not(now_s, self._phase),
             autopilot=autopilot.name if autopilot else "",
             mode=autopilot.mode_name(telemetry.mode) if autopilot else "",
             armed=telemetry.armed,
@@ -165,97 +124,17 @@ class MavlinkPilot:
             goal=self._goal,
         )
 
-    # The pilot has priority ------------------------------------------------------------------
-
-    def _trouble(self, now_s: float) -> str:
-        """Why no flight is possible now, under any control; empty: it is possible."""
-        telemetry, limits = self._telemetry, self._limits
-        link = telemetry.link_trouble(now_s)
-        if link:
-            return link
-        if telemetry.failsafe:
-            return "the autopilot reports a failsafe"
-        position = telemetry.position_trouble(now_s)
-        if position:
-            return position
-        if telemetry.home is None:
-            return "the autopilot has not reported its home yet"
-        if not self._is_in_frame(telemetry.home):
-            return "its home is more than 5 km from --origin"
-        if telemetry.is_outside_fence():
-            return "outside the autopilot's fence"
-        battery = telemetry.battery_percent(now_s)
-        if battery is None and limits.min_battery_percent > 0.0:
-            return "the battery's charge is not reported"
-        if battery is not None and battery < limits.min_battery_percent:
-            return f"battery at {battery:.0f} %, below --min-battery {limits.min_battery_percent:g}"
-        if telemetry.on_ground(now_s) is None:
-            return "the autopilot does not report whether it has landed"
-        if telemetry.sticks_moved(now_s):
-            return "the pilot moved the sticks"
-        return ""
-
-    def _why_not(self, now_s: float) -> str:
-        """Why a goal would not be flown to now; empty: it would."""
-        trouble = self._trouble(now_s)
-        if trouble:
-            return trouble
-        telemetry, may = self._telemetry, self._permissions
-        autopilot = telemetry.autopilot
-        assert autopilot is not None  # else there was trouble
-        on_ground = telemetry.on_ground(now_s)
-        if self._phase is Phase.LANDING:
-            return "landing, as ordered"
-        if telemetry.mode != autopilot.own_mode:
-            name = autopilot.mode_name(telemetry.mode)
-            own = autopilot.mode_name(autopilot.own_mode)
-            if not self._may_leave(telemetry.mode, autopilot, bool(on_ground)):
-                hold = autopilot.mode_name(autopilot.hold_mode)
-                return f"in {name}, under its pilot's hand: only {own} (or {hold}) is ours"
-            if not may.may_change_mode:
-                return f"in {name}: the pilot has to choose {own}, or --may-change-mode"
-        if not telemetry.armed and not may.may_arm:
-            return "not armed: the pilot has to arm, or --may-arm"
-        if on_ground and not may.may_take_off:
-            return "on the ground: the pilot has to take off, or --may-take-off"
-        return ""
-
-    def _may_leave(self, mode: int, autopilot: Autopilot, on_ground: bool) -> bool:
-        if mode == autopilot.hold_mode:
-            return True
-        return self._we_landed and mode == autopilot.land_mode and on_ground
-
-    def _why_let_go(self, now_s: float) -> str:
-        """Why what is under way has to end; empty: it goes on."""
-        telemetry = self._telemetry
-        trouble = self._trouble(now_s)
-        autopilot = telemetry.autopilot
-        if trouble or autopilot is None:
-            return trouble
-        mode = telemetry.mode
-        if mode == autopilot.own_mode:
-            if self._phase in (Phase.TAKING_OFF, Phase.FLYING) and not telemetry.armed:
-                return "disarmed"
-            return ""
-        if self._phase is Phase.CHANGING_MODE and self._may_leave(
-            mode, autopilot, bool(telemetry.on_ground(now_s))
-        ):
-            return ""
-        if self._phase is Phase.LANDING and mode == autopilot.land_mode:
-            return ""
-        return f"{autopilot.mode_name(mode)} was chosen: the pilot flies"
-
     def _let_go(self, reason: str, now_s: float) -> None:
         """End what is under way. The drone holds where it is, or does what its autopilot chose."""
         telemetry = self._telemetry
         was, self._goal, self._route = self._phase, None, None
         self._commander.no_command()
-        here = self._here(now_s)
+        here = self._area.here(now_s)
         autopilot = telemetry.autopilot
         ours = autopilot is not None and telemetry.mode == autopilot.own_mode
         in_air = telemetry.armed and telemetry.on_ground(now_s) is False
         if ours and in_air and here is not None and not telemetry.link_trouble(now_s):
-            self._hold = self._hold if was is Phase.HOLDING else self._within(here)
+            self._hold = self._hold if was is Phase.HOLDING else self._area.within(here)
             self._enter(Phase.HOLDING, now_s)
         else:
             self._hold = None
@@ -287,10 +166,14 @@ class MavlinkPilot:
         autopilot = telemetry.autopilot
         if autopilot is None or not autopilot.wants_targets_beforehand:
             return
-        if telemetry.armed and telemetry.on_ground(now_s) is False and not self._trouble(now_s):
-            here = self._here(now_s)
+        if (
+            telemetry.armed
+            and telemetry.on_ground(now_s) is False
+            and not self._authority.trouble(now_s)
+        ):
+            here = self._area.here(now_s)
             if telemetry.mode == autopilot.own_mode and here is not None:
-                self._hold = self._within(here)
+                self._hold = self._area.within(here)
                 self._enter(Phase.HOLDING, now_s)
             else:
                 self._send_target(here, now_s)
@@ -300,11 +183,11 @@ class MavlinkPilot:
         autopilot = telemetry.autopilot
         assert autopilot is not None  # else it had let go
         if telemetry.mode == autopilot.own_mode:
-            self._we_landed = False
+            self._authority.we_landed = False
             self._enter(Phase.ARMING, now_s)
             return
         if autopilot.wants_targets_beforehand:
-            self._send_target(self._here(now_s), now_s)
+            self._send_target(self._area.here(now_s), now_s)
             if now_s - self._phase_since_s < TARGETS_BEFORE_MODE_S:
                 return
         self._command(
@@ -320,7 +203,7 @@ class MavlinkPilot:
         if not self._telemetry.armed:
             autopilot = self._telemetry.autopilot
             if autopilot is not None and autopilot.wants_targets_beforehand:
-                self._send_target(self._here(now_s), now_s)
+                self._send_target(self._area.here(now_s), now_s)
             self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,), now_s)
         elif self._telemetry.on_ground(now_s):
             self._enter(Phase.TAKING_OFF, now_s)
@@ -329,7 +212,7 @@ class MavlinkPilot:
 
     def _take_off(self, now_s: float) -> None:
         telemetry = self._telemetry
-        here, home = self._here(now_s), self._home()
+        here, home = self._area.here(now_s), self._area.home()
         autopilot = telemetry.autopilot
         assert autopilot is not None  # else it had let go, as in all that follows
         assert here is not None
@@ -346,12 +229,12 @@ class MavlinkPilot:
             self._command(mavlink.MAV_CMD_NAV_TAKEOFF, take_off, now_s)
 
     def _fly(self, now_s: float) -> None:
-        here, home = self._here(now_s), self._home()
+        here, home = self._area.here(now_s), self._area.home()
         assert here is not None
         assert home is not None
         assert self._goal is not None
         ceiling_m = self._limits.ceiling_m(home)
-        start = self._within(here)
+        start = self._area.within(here)
         self._route = Route(
             start,
             self._goal,
@@ -363,7 +246,7 @@ class MavlinkPilot:
         self._enter(Phase.FLYING, now_s)
 
     def _fly_on(self, passed_s: float, now_s: float) -> None:
-        here, route = self._here(now_s), self._route
+        here, route = self._area.here(now_s), self._route
         assert here is not None
         assert route is not None
         if not route.advance(here, passed_s):
@@ -385,7 +268,7 @@ class MavlinkPilot:
             return
         autopilot = telemetry.autopilot
         if autopilot is not None and telemetry.mode != autopilot.land_mode:
-            self._we_landed = True
+            self._authority.we_landed = True
             self._command(mavlink.MAV_CMD_NAV_LAND, (), now_s)
 
     def _command(self, command: int, parameters: tuple[float, ...], now_s: float) -> None:
@@ -399,37 +282,8 @@ class MavlinkPilot:
         if phase in (Phase.IDLE, Phase.HOLDING):
             self._commander.no_command()
 
-    # Places ----------------------------------------------------------------------------------
-
-    def _here(self, now_s: float) -> Location | None:
-        place = self._telemetry.place(now_s)
-        return None if place is None else self._origin.to_frame(place)
-
-    def _home(self) -> Location | None:
-        home = self._telemetry.home
-        return None if home is None else self._origin.to_frame(home)
-
-    def _is_in_frame(self, place: EarthPlace) -> bool:
-        location = self._origin.to_frame(place)
-        reach_m = max(abs(location.latitude), abs(location.longitude))
-        return reach_m <= MAX_COORDINATE_M and abs(location.height) <= MAX_HEIGHT_M
-
-    def _within(self, place: Location) -> Location:
-        """The nearest place inside the limits: no target lies outside them, wherever it is now."""
-        home = self._home()
-        if home is None:
-            return place
-        east, north = place.longitude - home.longitude, place.latitude - home.latitude
-        distance_m = math.hypot(east, north)
-        share = min(1.0, self._limits.max_distance_m / distance_m) if distance_m else 1.0
-        return Location(
-            latitude=home.latitude + north * share,
-            longitude=home.longitude + east * share,
-            height=min(place.height, self._limits.ceiling_m(home)),
-        )
-
     def _send_target(self, target: Location | None, now_s: float) -> None:
         if target is None or now_s < self._target_due_s:
             return
         self._target_due_s = now_s + TARGET_PERIOD_S
-        self._commander.target(self._origin.to_earth(self._within(target)))
+        self._commander.target(self._area.to_earth(target))

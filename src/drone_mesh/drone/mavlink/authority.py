@@ -1,0 +1,108 @@
+"""Authority: who may fly the drone now, this program or its human pilot, and why.
+
+The human pilot is the master. This program follows only while the autopilot is in the mode that is
+meant for it.
+"""
+
+from __future__ import annotations
+
+from drone_mesh.drone.mavlink.autopilots import Autopilot
+from drone_mesh.drone.mavlink.flight_area import FlightArea
+from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.drone.mavlink.pilot_status import Phase
+from drone_mesh.drone.mavlink.telemetry import Telemetry
+
+
+class Authority:
+    """Judges by the telemetry; changes nothing."""
+
+    def __init__(
+        self,
+        telemetry: Telemetry,
+        area: FlightArea,
+        limits: FlightLimits,
+        permissions: Permissions,
+    ) -> None:
+        self._telemetry = telemetry
+        self._area = area
+        self._limits = limits
+        self._permissions = permissions
+        self.we_landed = False  # the autopilot is in its landing mode because we said so
+
+    def trouble(self, now_s: float) -> str:
+        """Why no flight is possible now, under any control; empty: it is possible."""
+        telemetry, limits = self._telemetry, self._limits
+        link = telemetry.link_trouble(now_s)
+        if link:
+            return link
+        if telemetry.failsafe:
+            return "the autopilot reports a failsafe"
+        position = telemetry.position_trouble(now_s)
+        if position:
+            return position
+        if telemetry.home is None:
+            return "the autopilot has not reported its home yet"
+        if not self._area.is_in_frame(telemetry.home):
+            return "its home is more than 5 km from --origin"
+        if telemetry.is_outside_fence():
+            return "outside the autopilot's fence"
+        battery = telemetry.battery_percent(now_s)
+        if battery is None and limits.min_battery_percent > 0.0:
+            return "the battery's charge is not reported"
+        if battery is not None and battery < limits.min_battery_percent:
+            return f"battery at {battery:.0f} %, below --min-battery {limits.min_battery_percent:g}"
+        if telemetry.on_ground(now_s) is None:
+            return "the autopilot does not report whether it has landed"
+        if telemetry.sticks_moved(now_s):
+            return "the pilot moved the sticks"
+        return ""
+
+    def why_not(self, now_s: float, phase: Phase) -> str:
+        """Why a goal would not be flown to now; empty: it would."""
+        trouble = self.trouble(now_s)
+        if trouble:
+            return trouble
+        telemetry, may = self._telemetry, self._permissions
+        autopilot = telemetry.autopilot
+        assert autopilot is not None  # else there was trouble
+        on_ground = telemetry.on_ground(now_s)
+        if phase is Phase.LANDING:
+            return "landing, as ordered"
+        if telemetry.mode != autopilot.own_mode:
+            name = autopilot.mode_name(telemetry.mode)
+            own = autopilot.mode_name(autopilot.own_mode)
+            if not self._may_leave(telemetry.mode, autopilot, bool(on_ground)):
+                hold = autopilot.mode_name(autopilot.hold_mode)
+                return f"in {name}, under its pilot's hand: only {own} (or {hold}) is ours"
+            if not may.may_change_mode:
+                return f"in {name}: the pilot has to choose {own}, or --may-change-mode"
+        if not telemetry.armed and not may.may_arm:
+            return "not armed: the pilot has to arm, or --may-arm"
+        if on_ground and not may.may_take_off:
+            return "on the ground: the pilot has to take off, or --may-take-off"
+        return ""
+
+    def _may_leave(self, mode: int, autopilot: Autopilot, on_ground: bool) -> bool:
+        if mode == autopilot.hold_mode:
+            return True
+        return self.we_landed and mode == autopilot.land_mode and on_ground
+
+    def why_let_go(self, now_s: float, phase: Phase) -> str:
+        """Why what is under way has to end; empty: it goes on."""
+        telemetry = self._telemetry
+        trouble = self.trouble(now_s)
+        autopilot = telemetry.autopilot
+        if trouble or autopilot is None:
+            return trouble
+        mode = telemetry.mode
+        if mode == autopilot.own_mode:
+            if phase in (Phase.TAKING_OFF, Phase.FLYING) and not telemetry.armed:
+                return "disarmed"
+            return ""
+        if phase is Phase.CHANGING_MODE and self._may_leave(
+            mode, autopilot, bool(telemetry.on_ground(now_s))
+        ):
+            return ""
+        if phase is Phase.LANDING and mode == autopilot.land_mode:
+            return ""
+        return f"{autopilot.mode_name(mode)} was chosen: the pilot flies"

@@ -1,0 +1,46 @@
+"""What the drone is doing for this program, and one look at it."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from drone_mesh.drone.interfaces import Location
+
+
+class Phase(enum.Enum):
+    """What the drone is doing for this program."""
+
+    IDLE = "idle"
+    CHANGING_MODE = "changing mode"
+    ARMING = "arming"
+    TAKING_OFF = "taking off"
+    FLYING = "flying"
+    HOLDING = "holding"
+    LANDING = "landing"
+
+
+UNDER_WAY = frozenset(Phase) - {Phase.IDLE, Phase.HOLDING}
+
+
+@dataclass(frozen=True)
+class PilotStatus:
+    """One look at the drone. Never changes, so any thread may keep it."""
+
+    phase: Phase = Phase.IDLE
+    location: Location | None = None
+    location_trouble: str = "no heartbeat from an ArduPilot or PX4 autopilot yet"
+    home: Location | None = None
+    why_not_fly: str = "no heartbeat from an ArduPilot or PX4 autopilot yet"
+    autopilot: str = ""
+    mode: str = ""
+    armed: bool = False
+    on_ground: bool | None = None
+    battery_percent: float | None = None
+    complaints: tuple[str, ...] = ()  # parameters that are not safe
+    goal: Location | None = None
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether a flight to a goal is under way."""
+        return self.phase in UNDER_WAY
