@@ -10,7 +10,7 @@ from drone_mesh.report.charts import messages_figure, timeline_figure
 from drone_mesh.report.maps import maps_figure
 from drone_mesh.report.outage_bars import outages_figure
 from drone_mesh.report.story import RunStory
-from drone_mesh.report.tables import EVENT_KINDS_LEFT_OUT, key_numbers, repair_rows
+from drone_mesh.report.tables import EVENT_KINDS_LEFT_OUT, key_numbers, repair_rows, repairs_left
 from drone_mesh.state.trouble import find_trouble, summarise
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 
@@ -28,6 +28,7 @@ def render_page(story: RunStory, title: str) -> str:
         numbers=key_numbers(story),
         summary=summarise(story.after.nodes, find_trouble(story.after.nodes)),
         repairs=repair_rows(story),
+        left=repairs_left(story),
         blips=story.blips,
         timeline=timeline_figure(story),
         outages=outages_figure(story) if story.outages else "",

@@ -61,6 +61,11 @@ def repair_rows(story: RunStory) -> list[dict[str, str]]:
     ]
 
 
+def repairs_left(story: RunStory) -> list[tuple[int, str]]:
+    """Each node that still had something to repair at the end, and its own words about it."""
+    return [(node.id, node.repair) for node in story.after.nodes if node.repair]
+
+
 def write_csv(story: RunStory, folder: Path) -> list[Path]:
     """samples.csv, events.csv and outages.csv; returns their paths. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)

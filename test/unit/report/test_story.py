@@ -167,3 +167,14 @@ def test_a_moment_without_routers_is_a_gap_and_not_all_connected():
     story = tell_story([starting, *STATES], EVENTS)
     assert [sample.connected_share for sample in story.samples][:2] == [None, 1.0]
     assert render_page(story, "starting").count("<svg") == 4
+
+
+def test_the_page_says_what_each_node_still_does_about_its_lost_connection_at_the_end():
+    end = state(160.0, on=False, lost=True)
+    end.nodes[2].repair = "does not fly: the place of 1 is occupied by 3"
+    page = render_page(tell_story([*STATES, end], EVENTS), "a run")
+    assert "<li>node 2: does not fly: the place of 1 is occupied by 3</li>" in page
+
+
+def test_the_page_of_a_mesh_that_needs_no_repair_has_no_such_list():
+    assert "<li>" not in render_page(tell_story(STATES, EVENTS), "a run")

@@ -45,6 +45,7 @@ def _trouble_status(trouble: Trouble, node: NodeStatus) -> DiagnosticStatus:
                 "hops": node.hops,
                 "neighbours": _in_words(node.neighbours),
                 "route": _in_words(node.route),
+                "repair": node.repair,
                 "radio channel": channel_in_words(node),
             }
         ),
