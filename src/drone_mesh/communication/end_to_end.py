@@ -143,6 +143,10 @@ class EndToEnd:
         made = bytes((creator, to)) + message
         return hashlib.blake2s(made, key=key, digest_size=TAG_BYTES, person=b"message").digest()
 
+    def is_gateway(self, node: int) -> bool:
+        """Whether this node has proved to be a gateway."""
+        return node in self._gateways
+
     # Packets of others -----------------------------------------------------------------------
 
     def open(self, payload: bytes) -> bytes:

@@ -134,6 +134,10 @@ class IWirelessCommunication(abc.ABC):
         """What shows that `creator` made a message of a user for `to`; empty without a key."""
         return b""
 
+    def may_be_gateway(self, node: int) -> bool:
+        """Whether to believe a packet on its way to another node that `node` is a gateway."""
+        return True
+
     def patience(self) -> float:
         """For how many check periods the mesh should not probe again what is known to work.
 

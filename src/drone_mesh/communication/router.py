@@ -20,6 +20,7 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.messages import (
     GatewayPlace,
     LocationMessage,
+    MessageType,
     MovementNegotiationMessage,
 )
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
@@ -170,11 +171,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
     ) -> None:
         """The answer of a gateway proves the connection of each relay, too."""
         proves = creator == preferred_gateway and self._repair.may_connect(NO_ROUTE, know_gateway)
+        proves = proves and self._antenna.may_be_gateway(creator)
         if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
             self._repair.on_connected()
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
-        """Where the gateway is concerns each relay, too."""
+        """Where the gateway is concerns each relay, too, unless only the addressee can check it."""
+        if self._antenna.reserved_bytes(MessageType.LOCATION):
+            return
         if creator == self._connection.gateway:
             location = LocationMessage.from_payload(payload).location
             self.places.gateway_is_at(location, self._deadlines.now_s)

@@ -89,6 +89,9 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def proof_of(self, creator: int, to: int, message: bytes) -> bytes:
         return self._end_to_end.proof_of(creator, to, message)
 
+    def may_be_gateway(self, node: int) -> bool:
+        return self._end_to_end.is_gateway(node)
+
     def channel_use(self) -> ChannelUse:
         return self._antenna.channel_use()
 

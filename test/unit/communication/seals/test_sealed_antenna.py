@@ -169,3 +169,24 @@ def test_without_a_key_there_is_no_layer():
     network = line(2, key=None)
     network.run_for(1.0)
     assert network.nodes[0].receiver is network.nodes[0].component
+
+
+def test_a_relay_believes_no_gateway_in_passing_that_did_not_prove_to_be_one():
+    network = line(4, node_keys, "shared")
+    assert network.run_until(network.all_connected, within_s=30.0)
+    relay = network.nodes[2].component
+    false = packet("07 01 04 02 03 01 07 00")  # of "gateway" 7, on its way to node 3
+    for _ in range(20):
+        relay.on_msg(false, network.now_s())
+        network.run_for(2.0)
+        assert relay.get_preferred_gateway() == 0
+
+
+def test_a_relay_takes_no_place_that_only_its_addressee_can_check():
+    network = line(3, node_keys)
+    network.run_for(30.0)
+    relay = network.nodes[1].component
+    relay.on_msg(
+        packet("00 00 01 01 02 00 00 80 3f 00 00 80 3f 00 00 ff ff ff 7f"), network.now_s()
+    )
+    assert relay.places.gateway == network.location(0)
