@@ -7,32 +7,18 @@ back are learned from heartbeats as in the tree.
 from __future__ import annotations
 
 import struct
-from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.techniques.feasible_routes import Distance, FeasibleRoutes
 from drone_mesh.communication.techniques.gateway_routes import GatewayRoutes
 
 UPDATE = struct.Struct("<BHH")  # gateway + 1 (0: no update), sequence number, metric
 REQUEST = struct.Struct("<BHB")  # gateway, the sequence number that is needed, hops left
 REQUEST_TYPE = 8
 REQUEST_HOPS = 32  # our choice; RFC 8966, 3.8.1.2 wants a limit
-COST_PER_ETX = 256  # RFC 8966, appendix A.2.2
-INFINITE = 0xFFFF
 SOON_S = 0.2  # our choice: urgent updates within this time share one packet
-
-
-class Distance(NamedTuple):
-    """A sequence number and a metric; a feasible one is newer, or as new and smaller."""
-
-    sequence: int
-    metric: int
-
-    def better_than(self, other: Distance) -> bool:
-        """RFC 8966, 3.5.1."""
-        newer = (self.sequence - other.sequence + 2**15) % 2**16 - 2**15
-        return newer > 0 or (newer == 0 and self.metric < other.metric)
 
 
 class Babel(GatewayRoutes):
@@ -40,8 +26,7 @@ class Babel(GatewayRoutes):
 
     def __init__(self) -> None:
         super().__init__()
-        self._updates: dict[int, dict[int, Distance]] = {}  # by gateway, by neighbour
-        self._feasibility: dict[int, Distance] = {}  # by gateway: the best ever advertised
+        self._routes = FeasibleRoutes(self.links)
         self._own_sequence = 0
 
     def maintain_routing(self) -> None:
@@ -60,39 +45,28 @@ class Babel(GatewayRoutes):
         return super().learn(creator, from_, kind, payload)
 
     def extension(self, kind: int, room: int) -> bytes:
-        """The updates that fit, for PRESENT. What is advertised bounds what is feasible."""
+        """The updates that fit, for PRESENT."""
         if kind != MessageType.PRESENT or self._essentials is None:
             return b""
         me, packed = self._essentials.get_node_id(), []
         if self._essentials.get_preferred_gateway() == me:
             packed.append(UPDATE.pack(me + 1, self._own_sequence, 0))
-        for gateway in self._updates:
-            said = self._distance(gateway)
+        for gateway, said in self._routes.advertise():
             packed.append(UPDATE.pack(gateway + 1, *said))
-            limit = self._feasibility.get(gateway)
-            if said.metric != INFINITE and (limit is None or said.better_than(limit)):
-                self._feasibility[gateway] = said
         return b"".join(packed[: room // UPDATE.size])
 
     def next_hop_to_gateway(self, gateway: int) -> int:
-        """The feasible neighbour with the smallest sum of its metric and the link's cost."""
-        updates, limit = self._updates.get(gateway, {}), self._feasibility.get(gateway)
-        costs = {
-            n: self._cost(n, said)
-            for n, said in updates.items()
-            if said.metric != INFINITE and (limit is None or said.better_than(limit))
-        }
-        return min(costs, key=lambda n: (costs[n], n)) if costs else NO_ROUTE
+        """The best feasible neighbour."""
+        return self._routes.best(gateway)
 
     def forget_neighbour(self, neighbour: int) -> None:
         """Its updates are void; without another route the neighbours hear of that soon."""
-        for gateway, updates in self._updates.items():
-            if updates.pop(neighbour, None) and self.next_hop_to_gateway(gateway) == NO_ROUTE:
-                self._starve(gateway)
+        for gateway in self._routes.forget_neighbour(neighbour):
+            self._starve(gateway)
 
     def forget_gateway(self, gateway: int) -> None:
         """All updates for it are void until they are repeated."""
-        self._updates.get(gateway, {}).clear()
+        self._routes.forget_gateway(gateway)
 
     def on_time(self, now_s: float) -> None:
         """Advertise what has changed."""
@@ -119,7 +93,7 @@ class Babel(GatewayRoutes):
         if gateway == self._essentials.get_node_id():
             return
         had_route = self.next_hop_to_gateway(gateway) != NO_ROUTE
-        self._updates.setdefault(gateway, {})[neighbour] = said
+        self._routes.hear(gateway, neighbour, said)
         has_route = self.next_hop_to_gateway(gateway) != NO_ROUTE
         if had_route and not has_route:
             self._starve(gateway)
@@ -127,20 +101,9 @@ class Babel(GatewayRoutes):
             self._essentials.wake_at(self._essentials.now_s() + SOON_S)
 
     def _starve(self, gateway: int) -> None:
-        limit = self._feasibility.get(gateway)
-        if self._essentials is None or limit is None:
+        sequence = self._routes.needed_sequence(gateway)
+        if self._essentials is None or sequence is None:
             return
-        wanted = REQUEST.pack(gateway, (limit.sequence + 1) % 2**16, REQUEST_HOPS)
+        wanted = REQUEST.pack(gateway, sequence, REQUEST_HOPS)
         self._essentials.broadcast_packet(REQUEST_TYPE, wanted)
         self._essentials.wake_at(self._essentials.now_s() + SOON_S)
-
-    def _distance(self, gateway: int) -> Distance:
-        to = self.next_hop_to_gateway(gateway)
-        if to == NO_ROUTE:
-            limit = self._feasibility.get(gateway, Distance(0, INFINITE))
-            return Distance(limit.sequence, INFINITE)
-        said = self._updates[gateway][to]
-        return Distance(said.sequence, self._cost(to, said))
-
-    def _cost(self, neighbour: int, said: Distance) -> int:
-        return min(said.metric + round(COST_PER_ETX * self.links.etx(neighbour)), INFINITE - 1)
