@@ -22,7 +22,10 @@ class BodyLimits:
     max_sink_m_s: float = 1.5
     hover_s: float = 1200.0  # how long a full battery holds it in the air
     standby_s: float = 36_000.0  # how long it feeds the node on the ground
-    crash_m_s: float = 2.0  # a change of speed within one step, which no motor makes
+    crash_m_s: float = 1.0  # a change of speed within one step, which no motor makes
+    # Rotors do not survive this: held by something, a smaller change in every step, for so long.
+    held_m_s: float = 0.01
+    held_s: float = 0.5
 
 
 POSITION_GAIN_PER_S = 1.2  # m/s of wanted speed per metre of distance

@@ -54,6 +54,7 @@ class DynamicEngine(DroneEngine):
         self._battery_percent = 100.0
         self._was_flat = False
         self._settled = True
+        self._held_s = 0.0  # how long something has held it in the air
         self._crashed = False
         world.wake(self)
 
@@ -95,7 +96,7 @@ class DynamicEngine(DroneEngine):
         passed_s, self._stepped_s = now_s - self._stepped_s, now_s
         position, velocity = self._physics.body_state(self._box)
         if self._pushed is not None:
-            self._look_for_hits(velocity)
+            self._look_for_hits(velocity, passed_s)
         self._velocity = velocity
         while self._goals:
             self._begin(Location.from_vector(self._goals.popleft()), position, now_s)
@@ -181,10 +182,18 @@ class DynamicEngine(DroneEngine):
         if before > 0.0 == self._battery_percent:
             self._note(MeshEventKind.BATTERY_EMPTY)
 
-    def _look_for_hits(self, velocity: Vector) -> None:
+    def _look_for_hits(self, velocity: Vector, passed_s: float) -> None:
         assert self._pushed is not None
-        if math.dist(velocity, self._pushed) > self._limits.crash_m_s:
-            hit_m_s = math.dist(velocity, self._pushed)
-            self._crashed = True
-            self._route = self._hover = None
-            self._note(MeshEventKind.CRASHED, f"a hit of {hit_m_s:.1f} m/s")
+        hit_m_s = math.dist(velocity, self._pushed)
+        in_air = self._state.position[2] - self._half_height_m > ON_GROUND_M
+        is_held = in_air and hit_m_s > self._limits.held_m_s
+        self._held_s = self._held_s + passed_s if is_held else 0.0
+        if hit_m_s > self._limits.crash_m_s:
+            self._crash(f"a hit of {hit_m_s:.1f} m/s")
+        elif self._held_s > self._limits.held_s:
+            self._crash("caught in something")
+
+    def _crash(self, how: str) -> None:
+        self._crashed = True
+        self._route = self._hover = None
+        self._note(MeshEventKind.CRASHED, how)

@@ -124,6 +124,18 @@ def test_two_drones_that_meet_do_not_pass_through_each_other_and_a_hard_hit_ends
     assert other.get_location().height < 0.05  # it fell
 
 
+def test_two_drones_that_press_against_each_other_in_the_air_crash_and_do_not_hang_there(world):
+    slow = BodyLimits(max_speed_m_s=0.4)  # they touch too gently for a hard hit
+    one, other = (drone(world, x, 0.0, 3.0, limits=slow) for x in (0.0, 2.0))
+    one._hover = Location.from_vector((4.0, 0.0, 3.0))
+    other._hover = Location.from_vector((-2.0, 0.0, 3.0))
+    noted = []
+    one.observe(lambda kind, now_s, detail: noted.append((kind, detail)))
+    run(world, 8.0)
+    assert noted == [(MeshEventKind.CRASHED, "caught in something")]
+    assert one.get_location().height < 0.2
+
+
 def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world):
     engine = drone(world, limits=BodyLimits(hover_s=60.0))
     engine.set_goal(0.0, 0.0, 5)
