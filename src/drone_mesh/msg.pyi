@@ -60,8 +60,34 @@ class Location(Message):
     ) -> None: ...
 
 class MeshEvent(Message):
+    STARTED: Final = 0
+    CONNECTED: Final = 1
+    DISCONNECTED: Final = 2
+    GATEWAY_CHANGED: Final = 3
+    NEIGHBOUR_FOUND: Final = 4
+    NEIGHBOUR_LOST: Final = 5
+    NODE_MISSING: Final = 6
+    NO_ROUTE: Final = 7
+    POWER_ON: Final = 8
+    POWER_OFF: Final = 9
+    EMERGENCY: Final = 10
+    NEGOTIATION_STARTED: Final = 11
+    NEGOTIATION_ENDED: Final = 12
+    FLIGHT_DECIDED: Final = 13
+    FLIGHT_ORDERED: Final = 14
+    LANDED: Final = 15
+    CRASHED: Final = 16
+    BATTERY_LOW: Final = 17
+    BATTERY_EMPTY: Final = 18
+    GOAL_REFUSED: Final = 19
+    ORDER_SENT: Final = 20
+    ORDER_ACCEPTED: Final = 21
+    ORDER_REFUSED: Final = 22
+    ORDER_ARRIVED: Final = 23
+    ORDER_GIVEN_UP: Final = 24
     stamp: rospy.Time
     node: int
+    code: int
     kind: str
     peers: bytes
     detail: str
@@ -69,6 +95,7 @@ class MeshEvent(Message):
         self,
         stamp: rospy.Time = ...,
         node: int = ...,
+        code: int = ...,
         kind: str = ...,
         peers: bytes | Sequence[int] = ...,
         detail: str = ...,

@@ -6,6 +6,7 @@ from typing import Protocol, Sequence
 
 import rospy
 
+from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.msg import DroneInfo, MeshState, NodeState, Obstacle, RequestGatewayDroneFlight
@@ -15,6 +16,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.srv import RequestGPSResponse
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
+_CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
 _NO_POSITION = (0.0, 0.0, 0.0)
 
 
@@ -82,6 +84,7 @@ def event_msg(event: EventRecord) -> MeshEventMsg:
     return MeshEventMsg(
         stamp=ros_time(event.stamp_s),
         node=event.node,
+        code=_CODES[event.kind],
         kind=event.kind,
         peers=bytes(event.peers),
         detail=event.detail,
