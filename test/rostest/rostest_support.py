@@ -19,7 +19,7 @@ from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
 PAYLOAD_BYTES = 32
 STANDSTILL_S = 20.0  # wall: time that does not move means that the world has died
 LOOK_PERIOD_S = 0.01
-WALL_LIMIT_S = 20.0  # for what does not depend on simulated time
+WALL_LIMIT_S = 60.0  # for what takes a moment; a machine with much to do takes longer
 
 
 def wait_for(what: str, within_s: float, condition: Callable[[], object]) -> None:

@@ -23,14 +23,19 @@ class UnderWay:
     """
 
     def __init__(self) -> None:
-        self._lost = 0  # net: a packet that a stranger sends to a node counts as -1
+        self._lost = 0
         self._count = 0
-        self._since_s = 0.0  # wall; when the count changed last
+        self._since_s = 0.0  # wall; since when the count is the same, and the nodes do nothing
         self._patience_s = PATIENCE_S
 
-    def is_none(self, count: int, wall_s: float) -> bool:
-        """Whether nothing is under way, if `count` packets are not worked off at `wall_s`."""
-        if count != self._count:
+    def is_none(self, count: int, idle: bool, wall_s: float) -> bool:
+        """Whether nothing is under way, if `count` packets are not worked off at `wall_s`.
+
+        `idle`: the nodes have nothing to do but to wait for packets. The count may be too low for
+        a moment, as a process reports a packet that it received before another reports that it
+        sent it.
+        """
+        if count != self._count or not idle:
             self._count, self._since_s = count, wall_s
             if count == self._lost:
                 self._patience_s = PATIENCE_S
@@ -38,4 +43,4 @@ class UnderWay:
             _log.debug("%d packets were handed over and are lost", count - self._lost)
             self._lost = count
             self._patience_s = max(_SHORTEST_S, self._patience_s * _HASTE)
-        return count <= self._lost
+        return count == self._lost

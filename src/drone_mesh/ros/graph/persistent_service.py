@@ -78,6 +78,11 @@ class PersistentService(Generic[Request, Response]):
         poller.register(connection.fileno(), select.POLLRDHUP)
         return not poller.poll(0)  # POLLHUP and POLLERR are always looked for
 
+    @property
+    def server(self) -> str:
+        """The name of the node that offers the service; empty without a connection, or unknown."""
+        return "" if self._transport is None else self._transport.header.get("callerid", "")
+
     def connect(self) -> None:
         """Look the service up and connect. Raises ServiceGone."""
         self.close()

@@ -74,6 +74,11 @@ class MeshHost:
         return self.executor.lag_s(now_s)
 
     @property
+    def idle(self) -> bool:
+        """Whether the worker of the nodes waits for work."""
+        return self.executor.idle
+
+    @property
     def under_way(self) -> int:
         """Packets that this process handed over, less those that its nodes have worked off."""
         return self._radios.under_way

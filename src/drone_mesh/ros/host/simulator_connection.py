@@ -61,6 +61,11 @@ class SimulatorConnection:
             self.close()
             raise
 
+    @property
+    def simulator(self) -> str:
+        """The name of the simulator's node; empty if it does not say so."""
+        return self._message.server
+
     def is_connected(self) -> bool:
         """Whether all connections are still open at the other end."""
         services = (self._message, self._messages, self._broadcast, self._others)

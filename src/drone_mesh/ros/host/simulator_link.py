@@ -44,6 +44,7 @@ class SimulatorLink(rospy.SubscribeListener):
         self._stopping = False
         self._never_handed_over = 0  # written by the executor's worker, as the next one
         self._under_way = 0
+        self._simulator = ""  # its name, of the latest one; written by the link's own thread
         self._probing = False  # the worker has been asked to probe, and has not done so yet
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC,
@@ -79,9 +80,13 @@ class SimulatorLink(rospy.SubscribeListener):
         """
         return self._under_way
 
-    def worked_off(self) -> None:
-        """A node of this process is done with a packet. On the executor's worker."""
-        self._under_way -= 1
+    def worked_off(self, sender: str = "") -> None:
+        """A node of this process is done with a packet of this ROS node. On the worker.
+
+        What others than the simulator send to a node is not in the count.
+        """
+        if not (sender and self._simulator) or sender == self._simulator:
+            self._under_way -= 1
 
     @property
     def connected(self) -> bool:
@@ -176,6 +181,7 @@ class SimulatorLink(rospy.SubscribeListener):
         except ServiceGone as error:
             _log.debug("no simulator yet: %s", error)
             return
+        self._simulator = connection.simulator
         with self._lock:
             self._connection = connection
         self.antennas.announce_all_to_new_simulator()

@@ -96,14 +96,15 @@ class VirtualNRF24(IWirelessCommunication):
         if payload == self._probe:
             self._link.antennas.probe_returned(self.node_id)
         else:
-            self._inbox.put(lambda now_s: self._receive(payload, now_s))
+            sender = message._connection_header["callerid"]
+            self._inbox.put(lambda now_s: self._receive(payload, sender, now_s))
 
-    def _receive(self, payload: bytes, now_s: float) -> None:
+    def _receive(self, payload: bytes, sender: str, now_s: float) -> None:
         try:
             if self._on and self._mesh is not None:
                 self._mesh.on_msg(payload, now_s)
         finally:
-            self._link.worked_off()
+            self._link.worked_off(sender)
             while self._dropped < self._inbox.dropped:
                 self._dropped += 1
                 self._link.worked_off()

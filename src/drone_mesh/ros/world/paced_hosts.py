@@ -15,8 +15,8 @@ from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.world.under_way import UnderWay
 
 # Our choice, simulated: a timer is late by this and one step of the world at most, and so is the
-# last of all packets that follow from it. The mesh waits ten times as long for an answer.
-MAX_LAG_S = 0.05
+# last of all packets that follow from it. The mesh waits more than ten times as long for an answer.
+MAX_LAG_S = 0.03
 HOST_TIMEOUT_S = 2.0  # wall seconds; the world goes on without a host that is silent for longer
 LOOK_AGAIN_AFTER_S = 1.0  # wall seconds; between two looks at whether a stranger is a host
 
@@ -25,6 +25,10 @@ _log = logging.getLogger(__name__)
 
 class PacedNodes(Protocol):
     """Nodes that live in the time of the world."""
+
+    @property
+    def idle(self) -> bool:
+        """Whether they wait for packets, or for time to go on."""
 
     @property
     def under_way(self) -> int:
@@ -73,8 +77,9 @@ class PacedHosts:
     def are_behind(self, now_s: float) -> bool:
         """Whether the mesh was quiet too long ago for another step of the world."""
         wall_s = time.monotonic()
-        slowest, done_s, under_way = "the nodes of this process", now_s, 0
+        slowest, done_s, under_way, idle = "the nodes of this process", now_s, 0, True
         if self._nodes is not None:
+            idle = self._nodes.idle
             done_s, under_way = now_s - self._nodes.lag_s(now_s), self._nodes.under_way
         for host, progress in list(self._progress.items()):
             if wall_s - progress.reported_s > HOST_TIMEOUT_S:
@@ -84,7 +89,7 @@ class PacedHosts:
             under_way += progress.under_way
             if progress.done_s < done_s:
                 slowest, done_s = f"host {host}", progress.done_s
-        if self._under_way.is_none(under_way, wall_s):
+        if self._under_way.is_none(under_way, idle, wall_s):
             self._quiet_s = max(self._quiet_s, done_s)
         elif done_s >= now_s:
             slowest = f"{under_way} packets"
