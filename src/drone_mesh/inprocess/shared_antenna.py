@@ -29,6 +29,7 @@ SETTLING_S = SETTLING_NS / NS_PER_S
 # What the driver's SPI transfers take at 8 MHz, as the emulator counts them.
 PREPARE_S = 60e-6  # from a listening chip to the rise of CE, without the pause of TX_DELAY_S
 FINISH_S = 20e-6  # from TX_DS or MAX_RT to CE high again
+LOAD_S = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
 READ_S = 80e-6  # from the end of a frame until its payload is in the driver
 
 Submit = Callable[[Callable[[float], None]], None]
@@ -195,7 +196,13 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
     def _listen_again(self, acknowledged: bool) -> None:
         packet, self._trying = self._trying, None
         now_s = self._clock.now_s
-        if self.powered and self._mesh is not None:
+        if packet is not None and acknowledged and self.powered:
+            self._trying = self.access.following(packet, now_s)
+        if self._trying is not None:
+            self._ce_rose_s = now_s + LOAD_S
+            self._answered = False
+            self._clock.call_at(self._ce_rose_s + SETTLING_S, self._send_frame, self._trying)
+        elif self.powered and self._mesh is not None:
             self.listening_since_s = now_s + SETTLING_S
         if packet is None:
             return
@@ -246,7 +253,8 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         if mesh is None or not self.powered:
             return
         broadcast = packet.receiver == ALL_NODES
-        self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast)
+        data = is_data(packet.payload) and not broadcast
+        self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast, data=data)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))

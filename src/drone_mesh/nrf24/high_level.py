@@ -211,7 +211,9 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         if mesh is None or not self._powered:
             return
         self._note(payload)
-        self._sender.heard(sender(payload), broadcast=received.pipe == BROADCAST_PIPE)
+        broadcast = received.pipe == BROADCAST_PIPE
+        data = is_data(payload) and not broadcast
+        self._sender.heard(sender(payload), broadcast=broadcast, data=data)
         if received.pipe == BROADCAST_PIPE:
             payload = readdressed(payload, self._radio.node_id)
         if self._on_payload is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import random
 from dataclasses import replace
+from typing import Callable
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.errors import RadioError
@@ -130,11 +131,19 @@ class NRF24LowLevelInterface:
             self._pause(packet.not_before_s - self._runtime.now_s())
 
     def try_once(
-        self, node_id: int, payload: bytes, again: bool, retransmits: int, delay: int
+        self,
+        node_id: int,
+        payload: bytes,
+        again: bool,
+        retransmits: int,
+        delay: int,
+        following: Callable[[], bytes | None] = lambda: None,
     ) -> bool:
         """Send a packet to a node in one go; True once its chip has acknowledged it.
 
-        `again`: it was tried before. `retransmits`, `delay`: the chip's own, for this try.
+        `again`: it was tried before. `retransmits`, `delay`: the chip's own, for this try. When it
+        was acknowledged, `following` may return another packet for the same node, which is sent
+        without listening in between, and so on; then the result is that of the last one.
 
         The acknowledgement comes back to pipe 0, which holds the receiver's address as long as
         this takes. The program of 2019 opened pipe 3 for it, at the address of another node: the
@@ -149,6 +158,12 @@ class NRF24LowLevelInterface:
                 chip.load(address, payload, again=again)
                 chip.set_retries(delay, retransmits)
                 done = chip.transmit() is not None
+                while done:
+                    more = following()
+                    if more is None:
+                        break
+                    chip.load(address, more)
+                    done = chip.transmit() is not None
                 chip.listen()
             except RadioError as error:
                 self._failed(error)

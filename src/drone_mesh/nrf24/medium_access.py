@@ -16,7 +16,11 @@ air (`inprocess.shared_air`) both follow this one implementation.
    (RFC 5148, jitter).
 4. A node leaves a gap after each of its packets, so that a burst of them (a check of all
    neighbours) does not occupy the channel as a block.
-5. Each receiver has a line of its own: waiting for one of them does not delay the others. A
+5. Users' packets for one receiver follow each other in trains, without the gap between them: a pair
+   that is alone gets most of the channel. Trains get shorter as the channel gets busier, and end
+   when a packet of the mesh waits. A node that hears a train waits for its end, and the sender
+   leaves time for that: so an answer gets through, and a relay takes its turn.
+6. Each receiver has a line of its own: waiting for one of them does not delay the others. A
    receiver that let a packet fail and was not heard since gets fewer tries for the next one.
 """
 
@@ -45,6 +49,9 @@ class AccessRules:
     first_pause_s: float  # mean pause after the first try; doubles with each further one
     longest_pause_s: float  # mean pause, at most
     gap_s: float  # mean distance between two packets of one node
+    train: int  # users' packets without a gap between them, at most
+    train_pause_s: float  # a train that was not heard for so long is over
+    most_yield_s: float  # wait for the end of trains at most so long
     broadcast_jitter_s: float  # a broadcast waits for a random part of this
     answer_jitter_s: float  # as does whatever is sent within that time after a broadcast was heard
     lifetime_s: float  # a packet that waited for so long is of no use to anyone
@@ -64,11 +71,14 @@ class AccessRules:
             first_pause_s=5 * cycle_s,
             longest_pause_s=400 * cycle_s,
             gap_s=2 * cycle_s,
+            train=64,
+            train_pause_s=1.1 * cycle_s,
+            most_yield_s=60 * cycle_s,
             broadcast_jitter_s=60 * cycle_s,
             answer_jitter_s=60 * cycle_s,
             lifetime_s=10.0,
             queue_length=300,
-            data_queue_length=60,
+            data_queue_length=120,
             most_patience=2.5,
             busy_at=0.3,
         )
@@ -130,6 +140,10 @@ class MediumAccess:
         self._waiting_data = 0
         self._free_s = -math.inf  # the gap after the last packet ends
         self._broadcast_heard_s = -math.inf
+        self._train_left = 0  # packets that may still follow in the train that is being sent
+        self._yields_since_s = -math.inf  # to the trains of others
+        self._yields_until_s = -math.inf
+        self._has_yielded = False  # for long enough: it is this node's turn
         self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
         self._heard_s: dict[int, float] = {}
         self._counts = {"sent": 0, "acknowledged": 0, "lost": 0, "tries": 0, "broadcasts": 0}
@@ -175,10 +189,16 @@ class MediumAccess:
         """How many packets of priority DATA it would take now."""
         return self.rules.data_queue_length - self._waiting_data
 
-    def heard(self, sender: int, now_s: float, *, broadcast: bool) -> None:
-        """A packet came in."""
+    def heard(self, sender: int, now_s: float, *, broadcast: bool, data: bool = False) -> None:
+        """A packet came in; `data`: one of a user, for this node."""
         self._silent.discard(sender)
         self._heard_s[sender] = now_s
+        if data and not self._has_yielded:
+            if now_s > self._yields_until_s:
+                self._yields_since_s = now_s
+            last_s = self._yields_since_s + self.rules.most_yield_s
+            self._yields_until_s = min(now_s + self.rules.train_pause_s, last_s)
+            self._has_yielded = self._waiting > 0 and self._yields_until_s == last_s
         if broadcast:
             self._broadcast_heard_s = now_s
 
@@ -188,23 +208,45 @@ class MediumAccess:
         if not self._waiting:
             return math.inf
         first_s = min(line[0].not_before_s for line in self._lines.values())
-        return max(first_s, self._free_s)
+        return max(first_s, self._free_s, self._yields_until_s)
 
     def due(self, now_s: float) -> Outgoing | None:
         """The packet to try now. It stays in its line until `tried` says otherwise."""
-        if not self._waiting or now_s < self._free_s:
+        if not self._waiting or now_s < max(self._free_s, self._yields_until_s):
             return None
         ready = [line[0] for line in self._lines.values() if line[0].not_before_s <= now_s]
         if not ready:
             return None
-        return min(ready, key=lambda packet: (packet.priority, packet.not_before_s))
+        packet = min(ready, key=lambda packet: (packet.priority, packet.not_before_s))
+        quiet = max(0.0, 1.0 - self.contention / self.rules.busy_at)
+        self._train_left = int(quiet * self.rules.train)
+        return packet
+
+    def following(self, before: Outgoing, now_s: float) -> Outgoing | None:
+        """The packet that follows `before`, which was just delivered, in the same train."""
+        line = self._lines.get(before.receiver)
+        self._train_left -= 1
+        if self._train_left <= 0 or not line or before.priority is not Priority.DATA:
+            return None
+        after = next((packet for packet in line if packet is not before), None)
+        if after is None or after.tries or after.priority is not Priority.DATA:
+            return None
+        if any(
+            waiting[0].priority is Priority.CONTROL and waiting[0].not_before_s <= now_s
+            for waiting in self._lines.values()
+        ):
+            return None
+        return after
 
     def tried(self, packet: Outgoing, acknowledged: bool, now_s: float) -> Fate:
         """The result of a try that has just ended."""
         rules, receiver = self.rules, packet.receiver
         packet.tries += 1
+        self._has_yielded = False
         gap_s = rules.gap_s / (1.0 - self.contention)
         self._free_s = now_s + 2.0 * self._rng.random() * gap_s
+        if packet.priority is Priority.DATA and receiver != ALL_NODES:
+            self._free_s = now_s + rules.train_pause_s + self._rng.random() * gap_s
         counts = self._counts
         if receiver == ALL_NODES:
             counts["broadcasts"] += acknowledged

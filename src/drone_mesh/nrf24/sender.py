@@ -65,10 +65,10 @@ class Sender:
         with self._lock:
             return self._access.data_room()
 
-    def heard(self, sender: int, *, broadcast: bool) -> None:
-        """A packet of that node came in."""
+    def heard(self, sender: int, *, broadcast: bool, data: bool) -> None:
+        """A packet of that node came in; `data`: one of a user, for this node."""
         with self._lock:
-            self._access.heard(sender, self._runtime.now_s(), broadcast=broadcast)
+            self._access.heard(sender, self._runtime.now_s(), broadcast=broadcast, data=data)
 
     def clear(self) -> None:
         """Give up what waits, without a report."""
@@ -98,18 +98,37 @@ class Sender:
                 self._try(packet)
 
     def _try(self, packet: Outgoing) -> None:
-        radio, payload = self._radio, packet.payload
+        radio, access = self._radio, self._access
         if packet.receiver == ALL_NODES:
-            done = radio.broadcast(payload)
+            done = radio.broadcast(packet.payload)
         else:
-            retransmits, delay = self._access.retransmits()
-            again = packet.tries > 0
-            done = radio.try_once(packet.receiver, payload, again, retransmits, delay)
+            retransmits, delay = access.retransmits()
+
+            def following() -> bytes | None:
+                """The packet was delivered: the payload that follows in its train."""
+                nonlocal packet
+                with self._lock:
+                    now_s = self._runtime.now_s()
+                    more = access.following(packet, now_s)
+                    if more is None:
+                        return None
+                    fate = access.tried(packet, True, now_s)
+                self._settle(packet, fate)
+                packet = more
+                return more.payload
+
+            done = radio.try_once(
+                packet.receiver, packet.payload, packet.tries > 0, retransmits, delay, following
+            )
         with self._lock:
-            fate = self._access.tried(packet, done, self._runtime.now_s())
+            fate = access.tried(packet, done, self._runtime.now_s())
+        self._settle(packet, fate)
+
+    def _settle(self, packet: Outgoing, fate: Fate) -> None:
+        """Report what became of a packet."""
         if fate is Fate.GIVEN_UP:
-            radio.drop()
+            self._radio.drop()
             if not self._closed:
-                self._on_given_up(payload, packet.tries)
+                self._on_given_up(packet.payload, packet.tries)
         elif fate is Fate.DELIVERED and packet.receiver != ALL_NODES and not self._closed:
             self._on_delivered(packet.receiver, packet.tries)

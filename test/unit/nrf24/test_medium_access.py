@@ -237,3 +237,70 @@ def test_what_was_cleared_is_not_tried_again():
 def test_rules_without_tries_are_refused():
     with pytest.raises(ConfigurationError, match="tries must be at least 1"):
         AccessRules(**{**RULES.__dict__, "tries": 0})
+
+
+def loaded(data, control=0):
+    """A node with packets of users and of the mesh for node 5, and others of the mesh for 6."""
+    node = MediumAccess(RULES, random.Random(1))
+    for number in range(data):
+        assert node.offer(5, packet(number), 0.0, Priority.DATA)
+    for number in range(control):
+        assert node.offer(6, packet(1000 + number), 0.0)
+    return node
+
+
+def train(node, now_s=1.0):
+    """The packets that leave without a gap."""
+    left = [node.due(now_s)]
+    while left[-1] is not None:
+        following = node.following(left[-1], now_s)
+        node.tried(left[-1], True, now_s)
+        left.append(following)
+    return left[:-1]
+
+
+def test_users_packets_leave_in_trains_of_bounded_length_in_their_order():
+    node = loaded(RULES.train + 10)
+    assert [sent.payload for sent in train(node)] == [packet(n) for n in range(RULES.train)]
+    assert len(train(node, 2.0)) == 10
+
+
+def test_a_packet_of_the_mesh_is_no_train():
+    node = loaded(0, control=3)
+    assert len(train(node)) == 1
+
+
+def test_a_packet_of_the_mesh_ends_a_train():
+    node = loaded(10)
+    first = node.due(1.0)
+    assert node.following(first, 1.0) is not None
+    node.offer(6, packet(1000), 1.0)
+    assert node.following(first, 1.0) is None
+
+
+def test_on_a_busy_channel_users_packets_leave_one_by_one():
+    node = loaded(10)
+    node.contention = RULES.busy_at
+    assert len(train(node)) == 1
+
+
+def test_after_a_train_there_is_time_for_an_answer():
+    node = loaded(3)
+    train(node, 1.0)
+    node.offer(5, packet(99), 1.0)
+    assert node.next_try_s >= 1.0 + RULES.train_pause_s
+
+
+def test_who_hears_a_train_waits_for_its_end_but_not_for_ever():
+    node = loaded(0, control=1)
+    now_s = 1.0
+    node.heard(5, now_s, broadcast=False, data=True)
+    while node.due(now_s) is None:
+        assert now_s < 1.0 + 2 * RULES.most_yield_s, "it waits for ever"
+        now_s += RULES.train_pause_s / 2
+        node.heard(5, now_s, broadcast=False, data=True)
+    assert now_s >= 1.0 + RULES.most_yield_s - RULES.train_pause_s
+    quiet = loaded(0, control=1)
+    quiet.heard(5, 1.0, broadcast=False, data=True)
+    assert quiet.due(1.0) is None
+    assert quiet.due(1.0 + RULES.train_pause_s) is not None

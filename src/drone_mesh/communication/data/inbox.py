@@ -12,7 +12,7 @@ from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
 from drone_mesh.communication.data.reassembly import Prove, Reassembly, Whole, no_proof
 
 ACK_DELAY_S = 0.02  # our choice: messages that are complete within this time share an ACK
-ACK_AT = 32  # our choice: fragments of complete messages that make an ACK leave at once
+ACK_AT = 96  # our choice: fragments of complete messages that make an ACK leave at once
 REPEAT_S = 0.3  # our choice: an ACK that nothing asked for is not repeated sooner
 MOST_PORTS = 64  # whose order is kept per sender, the ones used last
 FORMER_SESSION_S = 30.0  # our choice: longer than a packet can wait on its way

@@ -21,7 +21,7 @@ from drone_mesh.communication.data.ticket import Ticket, TicketState, destinatio
 LIFETIME_S = 240.0  # our choice: a loss is repaired within two minutes and a flight
 FIRST_WINDOW = 32  # our choice, in fragments: less than a message of 1,024 bytes
 LEAST_WINDOW = 4
-MOST_WINDOW = 128  # our choice: three messages of 1,024 bytes
+MOST_WINDOW = 256  # our choice: six messages of 1,024 bytes
 MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
 NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
 

@@ -187,15 +187,12 @@ class Transport:
 
     def _work(self) -> None:
         """Send what may leave now, and plan the next time."""
-        now_s = self._parts.now_s
+        now_s, antenna = self._parts.now_s, self._parts.antenna
         if not self._lanes and not self._for_gateway:
             self._plan(math.inf)
             return
         self._follow_gateway()
-        again_s = math.inf
-        left = min(BURST, self._parts.antenna.data_room())
-        if left <= 0:
-            again_s = now_s + self._parts.antenna.medium.data_pause_s
+        left = min(BURST, antenna.data_room())
         idle = 0
         while left > 0 and idle < len(self._lanes):
             to, lane = next(iter(self._lanes.items()))
@@ -204,11 +201,12 @@ class Transport:
                 left, idle = left - 1, 0
             else:
                 idle += 1
-        if left <= 0:
-            again_s = now_s + self._parts.antenna.medium.data_pause_s
-        for to, lane in list(self._lanes.items()):
+        soon_s = now_s + antenna.medium.data_pause_s
+        again_s = soon_s if left <= 0 else math.inf
+        for to, lane in self._lanes.items():
             lane.expire(now_s, self._direction(to) != NO_ROUTE)
-            again_s = min(again_s, lane.due_s(now_s)) if len(lane) else again_s
+            due_s = lane.due_s(now_s)
+            again_s = min(again_s, due_s if due_s > now_s else soon_s)  # it could not leave
         if self._for_gateway:
             again_s = min(again_s, now_s + ROUTE_PERIOD_S)
         self._plan(again_s)

@@ -164,3 +164,18 @@ def test_users_packets_leave_room_in_the_queue():
     assert sum(taken) == rules.data_queue_length
     assert access.data_room() == 0
     assert access.offer(5, b"of the mesh", 0.0)
+
+
+def test_while_the_antenna_has_no_room_the_node_does_not_wake_all_the_time(network):
+    network.send(3, 0, bytes(1024))
+    network.run_for(0.01)
+    node = network.nodes[3]
+    node.antenna.data_room = lambda: 0
+    ticks = []
+    tick = node.component.tick
+    node.component.tick = lambda now_s: (ticks.append(now_s), tick(now_s))
+    network.run_for(5.0)
+    assert len(ticks) <= 5.0 / 0.005 + 10
+    del node.antenna.data_room
+    network.run_for(5.0)
+    assert payloads(network, 0) == [bytes(1024)]

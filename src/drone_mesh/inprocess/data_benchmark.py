@@ -1,0 +1,175 @@
+"""What the mesh carries for users: `python3 -m drone_mesh.inprocess.data_benchmark --help`.
+
+Real drivers on emulated chips, on one channel with exact times, under a virtual clock: the figures
+do not depend on the machine. Nodes stand in a line, 6 m apart, with a range of 9 m.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+from typing import NamedTuple, Sequence
+
+from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES, count_of
+from drone_mesh.communication.data.ticket import Ticket, TicketState
+from drone_mesh.communication.data.transport import ReceivedMessage
+from drone_mesh.communication.messages import BODY_BYTES
+from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.nrf24.emulator.links import Hop, IdealDisc
+from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
+from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
+
+RANGE_M = 9.0
+SPACING_M = 6.0
+CONNECT_WITHIN_S = 120.0
+END_WITHIN_S = 600.0  # of the messages
+
+
+class Case(NamedTuple):
+    """One row of the table."""
+
+    rate: str
+    hops: int
+    flows: int
+    loss: float
+    reliable: bool
+
+
+class Outcome(NamedTuple):
+    """What came of it."""
+
+    kbit_s: float  # of payload, of all flows together
+    delivered: float  # share of the messages
+    bound_kbit_s: float
+    connected: bool  # all nodes, at the end
+
+
+class LossyDisc(IdealDisc):
+    """As IdealDisc, but a share of the frames arrives damaged, acknowledgements included."""
+
+    def __init__(self, range_m: float, loss: float, rng: random.Random) -> None:
+        super().__init__(range_m)
+        self._loss = loss
+        self._rng = rng
+
+    def bit_errors(self, hop: Hop) -> int | None:
+        errors = super().bit_errors(hop)
+        return 1 if errors == 0 and self._rng.random() < self._loss else errors
+
+
+def bound_kbit_s(settings: RadioSettings, hops: int) -> float:
+    """What the air allows: a packet and its acknowledgement at a time in each neighbourhood.
+
+    On k hops each packet is sent k times. From three hops on the first node may send again while
+    the fourth does: 1/3.
+    """
+    packets = count_of(MAX_MESSAGE_BYTES, BODY_BYTES)
+    return MAX_MESSAGE_BYTES * 8 / packets / settings.acknowledged_s / min(hops, 3) / 1e3
+
+
+def measure(case: Case, messages: int, seed: int) -> Outcome:
+    """Send so many messages of 1024 bytes in all from the end of a line to its gateway.
+
+    With several flows the messages come from the last nodes of the line in turn.
+    """
+    settings = RadioSettings(data_rate=DATA_RATES[case.rate])
+    rng = random.Random(f"{seed} loss")
+    mesh = EmulatedMesh(VirtualClock(), LossyDisc(RANGE_M, case.loss, rng), seed, settings=settings)
+    try:
+        return _measured(mesh, case, messages, settings)
+    finally:
+        mesh.stop()
+
+
+def _measured(mesh: EmulatedMesh, case: Case, messages: int, settings: RadioSettings) -> Outcome:
+    mesh.add_gateway(0, (0.0, 0.0, 0.0))
+    for node in range(1, case.hops + 1):
+        mesh.add_router(node, (SPACING_M * node, 0.0, 0.0))
+    ends = [case.hops]
+    for flow in range(1, case.flows):  # beside the last node, and as far from the gateway
+        ends.append(case.hops + flow)
+        mesh.add_router(ends[-1], (SPACING_M * case.hops, 0.1 * flow, 0.0))
+    mesh.run_until(mesh.all_connected, CONNECT_WITHIN_S)
+    mesh.run_for(3.0)
+    received: list[ReceivedMessage] = []
+    tickets: list[Ticket] = []
+    mesh.nodes[0].component.data.on_received(received.append)
+    started_s = mesh.now_s()
+    for number, end in enumerate(ends):
+        share = messages // len(ends) + (number < messages % len(ends))
+        _hand_in(mesh, end, share, case.reliable, tickets)
+    mesh.run_until(
+        lambda: len(tickets) == messages and all(ticket.final for ticket in tickets), END_WITHIN_S
+    )
+    if not case.reliable:  # the last packets are on their way
+        mesh.run_for(5.0)
+    took_s = (received[-1].received_s if received else mesh.now_s()) - started_s
+    delivered = len(received) / messages
+    if case.reliable:
+        delivered = sum(t.state is TicketState.DELIVERED for t in tickets) / messages
+    return Outcome(
+        len(received) * MAX_MESSAGE_BYTES * 8 / took_s / 1e3,
+        delivered,
+        bound_kbit_s(settings, case.hops),
+        mesh.all_connected(),
+    )
+
+
+def _hand_in(
+    mesh: EmulatedMesh, node: int, count: int, reliable: bool, tickets: list[Ticket]
+) -> None:
+    data, payload = mesh.nodes[node].component.data, bytes(MAX_MESSAGE_BYTES)
+
+    def hand_in(now_s: float) -> None:
+        for _ in range(count):
+            tickets.append(data.send(0, payload, now_s, reliable=reliable))
+
+    mesh.nodes[node].submit(hand_in)
+
+
+def cases() -> list[Case]:
+    """The rows of the table in docs/performance.md."""
+    one_hop = [
+        Case(rate, 1, 1, loss, reliable)
+        for rate in DATA_RATES
+        for reliable in (False, True)
+        for loss in (0.0, 0.1)
+    ]
+    chains = [Case("250k", hops, 1, loss, True) for hops in (2, 4, 8) for loss in (0.0, 0.1)]
+    several = [Case("250k", hops, 10, 0.0, True) for hops in (1, 2)]
+    return one_hop + chains + several
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table, row by row."""
+    parser = argparse.ArgumentParser(
+        prog="drone_mesh.inprocess.data_benchmark",
+        description="Measures the payload that the mesh carries, on emulated radios in simulated "
+        "time: rates, hops, flows, lost frames.",
+    )
+    parser.add_argument(
+        "--messages", type=int, default=40, help="of 1024 bytes, in each case (default 40)"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="(default 1)")
+    parser.add_argument("--hops", type=int, help="only the cases with so many hops")
+    parsed = parser.parse_args(arguments)
+    print("| rate | hops | flows | frames lost | messages | kbit/s | of the bound | delivered |")
+    print("|---|---|---|---|---|---|---|---|")
+    for case in cases():
+        if parsed.hops not in (None, case.hops):
+            continue
+        outcome = measure(case, parsed.messages, parsed.seed)
+        kind = "reliable" if case.reliable else "best effort"
+        share = outcome.kbit_s / outcome.bound_kbit_s
+        note = "" if outcome.connected else ", a node is not connected"
+        print(
+            f"| {case.rate} | {case.hops} | {case.flows} | {case.loss:.0%} | {kind} | "
+            f"{outcome.kbit_s:.1f} | {share:.0%} | {outcome.delivered:.0%}{note} |",
+            flush=True,
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
