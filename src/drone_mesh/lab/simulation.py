@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from dataclasses import replace
 from typing import Any, Callable
 
 import numpy as np
@@ -23,6 +24,7 @@ from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.timeline import Timeline
 from drone_mesh.state.model import MeshStatus
+from drone_mesh.state.observation import describe_obstacles
 
 FLIGHT_LOOK_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
@@ -51,6 +53,7 @@ class Simulation:
     def run(self, on_status: OnStatus | None = None) -> RunRecord:
         """Let all of it happen. `on_status` gets the state after each sample, for pictures."""
         network, scenario = self.network, self.scenario
+        boxes = describe_obstacles(obstacles_of(scenario.obstacles).boxes)
         end_s = scenario.duration_s
         step = 0
         while network.clock.now_s < end_s:
@@ -61,7 +64,7 @@ class Simulation:
                 self._start = self._scene(look)._replace(places=self._start_places)
             self.timeline.check(look)
             if on_status is not None:
-                on_status(network.status())
+                on_status(replace(network.status(), obstacles=boxes))
         assert self._start is not None  # a run has at least one sample
         return RunRecord(
             scenario=scenario,

@@ -16,6 +16,7 @@ from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Layout, Scenario
 from drone_mesh.lab.simulation import Simulation
 from drone_mesh.lab.streams import Streams
+from drone_mesh.state.model import MeshStatus
 
 
 def run(repetition: int = 0, seed: int = 1, **scenario: Any) -> RunRecord:
@@ -328,6 +329,16 @@ def test_a_wall_between_two_drones_ends_their_link_and_without_it_the_run_is_the
 
     assert events(boxes=[HOUSE])[1] == [1]
     assert events(boxes=[{**HOUSE, "center": [9, 50, 5]}]) == events()
+
+
+def test_the_states_of_a_run_show_its_boxes() -> None:
+    content = {
+        "layout": {"kind": "line", "drones": 3}, "duration_s": 2, "obstacles": {"boxes": [HOUSE]},
+    }  # fmt: skip
+    states: list[MeshStatus] = []
+    Simulation(Scenario.model_validate(content), Streams(1, 0)).run(states.append)
+    (box,) = states[0].obstacles
+    assert (list(box.center), list(box.size)) == (HOUSE["center"], HOUSE["size"])
 
 
 def test_drones_and_repairs_keep_out_of_the_boxes() -> None:
