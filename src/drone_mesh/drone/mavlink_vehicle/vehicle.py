@@ -13,6 +13,7 @@ from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body
 from drone_mesh.drone.mavlink_vehicle.faults import Faults
+from drone_mesh.drone.mavlink_vehicle.inquiries import Inquiries
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
 from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
 from drone_mesh.drone.mavlink_vehicle.reports import Reports
@@ -64,17 +65,19 @@ class MavlinkVehicle:
         self._stands_since_s = math.inf
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
         self._reports = Reports(self)
+        inquiries = Inquiries(self._reports, self.parameters, self._send, lambda: self.now_s)
+        self._inquiries = inquiries
         self._takes: dict[str, Callable[[Message], None]] = {
             "HEARTBEAT": self._take_heartbeat,
             "COMMAND_LONG": self._take_command,
             "COMMAND_INT": self._take_command,
             "SET_MODE": self._take_set_mode,
             "SET_POSITION_TARGET_GLOBAL_INT": self._take_target,
-            "PARAM_REQUEST_READ": self._take_parameter_request,
-            "PARAM_REQUEST_LIST": self._take_parameter_list_request,
-            "PARAM_SET": self._take_parameter,
-            "MISSION_REQUEST_LIST": self._take_mission_request,
-            "TIMESYNC": self._take_timesync,
+            "PARAM_REQUEST_READ": inquiries.take_parameter_request,
+            "PARAM_REQUEST_LIST": inquiries.take_parameter_list_request,
+            "PARAM_SET": inquiries.take_parameter,
+            "MISSION_REQUEST_LIST": inquiries.take_mission_request,
+            "TIMESYNC": inquiries.take_timesync,
         }
 
     # What its human pilot does ---------------------------------------------------------------
@@ -241,6 +244,7 @@ class MavlinkVehicle:
         self._send(mavlink.MAVLink_command_ack_message(message.command, result))
 
     def _obey(self, message: Message) -> int:
+        inquiries = self._inquiries
         orders: dict[int, Callable[[Message], int]] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._obey_arm,
             mavlink.MAV_CMD_DO_SET_MODE: self._obey_mode,
@@ -249,9 +253,9 @@ class MavlinkVehicle:
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _message: self._set_mode(Mode.RETURN),
             mavlink.MAV_CMD_DO_REPOSITION: self._obey_reposition,
             mavlink.MAV_CMD_DO_CHANGE_SPEED: lambda _message: ACCEPTED,
-            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._obey_interval,
-            mavlink.MAV_CMD_REQUEST_MESSAGE: self._obey_request,
-            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._obey_capabilities,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: inquiries.set_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: inquiries.request_message,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: inquiries.report_capabilities,
         }
         obey = orders.get(message.command)
         return obey(message) if obey is not None else UNSUPPORTED
@@ -308,60 +312,3 @@ class MavlinkVehicle:
         self._enter(Mode.HOLD if self.autopilot is PX4 else Mode.FOLLOW)
         self._target = target
         return int(ACCEPTED)
-
-    def _obey_interval(self, message: Message) -> int:
-        if not math.isfinite(message.param1):
-            return int(DENIED)
-        known = self._reports.set_interval(int(message.param1), message.param2)
-        return int(ACCEPTED if known else UNSUPPORTED)
-
-    def _obey_request(self, message: Message) -> int:
-        if not math.isfinite(message.param1):
-            return int(DENIED)
-        if message.param1 == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-            return self._obey_capabilities(message)
-        answer = self._reports.make(int(message.param1))
-        if answer is None:
-            return int(UNSUPPORTED)
-        self._send(answer)
-        return int(ACCEPTED)
-
-    def _obey_capabilities(self, _message: Message) -> int:
-        capabilities = (
-            mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-            | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-            | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-        )
-        self._send(
-            mavlink.MAVLink_autopilot_version_message(
-                capabilities, 0x01000000, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
-            )
-        )
-        return int(ACCEPTED)
-
-    def _take_parameter_request(self, message: Message) -> None:
-        names = self.parameters.names()
-        if 0 <= message.param_index < len(names):
-            self._send(self.parameters.message(names[message.param_index]))
-        elif message.param_id in self.parameters:
-            self._send(self.parameters.message(message.param_id))
-
-    def _take_parameter_list_request(self, _message: Message) -> None:
-        for name in self.parameters.names():
-            self._send(self.parameters.message(name))
-
-    def _take_parameter(self, message: Message) -> None:
-        if message.param_id in self.parameters and math.isfinite(message.param_value):
-            self.parameters.take(message.param_id, message.param_value)
-            self._send(self.parameters.message(message.param_id))
-
-    def _take_mission_request(self, message: Message) -> None:
-        self._send(
-            mavlink.MAVLink_mission_count_message(
-                message.get_srcSystem(), message.get_srcComponent(), 0
-            )
-        )
-
-    def _take_timesync(self, message: Message) -> None:
-        if message.tc1 == 0:
-            self._send(mavlink.MAVLink_timesync_message(int(self.now_s * 1e9), message.ts1))
