@@ -341,6 +341,38 @@ def test_the_clock_is_not_announced_and_every_button_has_a_name_in_words(page):
         assert page.page.get_by_label(name, exact=True).count() == 1, name
 
 
+DRAW_LOST = """async (count) => {
+  const { drawMesh, readColours } = await import("/static/draw.js");
+  const { Camera } = await import("/static/camera.js");
+  const nodes = new Map();
+  for (let id = 0; id < 254; id++)
+    nodes.set(id, { id, role: 0, on: true, colour: "off", path: [],
+      position: [id % 16, id / 16, 0] });
+  const lost = [];
+  for (let a = 0; a < 254 && lost.length < count; a++)
+    for (let b = a + 1; b < 254 && lost.length < count; b++) lost.push([a, b]);
+  const context = document.createElement("canvas").getContext("2d");
+  let alpha = null;
+  const stroke = context.stroke.bind(context);
+  context.stroke = () => {
+    if (context.getLineDash().length) alpha ??= context.globalAlpha;
+    stroke();
+  };
+  const mesh = { nodes, links: { known: [], lost, route: [] }, clock: {}, obstacles: [],
+    selected: null, group: new Set() };
+  const options = { known: true, ranges: false, covered: { top: 0, bottom: 0 } };
+  const drawn = drawMesh(context, new Camera(), mesh, readColours(), options, []);
+  return [drawn.lostLinks, alpha];
+}"""
+
+
+def test_lost_links_of_a_crowd_fade_and_only_the_shortest_are_drawn(page):
+    assert page.page.evaluate(DRAW_LOST, 40) == [40, 1]
+    drawn, alpha = page.page.evaluate(DRAW_LOST, 20_000)
+    assert drawn == 1500
+    assert alpha == pytest.approx(0.25)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", [(1400, 880), (390, 780)], ids=["desk", "phone"])
 def test_axe_finds_no_violation(start_console, visit, scheme, size):

@@ -59,6 +59,12 @@ class MasterRestartTest(unittest.TestCase):
         """What `status` finds: it needs the state's topic and the parameter of simulated time."""
         return self.run_tool("rosrun", "drone_mesh", "status").returncode == 0
 
+    def markers_are_found(self) -> bool:
+        """What rviz finds: a node that publishes them, from the states."""
+        shown = self.run_tool("rostopic", "info", "/mesh/markers").stdout
+        read = self.run_tool("rostopic", "info", "/mesh/state").stdout
+        return "* /mesh_markers" in shown and "* /mesh_markers" in read
+
     def master_answers(self) -> bool:
         return rosgraph.is_master_online(self.environment["ROS_MASTER_URI"])
 
@@ -70,6 +76,8 @@ class MasterRestartTest(unittest.TestCase):
             wait_for("a master", STARTED_WITHIN_S, self.master_answers)
             stack.enter_context(self.started(*fleet))
             wait_for("all connected", STARTED_WITHIN_S, self.all_connected)
+            stack.enter_context(self.started("rosrun", "drone_mesh", "mesh_markers"))
+            wait_for("the markers", STARTED_WITHIN_S, self.markers_are_found)
             for process in psutil.Process(first.pid).children(recursive=True):
                 process.kill()
             first.kill()
@@ -77,6 +85,7 @@ class MasterRestartTest(unittest.TestCase):
             stack.enter_context(self.started(*core))
             wait_for("a new master", STARTED_WITHIN_S, self.master_answers)
             wait_for("the state found again", FOUND_WITHIN_S, self.all_connected)
+            wait_for("the markers found again", FOUND_WITHIN_S, self.markers_are_found)
             simulated = self.run_tool("rosparam", "get", "/use_sim_time")
             self.assertEqual(simulated.stdout.strip(), "true")
             order = ("/DroneManager/requestDroneMovement", "2", "3", "3", "0")

@@ -15,6 +15,10 @@ const HULL = 0.85;
 const ROTOR_RAD_PER_S = 9; // our choice: a real one is a blur
 const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and only the selected node's are drawn
 
+const MOST_LOST = 1500; // lost links drawn: the shortest ones, as in rviz
+const CLEAR_LOST = 150; // up to so many in full colour; more of them fade, so that drones stay visible
+const FAINTEST = 0.25;
+
 /** The palette's colours in the present theme, by name. */
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
@@ -114,15 +118,10 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
       [],
     );
   }
-  drawn.lostLinks = drawLines(
-    context,
-    camera,
-    radius,
-    ends(mesh.links.lost),
-    colours["lost-link"],
-    1.5,
-    [5, 5],
-  );
+  const lost = shortest(ends(mesh.links.lost), MOST_LOST);
+  context.globalAlpha = Math.max(FAINTEST, Math.min(1, CLEAR_LOST / lost.length));
+  drawn.lostLinks = drawLines(context, camera, radius, lost, colours["lost-link"], 1.5, [5, 5]);
+  context.globalAlpha = 1;
   const width = Math.min(3, Math.max(1, radius * 0.25));
   drawn.routeLinks = drawLines(
     context,
@@ -160,6 +159,20 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
   for (const goal of goals)
     drawGoal(context, camera, mesh.nodes.get(goal.id), goal, colours, radius);
   return drawn;
+}
+
+/** At most so many of these [node, node] pairs, those that are closest to each other. */
+function shortest(pairs, most) {
+  if (pairs.length <= most) return pairs;
+  const length = ([a, b]) =>
+    a?.position && b?.position
+      ? Math.hypot(a.position[0] - b.position[0], a.position[1] - b.position[1])
+      : Infinity;
+  return pairs
+    .map((pair) => [length(pair), pair])
+    .sort((a, b) => a[0] - b[0])
+    .slice(0, most)
+    .map(([, pair]) => pair);
 }
 
 function drawGrid(context, camera, colours, { top, bottom }) {

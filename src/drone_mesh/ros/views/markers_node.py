@@ -14,6 +14,7 @@ from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.views.markers import MarkerMaker
 from drone_mesh.state.model import NodeStatus, position_is_known
 
@@ -95,4 +96,5 @@ def main() -> None:
     rospy.init_node("mesh_markers")
     show_library_logs_on_rosout()
     MeshMarkers()
+    MasterWatch().start()
     rospy.spin()
