@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 from drone_mesh.air.obstacles import Box, Obstacles
+from drone_mesh.communication.keys import KEY_BYTES, MeshKey
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 
@@ -38,6 +41,21 @@ def test_a_drone_on_the_ground_refuses_over_four_hops_with_its_reason():
     assert network.order(4, 24.0, 1.0)
     network.run_for(0.5)
     assert ends(network) == [(4, "refused", "drone 4 cannot fly: it stands on the ground")]
+
+
+@pytest.mark.parametrize("medium", [{"radio": "shared"}, {"key": MeshKey(bytes(range(KEY_BYTES)))}])
+def test_replies_and_reports_pass_a_shared_channel_and_the_seals_of_a_key(medium):
+    network = line(timing=MeshTiming(report_period_s=30.0), **medium)
+    assert network.order(3, 18.0, 6.0)
+    assert network.order(4, 24.0, 1.0)
+    network.run_for(40.0)
+    assert ends(network) == [
+        (3, "arrived", ""),
+        (4, "refused", "drone 4 cannot fly: it stands on the ground"),
+    ]
+    four = network.nodes[0].component.get_node_reports()[-1]
+    assert (four.node_id, four.report.hops, four.report.place) == (4, 4, (0.0, 24.0, 0.0))
+    assert four.why_not_fly == "it stands on the ground"
 
 
 def test_a_drone_that_flew_out_of_reach_is_given_up():
