@@ -137,17 +137,23 @@ class HopSeal:
 
         The number of challenges under way is bounded, and an answered one no longer counts.
         """
+        while self._challenges and now_s - self._oldest_s() >= CHALLENGE_AGAIN_S:
+            self._challenges.popitem(last=False)
         waiting = self._challenges.get(node)
-        if waiting is not None and now_s - waiting.sent_s < CHALLENGE_AGAIN_S:
+        if waiting is not None:
             return None
-        if waiting is None and len(self._challenges) >= WAITING_CHALLENGES:
-            if now_s - next(iter(self._challenges.values())).sent_s < CHALLENGE_OUT_S:
+        if len(self._challenges) >= WAITING_CHALLENGES:
+            if now_s - self._oldest_s() < CHALLENGE_OUT_S:
                 return None
             self._challenges.popitem(last=False)
         nonce = self._rng.getrandbits(_NONCE_BITS)
         self._challenges[node] = _Challenge(nonce, now_s)
-        self._challenges.move_to_end(node)
         return self._proven(MessageType.SEAL_CHALLENGE, node, _CHALLENGE.pack(nonce))
+
+    @property
+    def crowded(self) -> bool:
+        """Whether so many challenges wait for an answer that many are to nobody."""
+        return len(self._challenges) > WAITING_CHALLENGES // 2
 
     def answer(self, challenge: bytes) -> bytes | None:
         """The answer to a challenge; None if that is not from a node with the key."""
@@ -177,6 +183,9 @@ class HopSeal:
         self._peers[node] = _Peer(self._keys.network, self._pair_key(node), epoch, count, now_s)
         return is_new
 
+    def _oldest_s(self) -> float:
+        return next(iter(self._challenges.values())).sent_s
+
     def _begin_epoch(self) -> None:
         self._epoch = self._rng.getrandbits(_EPOCH_BITS)
         self._count = 0
@@ -201,8 +210,10 @@ class HopSeal:
         return hmac.compare_digest(proof, payload[TAG_AT:])
 
     def _proof(self, packet: bytes, other: int) -> bytes:
+        """Over all but byte 3, which differs for each receiver of a broadcast challenge."""
         key = self._pair_key(other)
-        tag = hashlib.blake2s(packet, key=key, digest_size=TAG_BYTES, person=b"epochs")
+        covered = packet[:_TO] + packet[_FORWARD:]
+        tag = hashlib.blake2s(covered, key=key, digest_size=TAG_BYTES, person=b"epochs")
         return tag.digest()
 
 

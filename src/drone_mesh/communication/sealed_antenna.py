@@ -207,8 +207,10 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
             self._challenge(from_, now_s)
 
     def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
+        if messages.addressee(challenge) != self._node_id:
+            return
         answer = self._seal.answer(challenge)
-        if answer is None or messages.receiver(challenge) != self._node_id:
+        if answer is None:
             self._complain(challenge, from_, now_s)
             return
         self._antenna.send_message_to(answer)
@@ -220,7 +222,11 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def _challenge(self, node: int, now_s: float) -> None:
         challenge = self._seal.challenge(node, now_s)
-        if challenge is not None:
+        if challenge is None:
+            return
+        if self._antenna.medium.shared and self._seal.crowded:  # no retransmissions to nobody
+            self._antenna.broadcast_message(challenge)
+        else:
             self._antenna.send_message_to(challenge)
 
     def _not_proven(self, reason: str, payload: bytes, now_s: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 import statistics
 from typing import Iterator, NamedTuple, Sequence
 
@@ -11,10 +12,10 @@ from drone_mesh.communication.keys import Keys, MeshKey
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network
-from drone_mesh.lab.attacks import ATTACKS, RECORDING, highest_bid, plausible_bid
+from drone_mesh.lab.attacks import ATTACKS, RECORDING, highest_bid, invented_ids, plausible_bid
 from drone_mesh.lab.stranger import Stranger
 
-NODES = 25
+NODES, SHARED_NODES = 25, 9
 SPACING_M = 6.0
 STRANGER = 200
 LURED_M = 50.0  # further than any repair flies here
@@ -46,14 +47,19 @@ class Damage(NamedTuple):
 def trial(name: str, case: Case, seed: int) -> Damage:
     """One attack, on a mesh without a key, with one, or by a captured node of one with a key."""
     attack = ATTACKS[name]
-    network = Network(seed, key=_keys_of if case in (Case.WITH_KEY, Case.CAPTURED) else None)
+    shared = attack is invented_ids  # where an answer to nobody costs airtime
+    radio = "shared" if shared else "disc"
+    network = Network(
+        seed, radio=radio, key=_keys_of if case in (Case.WITH_KEY, Case.CAPTURED) else None
+    )
     if attack in (highest_bid, plausible_bid):
         network.add_gateway(0, 0.0, 0.0)
         for node in (1, 2, 3):
             network.add_router(node, SPACING_M * node, 0.0)
         at = (2 * SPACING_M, 3.0)
     else:
-        network.add_fleet(1, NODES - 1, 5, SPACING_M)
+        nodes = SHARED_NODES if shared else NODES
+        network.add_fleet(1, nodes - 1, math.ceil(math.sqrt(nodes - 1)), SPACING_M)
         at = (2.0, 3.0)
     if not network.run_until(network.all_connected, within_s=60.0):
         raise MeshError(f"seed {seed}: the mesh does not connect without an attack")

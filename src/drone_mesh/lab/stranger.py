@@ -13,6 +13,7 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna
+from drone_mesh.inprocess.shared_antenna import SharedAntenna
 
 
 class Recorded(NamedTuple):
@@ -56,8 +57,7 @@ class Stranger(IMeshNetwork):
     """Records and invents packets from one place, over a radio that answers as `node_id`."""
 
     def __init__(self, network: Network, node_id: int, x: float, y: float) -> None:
-        """At (x, y) metres on the ground, with the range of every other radio on the disc."""
-        assert isinstance(network.air, InProcessAir)
+        """At (x, y) metres on the ground, with a radio like those of the network."""
         self.node_id = node_id
         self.network = network
         self.mute = False  # True: it does nothing at all
@@ -67,10 +67,13 @@ class Stranger(IMeshNetwork):
         drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda _started: None, "")
         self._receiver: IMeshNetwork = self
         self._is_inside = False
-        self.antenna: IWirelessCommunication = InProcessAntenna(
-            network.air, node_id, drone, self._hear
-        )
-        self._air = network.air
+        self._air = air = network.air
+        self.antenna: IWirelessCommunication
+        if isinstance(air, InProcessAir):
+            self.antenna = InProcessAntenna(air, node_id, drone, self._hear)
+        else:
+            rng = random.Random(f"stranger {node_id}")
+            self.antenna = SharedAntenna(air, node_id, drone, self._work, rng)
 
     def join_with(self, keys: Keys) -> None:
         """Send and receive with the keys of a captured node."""
@@ -117,6 +120,9 @@ class Stranger(IMeshNetwork):
             self.network.run_for(period_s)
 
     # IMeshNetwork ----------------------------------------------------------------------------
+
+    def _work(self, work: Callable[[float], None]) -> None:
+        work(self.network.now_s())
 
     def _hear(self, payload: bytes) -> None:
         self._receiver.on_msg(payload, self.network.now_s())
