@@ -1,6 +1,6 @@
 """FeasibleRoutes: the updates of neighbours, and which of them cannot lead in a circle.
 
-RFC 8966, sections 3.5 to 3.8: the source table and the route table of Babel, for gateways.
+RFC 8966, 3.5 to 3.8: the source table and the route table of Babel, for gateways.
 """
 
 from __future__ import annotations
