@@ -206,9 +206,8 @@ byId("find-form").addEventListener("submit", (event) => {
   byId("find").value = "";
   byId("map").focus();
 });
-byId("follow").addEventListener("click", () => {
-  map.following = !map.following;
-  byId("follow").setAttribute("aria-pressed", map.following);
+byId("follow").addEventListener("change", (event) => {
+  map.following = event.target.checked;
   map.redraw();
 });
 mesh.addEventListener("select", () => {
