@@ -121,13 +121,17 @@ export class Charts {
       context.fillText(Number(value.toPrecision(3)), LEFT_PX - 5, y(value) + 4);
     }
     context.stroke();
-    context.textAlign = "center";
     const room = context.measureText(`${end.toFixed(0)} s`).width + BETWEEN_TIMES_PX;
     const spacing = niceStep(((end - start) * room) / Math.max(width - LEFT_PX, 1) || 1);
-    let ticks = 0;
+    context.textAlign = "left";
+    let [ticks, free] = [0, 0]; // px from which on there is room
     for (let t = Math.ceil(start / spacing) * spacing; t <= end; t += spacing) {
-      context.textAlign = x(t) > width - room / 2 ? "right" : "center";
-      context.fillText(`${Number(t.toPrecision(6))} s`, Math.min(x(t), width - 1), height - 4);
+      const text = `${Number(t.toPrecision(6))} s`;
+      const wide = context.measureText(text).width;
+      const left = Math.min(x(t) - wide / 2, width - 1 - wide);
+      if (left < free) continue;
+      context.fillText(text, left, height - 4);
+      free = left + wide + BETWEEN_TIMES_PX / 2;
       ticks++;
     }
     context.canvas.dataset.ticks = ticks;

@@ -63,6 +63,9 @@ export class NodeTable {
     this.#makeHead();
     mesh.addEventListener("frame", (event) => this.#update(event.detail));
     mesh.addEventListener("select", () => this.#mark(true));
+    this.body.addEventListener("mousedown", (event) => {
+      if (event.shiftKey) event.preventDefault(); // it would select text
+    });
     this.body.addEventListener("click", (event) => this.#choose(event));
     this.body.addEventListener("keydown", (event) => this.#key(event));
   }
