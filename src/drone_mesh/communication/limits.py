@@ -4,7 +4,7 @@ from __future__ import annotations
 
 LIMIT_PERIOD_S = 10.0  # our choice: one check period
 STRANGERS = 16  # our choice: losses per period of nodes that never took a packet
-REPEATS = 8  # our choice: announcements per period that the same node is missing
+REPEATS = 64  # our choice: announcements per period of one missing node; lossy links need many
 
 
 class RateLimit:
