@@ -59,6 +59,18 @@ def test_the_past_can_be_paused_stepped_and_played_until_the_present(page):
     page.wait_for("the present", lambda: page.page.inner_text("#time-now") == "now", 20.0)
 
 
+def test_on_a_phone_the_time_line_of_the_past_fits(start_console, visit):
+    page = visit(start_console(*HASTE).url, viewport={"width": 390, "height": 844})
+    page.wait_for_drones(18)
+    page.wait_for("some time to look back at", lambda: clock_s(page) > 20.0)
+    drag_to(page, 0.0)
+    page.wait_for("the past", lambda: page.page.is_visible("#time-live"))
+    assert page.page.evaluate("document.documentElement.scrollWidth") == 390
+    box = page.page.locator("#time-live").bounding_box()
+    assert box is not None
+    assert box["x"] + box["width"] <= 390
+
+
 def test_one_page_looks_back_while_another_stays_in_the_present(start_console, visit):
     console = start_console(*HASTE)
     page, other = visit(console.url), visit(console.url)

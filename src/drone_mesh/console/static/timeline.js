@@ -66,7 +66,9 @@ export class TimeLine {
   /** The left end of the time line moves on, and with it the marks. */
   #place() {
     const { start, end } = this.mesh.timeline;
-    for (const line of byId("marks").children)
-      line.style.left = `${(100 * (Number(line.dataset.t) - start)) / (end - start || 1)}%`;
+    for (const line of byId("marks").children) {
+      const share = (Number(line.dataset.t) - start) / (end - start || 1);
+      line.style.left = `${100 * Math.min(1, Math.max(0, share))}%`;
+    }
   }
 }
