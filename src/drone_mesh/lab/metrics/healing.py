@@ -143,7 +143,7 @@ def outage_p95_s(run: RunRecord) -> float:
     return lengths[math.ceil(0.95 * len(lengths)) - 1] if lengths else 0.0
 
 
-@metric("s", "the longest of them", better="less")
+@metric("s", "length of the longest of these outages", better="less")
 def outage_max_s(run: RunRecord) -> float:
     return max(_outage_lengths(run), default=0.0)
 

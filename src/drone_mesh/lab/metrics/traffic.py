@@ -31,7 +31,9 @@ def payload_bytes(run: RunRecord) -> float:
     return 32.0 * packets(run)
 
 
-@metric("share", "time with frames on the air, those at one time added; shared radio only")
+@metric(
+    "share", "airtime of all frames per time, overlapping frames each counted; shared radio only"
+)
 def air_load(run: RunRecord) -> float:
     return NAN if run.airtime_s is None else run.airtime_s / run.end_s
 
