@@ -98,6 +98,7 @@ def grid(nodes, seed=1):
     return mesh
 
 
+@pytest.mark.slow
 def test_26_nodes_on_one_channel_connect_and_stay_connected():
     mesh = grid(26)
     assert mesh.run_until(mesh.all_connected, within_s=12.0)
@@ -111,6 +112,7 @@ def test_26_nodes_on_one_channel_connect_and_stay_connected():
     mesh.stop()
 
 
+@pytest.mark.slow
 def test_the_fast_model_agrees_with_the_chips():
     """A minute of 26 nodes, three seeds; `python3 -m drone_mesh.lab.air_validation` shows more."""
     chips, model = Counter(), Counter()

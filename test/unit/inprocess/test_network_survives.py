@@ -104,7 +104,10 @@ def survive(seed):
     return happened
 
 
-@pytest.mark.parametrize("first_seed", range(0, 1000, 100))
+@pytest.mark.parametrize(
+    "first_seed",
+    [0, *(pytest.param(first, marks=pytest.mark.slow) for first in range(100, 1000, 100))],
+)
 def test_a_hundred_kill_sequences_end_without_a_deadlock_and_without_circling_packets(first_seed):
     """Kills among few nodes, also in the middle of a negotiation, with loss and jitter."""
     happened = sum((survive(seed) for seed in range(first_seed, first_seed + 100)), Counter())

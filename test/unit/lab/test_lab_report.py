@@ -49,6 +49,7 @@ def test_the_page_needs_nothing_but_itself(results_folder: Path) -> None:
     assert "connection_lost_after_s" in page
 
 
+@pytest.mark.slow
 def test_the_same_rows_give_the_same_page(results_folder: Path, tmp_path: Path) -> None:
     pages = []
     for name in ("a", "b"):
@@ -58,6 +59,7 @@ def test_the_same_rows_give_the_same_page(results_folder: Path, tmp_path: Path) 
     assert pages[0] == pages[1]
 
 
+@pytest.mark.slow
 def test_every_figure_and_table_is_exported(results_folder: Path) -> None:
     formats = [word for kind in ("png", "pdf", "csv", "latex") for word in ("--export", kind)]
     assert main(["report", str(results_folder), *formats]) == 0
@@ -122,6 +124,7 @@ def test_compare_names_what_is_wrong(
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_page_about_one_run_can_be_written(results_folder: Path, tmp_path: Path) -> None:
     run = next(csv.DictReader((results_folder / "runs.csv").open()))["run"]
     page = tmp_path / "run.html"

@@ -113,6 +113,7 @@ class FlyingMesh(EmulatedMesh):
         node.start()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [ARDUPILOT, PX4], ids=lambda a: a.name)
 def test_layout_202_without_node_1_is_repaired_by_drones_that_really_fly(kind: Autopilot) -> None:
     mesh = FlyingMesh(kind, seed=3)
