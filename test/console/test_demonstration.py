@@ -58,4 +58,4 @@ def test_a_fleet_that_is_too_small_is_told_so(start_console, visit):
     page = visit(start_console("--routers", "4", *HASTE).url)
     page.wait_for_drones(5)
     page.page.click("#demonstrate")
-    wait_for_sentence(page, "a repair takes a gateway and 5 routers to show")
+    wait_for_sentence(page, "this demonstration needs a gateway and 5 routers")

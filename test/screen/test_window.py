@@ -123,7 +123,7 @@ def test_q_closes_the_window_and_the_simulation_hears_of_it(screen, window, capl
     caplog.set_level(logging.INFO)
     wait_until_shown(screen)
     press(screen, "q")
-    wait_until(lambda: "window was closed; the simulation goes on" in caplog.text, "closed")
+    wait_until(lambda: "window was closed; the simulation continues" in caplog.text, "closed")
 
 
 @needs_screen

@@ -102,7 +102,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--key-file",
         type=Path,
         metavar="FILE",
-        help="in process: seal all packets with this mesh key (for the other half: "
+        help="seal all packets of the runs in process with this mesh key (over ROS: "
         "--launch key:=FILE)",
     )
     parser.add_argument(

@@ -160,7 +160,7 @@ def _choose_cast(mesh: MeshStatus) -> tuple[int, list[int]]:
     gateways = [n.id for n in mesh.nodes if n.role == Role.GATEWAY and position_is_known(n)]
     routers = [n.id for n in mesh.nodes if n.role == Role.ROUTER and position_is_known(n)]
     if not gateways or len(routers) < len(_PLACES):
-        raise OrderRefused(f"a repair takes a gateway and {len(_PLACES)} routers to show")
+        raise OrderRefused(f"this demonstration needs a gateway and {len(_PLACES)} routers")
     return gateways[0], routers[: len(_PLACES)]
 
 

@@ -78,12 +78,12 @@ class GatewayControls:
 
     def power(self, node: int, on: bool) -> str:
         """Refused."""
-        raise OrderRefused("a real node is switched at its battery")
+        raise OrderRefused("a real node can only be switched at its battery")
 
     def layout(self, case: int) -> str:
         """Refused."""
-        raise OrderRefused("layouts are for the simulation")
+        raise OrderRefused("layouts exist only in the simulation")
 
     def speed(self, paused: bool, factor: float) -> str:
         """Refused."""
-        raise OrderRefused("real time has one speed")
+        raise OrderRefused("the speed of a real mesh cannot be changed")

@@ -70,15 +70,23 @@ def main(
     """Run until Ctrl-C or SIGTERM; the exit status."""
     parser = argparse.ArgumentParser(
         "drone_mesh_console",
-        description="The web console of a real mesh: shows what its gateway knows, and orders "
-        f"drones through it. {GATEWAY_TOKEN}: the gateway's token, if it has one; {PAGE_TOKEN}: "
-        "that of the page (default with --bind: a random one, which is printed).",
+        description="Serves the web console of a real mesh: it shows the state that the gateway "
+        "reports, and sends orders to drones through the gateway.",
+        epilog=f"Environment: {GATEWAY_TOKEN}, the token of the gateway, if it needs one; "
+        f"{PAGE_TOKEN}, the token of the page (default with --bind: a random one, which is "
+        "printed).",
     )
     parser.add_argument(
-        "--gateway", required=True, metavar="URL", help="of the gateway, as in http://pi:9080"
+        "--gateway",
+        required=True,
+        metavar="URL",
+        help="address of the gateway, as in http://pi:9080",
     )
     parser.add_argument(
-        "--bind", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)"
+        "--bind",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="address to listen on (default: %(default)s)",
     )
     parser.add_argument(
         "--port", type=int, default=8080, help="TCP port (default: %(default)s; 0: any free one)"

@@ -47,7 +47,7 @@ class Stage:
                 mesh = self._store.mesh
                 if mesh is not None and mesh is not shown:
                     if shown is not None and mesh.stamp_s < shown.stamp_s:
-                        raise OrderRefused("the simulation started again")
+                        raise OrderRefused("the simulation was restarted")
                     shown = mesh
                     orders = demonstration.advance(mesh)
                     self._store.set_story(describe(story, mesh, running=True))

@@ -68,5 +68,5 @@ def _own_engine(node_id: int, name: str) -> IDroneEngine:
     except (ImportError, AttributeError, TypeError, ValueError) as error:
         raise ConfigurationError(f"--drone {name} cannot be created: {error}") from error
     if not isinstance(engine, IDroneEngine):
-        raise ConfigurationError(f"--drone {name} is not an IDroneEngine")
+        raise ConfigurationError(f"--drone {name} does not implement IDroneEngine")
     return engine

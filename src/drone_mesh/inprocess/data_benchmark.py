@@ -149,10 +149,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "time: rates, hops, flows, lost frames.",
     )
     parser.add_argument(
-        "--messages", type=int, default=40, help="of 1024 bytes, in each case (default 40)"
+        "--messages",
+        type=int,
+        default=40,
+        help="number of messages of 1024 bytes in each case (default 40)",
     )
     parser.add_argument("--seed", type=int, default=1, help="(default 1)")
-    parser.add_argument("--hops", type=int, help="only the cases with so many hops")
+    parser.add_argument("--hops", type=int, help="run only the cases with this number of hops")
     parsed = parser.parse_args(arguments)
     print("| rate | hops | flows | frames lost | messages | kbit/s | of the bound | delivered |")
     print("|---|---|---|---|---|---|---|---|")

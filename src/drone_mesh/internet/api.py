@@ -34,7 +34,8 @@ Coordinate = Annotated[
     Path(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False, description="Metres."),
 ]
 Height = Annotated[
-    int, Path(ge=0, le=int(MAX_HEIGHT_M), description="Of the drone's underside, whole metres.")
+    int,
+    Path(ge=0, le=int(MAX_HEIGHT_M), description="Height of the drone's underside, whole metres."),
 ]
 
 
@@ -74,7 +75,9 @@ class EarthGoal(BaseModel, extra="forbid"):
 
     latitude_deg: Number = Field(ge=-90, le=90, allow_inf_nan=False)
     longitude_deg: Number = Field(ge=-180, le=180, allow_inf_nan=False)
-    altitude_m: Number = Field(allow_inf_nan=False, description="above sea level, as the origin's")
+    altitude_m: Number = Field(
+        allow_inf_nan=False, description="metres above sea level, as in the origin"
+    )
 
 
 class OrderSent(BaseModel):
@@ -97,7 +100,7 @@ class NodeReport(BaseModel):
 
     id: int
     next_hop: Optional[int] = Field(description="The neighbour that leads to it; null: no route.")
-    hops: Optional[int] = Field(description="As its last heartbeat said; null: none came.")
+    hops: Optional[int] = Field(description="From its last heartbeat; null: none came.")
     heard_s_ago: Optional[float] = Field(description="Seconds since it was heard; null: never.")
 
 

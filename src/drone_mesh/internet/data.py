@@ -64,7 +64,7 @@ def add_data_requests(
         port: Port = 0,
         reliable: bool = True,
         wait: Annotated[
-            float, Query(ge=0, le=LONGEST_WAIT_S, description="Seconds, for the delivery.")
+            float, Query(ge=0, le=LONGEST_WAIT_S, description="Seconds to wait for the delivery.")
         ] = 0.0,
     ) -> DataSent:
         """Send the body, up to 1024 bytes, to a node. 504: it did not arrive within `wait`."""
@@ -89,7 +89,9 @@ def add_data_requests(
         response_class=Response,
     )
     async def data(
-        port: Annotated[Optional[int], Query(ge=0, le=255, description="Only this one.")] = None,
+        port: Annotated[
+            Optional[int], Query(ge=0, le=255, description="Only messages for this port.")
+        ] = None,
     ) -> Response:
         """The messages that the gateway receives from now on, as server-sent events.
 

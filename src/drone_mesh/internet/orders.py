@@ -32,7 +32,7 @@ class OrderReport(BaseModel):
     longitude: float = Field(description="x, metres")
     height: int = Field(description="metres")
     state: OrderState
-    reason: str = Field(description="Of a refusal, or why it was given up; else empty.")
+    reason: str = Field(description="Why it was refused or given up; otherwise empty.")
     ordered_s_ago: float
     changed_s_ago: float = Field(description="Seconds in this state.")
 

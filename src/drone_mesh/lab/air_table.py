@@ -150,7 +150,8 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="drone_mesh.lab.air_table",
         description="Runs meshes on one shared channel and compares them with the aims. Prints a "
-        "table in Markdown, the worst seed of each row. The exit status is 1 if an aim is missed.",
+        "table in Markdown with the worst seed of each row. The exit status is 1 if an aim is "
+        "missed.",
     )
     parser.add_argument(
         "--radio",
@@ -162,11 +163,11 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--quick", action="store_true", help="26 and 50 nodes, one seed, one minute: for CI"
     )
-    parser.add_argument("--seeds", type=int, help=f"per row (default {SEEDS})")
+    parser.add_argument("--seeds", type=int, help=f"number of seeds per row (default {SEEDS})")
     parser.add_argument(
         "--seconds",
         type=float,
-        help=f"to watch after all are connected (default {AFTER_S:g})",
+        help=f"simulated time to observe after all are connected (default {AFTER_S:g})",
     )
     parser.add_argument(
         "--row", action="append", default=[], help="only rows whose name contains this; repeatable"

@@ -82,13 +82,15 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--links", nargs="+", choices=LINKS, default=LINKS)
     seeds = ", ".join(f"{count} for {nodes} nodes" for nodes, count in SEEDS.items())
     parser.add_argument(
-        "--seeds", type=int, help=f"per row (default {seeds}, else {SEEDS_OF_OTHERS})"
+        "--seeds",
+        type=int,
+        help=f"number of seeds per row (default {seeds}, else {SEEDS_OF_OTHERS})",
     )
     parser.add_argument(
         "--seconds",
         type=float,
         default=AFTER_S,
-        help="to watch after all are connected (default %(default)g)",
+        help="simulated time to observe after all are connected (default %(default)g)",
     )
     arguments = parser.parse_args(argv)
     if arguments.seeds is not None and arguments.seeds < 1:

@@ -75,7 +75,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--cluster", metavar="ADDRESS", help="a dask scheduler (tcp://host:8786), or slurm"
     )
-    run.add_argument("--shard", type=_shard, metavar="I/N", help="each N-th run, from the I-th on")
+    run.add_argument(
+        "--shard", type=_shard, metavar="I/N", help="execute every N-th run, starting with the I-th"
+    )
     run.add_argument("--out", type=Path, help="results folder (default: results/NAME)")
     run.add_argument("--retry-failed", action="store_true", help="run failed runs again")
     run.set_defaults(run=_run)
@@ -112,7 +114,9 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     show.add_argument("--port", type=int, default=9081, help="port for --console (default 9081)")
     show.set_defaults(run=_show)
 
-    compare = commands.add_parser("compare", help="paired difference of two cells, per seed")
+    compare = commands.add_parser(
+        "compare", help="show the paired differences of two cells, seed by seed"
+    )
     compare.add_argument("results", type=Path)
     compare.add_argument("a", metavar="A", help="a cell: axis=value[,axis=value...]")
     compare.add_argument("b", metavar="B", help="the other cell")
@@ -130,14 +134,20 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     attack.add_argument(
         "attacks", nargs="*", metavar="ATTACK", help=f"of: {', '.join(ATTACKS)} (default: all)"
     )
-    attack.add_argument("--runs", type=_count, default=12, metavar="N", help="seeds (default: 12)")
+    attack.add_argument(
+        "--runs", type=_count, default=12, metavar="N", help="number of seeds (default: 12)"
+    )
     attack.set_defaults(run=_attack)
 
     fuzzing = commands.add_parser(
-        "fuzz", help="let a small mesh hear mutated packets, without and with a key"
+        "fuzz", help="send mutated packets to a small mesh, without and with a key"
     )
     fuzzing.add_argument(
-        "--packets", type=_count, default=1_000_000, metavar="N", help="(default: %(default)s)"
+        "--packets",
+        type=_count,
+        default=1_000_000,
+        metavar="N",
+        help="number of packets (default: %(default)s)",
     )
     fuzzing.add_argument("--seed", type=int, default=1, help="(default: %(default)s)")
     fuzzing.set_defaults(run=_fuzz)
@@ -156,7 +166,8 @@ def _add_experiment(parser: argparse.ArgumentParser) -> None:
 def _add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=_count, default=len(os.sched_getaffinity(0)), metavar="N",
-        help="processes; 0: in this one, for a debugger (default: one per core, %(default)s)",
+        help="number of processes; 0: run in this one, for a debugger (default: one per core, "
+        "%(default)s)",
     )  # fmt: skip
 
 

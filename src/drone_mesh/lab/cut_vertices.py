@@ -52,12 +52,14 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="drone_mesh.lab.cut_vertices",
         description="Kills every cut vertex of random layouts once and prints how far the drones "
-        "fly: total / longest / drones that moved, means, distances in units of the range. Beside "
-        "it what ideal information allows, if all drones may move, and if only those that are cut "
-        "off from the gateway do, as here.",
+        "fly: total / longest / drones that moved, as means, with distances in units of the range. "
+        "For comparison it prints the same for ideal information, if all drones may move, and if "
+        "only the drones cut off from the gateway move, as they do here.",
     )
     parser.add_argument("--drones", type=int, nargs="+", default=[20, 50, 100], choices=LAYOUTS)
-    parser.add_argument("--layouts", type=int, help="per number of drones (40, 20 and 8)")
+    parser.add_argument(
+        "--layouts", type=int, help="number of layouts per number of drones (default: 40, 20 and 8)"
+    )
     parser.add_argument("--repair", nargs="+", default=list(IDEAL), choices=IDEAL)
     options = parser.parse_args(argv)
     print("| drones | cut vertices | repair | ideal, all move | ideal, cut-off drones move | runs "

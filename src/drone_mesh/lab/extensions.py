@@ -35,7 +35,7 @@ def check_technique(kind: str, name: str, model: str) -> None:
 
         if name not in IDEAL_RULES:
             known = ", ".join(sorted(IDEAL_RULES))
-            raise ConfigurationError(f"no rule {name!r} for model ideal: use one of {known}")
+            raise ConfigurationError(f"unknown rule {name!r} for model ideal: use one of {known}")
         return
     network = Network(**{kind: name})  # type: ignore[arg-type]
     network.add_gateway(0, 0.0, 0.0)

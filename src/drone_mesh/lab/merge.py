@@ -28,7 +28,7 @@ def merge(into: Path, shards: Sequence[Path]) -> int:
             raise StoreError(f"{shard}: no {PROVENANCE} there, so it is not a results folder")
     digests = {found[-1]["experiment_hash"] for found in sessions}
     if len(digests) > 1:
-        raise StoreError("these shards are of different experiments: their files differ")
+        raise StoreError("these shards belong to different experiments: their files differ")
     overrides = list(sessions[0][-1].get("overrides", ()))
     folder = Path(sessions[0][-1]["folder"])
     plan = Plan(load_experiment(shards[0] / EXPERIMENT, overrides, folder))

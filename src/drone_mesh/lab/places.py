@@ -144,7 +144,7 @@ def _moved_out(
         fresh = draw(layout, range_m, rng.random)
         for index in inside:
             points[index] = fresh[index]
-    raise ConfigurationError(f"layout {layout.kind}: the boxes leave no place for the drones")
+    raise ConfigurationError(f"layout {layout.kind}: the boxes leave no room for the drones")
 
 
 def _graph(points: list[tuple[float, float]], range_m: float, obstacles: Obstacles | None) -> Graph:

@@ -29,7 +29,7 @@ def write_report(folder: Path, out: Path | None, formats: Sequence[str]) -> list
     """Write the page and the exports; returns what was written. Raises MeshError."""
     results = load_results(folder)
     if not results.rows:
-        raise ReportError(f"{folder}: no run is done yet")
+        raise ReportError(f"{folder}: no run is finished yet")
     tables = [
         table
         for table in (

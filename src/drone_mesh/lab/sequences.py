@@ -77,9 +77,9 @@ def summary(rows: list[Outcome], repair: str) -> str:
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="drone_mesh.lab.sequences",
-        description="Runs random meshes of 8..60 nodes through random misfortunes under a virtual "
+        description="Runs random meshes of 8..60 nodes through random faults under a virtual "
         "clock: cut vertices and shares of nodes are killed, also in negotiations and in flight, "
-        "and the gateway is switched off and moved. Prints what the repair did about it.",
+        "and the gateway is switched off and moved. Prints how the repair handled them.",
     )
     parser.add_argument("--runs", type=int, default=100, help="number of sequences (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")

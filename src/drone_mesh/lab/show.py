@@ -33,7 +33,7 @@ def replay(results: Results, beginning: str) -> Replay:
     spec = planned.spec
     scenario = scenario_of(spec.scenario)
     if scenario.model == "ideal":
-        raise ConfigurationError(f"run {spec.run} is of model ideal: it has no events to show")
+        raise ConfigurationError(f"run {spec.run} uses model ideal, which has no events to show")
     simulation = Simulation(scenario, Streams(spec.seed, spec.repetition))
     states: list[MeshStatus] = []
     record = simulation.run(states.append)

@@ -56,7 +56,7 @@ def write_template(name: str) -> Path:
         with path.open("x", encoding="utf-8") as file:
             file.write(TEMPLATE.format(name=name, file=path))
     except FileExistsError:
-        raise ConfigurationError(f"{path} exists; it was not touched") from None
+        raise ConfigurationError(f"{path} already exists; it was not changed") from None
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror}") from error
     return path

@@ -33,7 +33,7 @@ def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
         "--emulated-air",
         metavar="[HOST:]PORT",
         help="without hardware: this node's radio is on the emulated air that another process "
-        "serves there; its place is that of --latitude and --longitude, or one in columns by id",
+        "serves there; the node stands at --latitude and --longitude, by default in columns by id",
     )
     if gateway:
         node.add_argument(

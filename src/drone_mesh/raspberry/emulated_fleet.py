@@ -48,7 +48,7 @@ def add_fleet_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="HOST:PORT",
-        help="with --drones: send what the vehicles report there too, for QGroundControl or "
+        help="with --drones: also send the reports of the vehicles there, for QGroundControl or "
         "MAVProxy; may be given several times",
     )
 

@@ -54,10 +54,12 @@ def add_http_options(http: argparse._ArgumentGroup) -> None:
         "--name",
         action="append",
         default=[],
-        help="another name by which clients ask for this machine; may be given several times",
+        help="another name by which clients address this machine; may be given several times",
     )
     http.add_argument("--cert", metavar="FILE", type=Path, help="certificate (PEM), for HTTPS")
-    http.add_argument("--key", metavar="FILE", type=Path, help="its private key (PEM)")
+    http.add_argument(
+        "--key", metavar="FILE", type=Path, help="private key of the certificate (PEM)"
+    )
 
 
 def http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> HttpOptions:

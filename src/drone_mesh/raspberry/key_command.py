@@ -25,11 +25,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     new = commands.add_parser(
-        "new", help="make a new mesh key: for all gateways, and for routers that are never captured"
+        "new", help="make a new mesh key, for gateways and for routers that cannot be captured"
     )
     new.add_argument("file", type=Path, help="file to make; it must not exist")
     node = commands.add_parser(
-        "node", help="make the keys of one router, with which it cannot give orders to others"
+        "node", help="make the keys of one router; they do not allow it to give orders to others"
     )
     node.add_argument("mesh_key", type=Path, help="file with the mesh key")
     node.add_argument("id", type=whole(0, MAX_NODE_ID), help="node id of the router, 0..253")

@@ -157,23 +157,23 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         default=0.0,
         metavar="METRES",
-        help=f"without hardware: an emulated radio, and node {PARTNER_ID} at this distance",
+        help=f"without hardware: use an emulated radio, with node {PARTNER_ID} at this distance",
     )
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
-    tools.add_parser("check", help="wiring, SPI, CE, supply, IRQ")
-    scan = tools.add_parser("scan", help="the 126 channels as bars, and the quietest ones")
+    tools.add_parser("check", help="test wiring, SPI, CE, supply and IRQ")
+    scan = tools.add_parser("scan", help="show the 126 channels as bars, and the quietest ones")
     scan.add_argument("--rounds", type=whole(1, 10_000), default=100, help="(default: %(default)s)")
-    reach = tools.add_parser("range", help="loss at each power to a running node, as CSV")
+    reach = tools.add_parser("range", help="measure the loss to a node at each power, as CSV")
     reach.add_argument("--to", type=whole(0, MAX_NODE_ID), required=True, help="id of that node")
     reach.add_argument(
         "--packets", type=whole(1, 100_000), default=1000, help="(default: %(default)s)"
     )
-    reach.add_argument("--distance", type=float, help="metres, to compare with 2019")
-    ear = tools.add_parser("listen", help="packets to all nodes, and to --id, decoded")
+    reach.add_argument("--distance", type=float, help="metres, to compare with the figures of 2019")
+    ear = tools.add_parser("listen", help="print packets to all nodes and to --id, decoded")
     ear.add_argument("--seconds", type=float, default=float("inf"), help="(default: until Ctrl-C)")
     ear.add_argument(
         "--pcapng", type=Path, metavar="FILE", help="also write what arrives to FILE, for Wireshark"
     )
-    report = tools.add_parser("report", help="check and scan into one file, to send to us")
+    report = tools.add_parser("report", help="write check and scan to one file, to send to us")
     report.add_argument("file", type=Path)
     return parser

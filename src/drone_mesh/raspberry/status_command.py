@@ -21,10 +21,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print it; the exit status is 1 if it cannot be had."""
     parser = argparse.ArgumentParser(
         "raspberry_status",
-        description=f"Prints the status of a gateway. {TOKEN_VARIABLE}: its token, if it has one.",
+        description="Prints the status of a gateway.",
+        epilog=f"Environment: {TOKEN_VARIABLE}, the token of the gateway, if it needs one.",
     )
     parser.add_argument(
-        "url", nargs="?", default=f"http://127.0.0.1:{DEFAULT_PORT}", help="(default: %(default)s)"
+        "url",
+        nargs="?",
+        default=f"http://127.0.0.1:{DEFAULT_PORT}",
+        help="address of the gateway (default: %(default)s)",
     )
     url = parser.parse_args(arguments).url.rstrip("/")
     request = urllib.request.Request(f"{url}/status")

@@ -23,11 +23,13 @@ def parser_for(command: str, description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         command,
         description=description,
-        epilog="Without --node: the only node that runs here, or the one of the environment "
-        f"variable {NODE_VARIABLE}.",
+        epilog="Without --node, the command uses the node given in the environment variable "
+        f"{NODE_VARIABLE}, or else the only node that runs here.",
     )
-    parser.add_argument("--node", type=node_id, help="id of the node of this machine to use")
-    parser.add_argument("--socket", type=Path, metavar="PATH", help="its socket, if elsewhere")
+    parser.add_argument("--node", type=node_id, help="id of the node on this machine to use")
+    parser.add_argument(
+        "--socket", type=Path, metavar="PATH", help="socket of the node, if not the usual one"
+    )
     return parser
 
 
@@ -66,7 +68,7 @@ def client(parsed: argparse.Namespace) -> LocalClient:
     if not found:
         raise MeshError(
             f"no node runs here (no socket in {socket_folder()}): start raspberry_router or "
-            "raspberry_gateway, for a try with --emulated 7"
+            "raspberry_gateway (without hardware: raspberry_gateway --emulated 7)"
         )
     ids = ", ".join(node_of(path) for path in found)
     raise MeshError(f"several nodes run here ({ids}): choose one with --node")

@@ -12,10 +12,14 @@ from drone_mesh.users import command_line
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the messages that arrive, one line each, until Ctrl-C."""
     parser = command_line.parser_for("mesh_listen", "Prints the messages that a node receives.")
-    parser.add_argument("--port", type=command_line.port, help="only those for this port")
-    parser.add_argument("--count", type=int, default=0, help="end after so many messages")
+    parser.add_argument("--port", type=command_line.port, help="print only messages for this port")
     parser.add_argument(
-        "--json", action="store_true", help="one JSON object per line, the payload in hex"
+        "--count", type=int, default=0, help="number of messages to print (default: until Ctrl-C)"
+    )
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print one JSON object per line, with the payload in hex",
     )
     parsed = parser.parse_args(arguments)
 

@@ -78,7 +78,9 @@ def local_socket(desk: UsersDesk) -> LocalSocket | None:
     try:
         return LocalSocket(desk, socket_path(desk.node_id))
     except ConfigurationError as error:
-        _log.warning("node %d: no mesh_ping and the like: %s", desk.node_id, error)
+        _log.warning(
+            "node %d: mesh_ping, mesh_send and the like cannot reach it: %s", desk.node_id, error
+        )
         return None
 
 
@@ -145,7 +147,7 @@ class _Client(socketserver.StreamRequestHandler):
         elif what == "listen":
             self._listen(request.get("port"))
         else:
-            raise ValueError(f"unknown: {what}")
+            raise ValueError(f"unknown request: {what}")
 
     def _wait(self, wait: Any, seconds: float) -> bool:
         """Wait in steps, so that the end of the node ends it."""

@@ -12,11 +12,11 @@ from drone_mesh.users.local_client import LocalClient, Refused
 def main(arguments: Sequence[str] | None = None) -> int:
     """Ask a node for echoes; the exit status is 1 if none came."""
     parser = command_line.parser_for(
-        "mesh_ping", "Asks a node for echoes: round trip, hops and loss."
+        "mesh_ping", "Sends echo requests to a node and prints round trip, hops and loss."
     )
-    parser.add_argument("id", type=command_line.node_id, help="the node to ask")
+    parser.add_argument("id", type=command_line.node_id, help="id of the node that answers")
     parser.add_argument(
-        "-c", "--count", type=int, default=0, help="so many times; else until Ctrl-C"
+        "-c", "--count", type=int, default=0, help="number of requests (default: until Ctrl-C)"
     )
     parser.add_argument(
         "-i",
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         type=float,
         default=1.0,
         metavar="SECONDS",
-        help="(default: %(default)g)",
+        help="time between two requests (default: %(default)g)",
     )
     parser.add_argument(
         "-W",
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         type=float,
         default=5.0,
         metavar="SECONDS",
-        help="for an answer (default: %(default)g)",
+        help="time to wait for an answer (default: %(default)g)",
     )
     parsed = parser.parse_args(arguments)
     round_trips_s: list[float] = []

@@ -17,20 +17,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "to", type=command_line.destination, metavar="TO", help='node id, "gateway" or "all"'
     )
     parser.add_argument(
-        "text", nargs="?", help="the message; without it, what comes on standard input"
+        "text", nargs="?", help="the message (default: the bytes on standard input)"
     )
     parser.add_argument(
-        "--port", type=command_line.port, default=0, help="0..255 (default: %(default)s)"
+        "--port",
+        type=command_line.port,
+        default=0,
+        help="port of the receiver, 0..255 (default: %(default)s)",
     )
     parser.add_argument(
-        "--no-ack", action="store_true", help="send it once, and wait for no acknowledgement"
+        "--no-ack", action="store_true", help="send the message once, without acknowledgement"
     )
     parser.add_argument(
         "--wait",
         type=float,
         default=30.0,
         metavar="SECONDS",
-        help="for the delivery; 0: not at all. The node goes on trying (default: %(default)g)",
+        help="time to wait for the delivery; 0: do not wait. The node keeps trying after that time "
+        "(default: %(default)g)",
     )
     parsed = parser.parse_args(arguments)
 

@@ -17,7 +17,7 @@ SIZE = (1280, 800)  # pixels
 HELP = (
     "Mouse:  Ctrl + left button turns,  Ctrl + middle button moves,  wheel zooms",
     "Keys:   F all in view    T from above    arrows turn and tilt    + - zoom",
-    "        L ids    N known links    H this help    Q close (the simulation goes on)",
+    "        L ids    N known links    H this help    Q close (the simulation continues)",
     "Ground: squares of 2 m",
 )
 LINK_PIXELS = {LinkUse.KNOWN: 1.0, LinkUse.LOST: 1.0, LinkUse.ROUTE: 3.0}

@@ -103,10 +103,10 @@ class WindowProcess:
         if self._stopped.is_set():
             return
         if process.returncode == 0:
-            _log.info("the world's window was closed; the simulation goes on")
+            _log.info("the world's window was closed; the simulation continues")
         else:
             _log.warning(
-                "the world's window failed with exit code %s; the simulation goes on",
+                "the world's window failed with exit code %s; the simulation continues",
                 process.returncode,
             )
 

@@ -89,5 +89,5 @@ def test_a_strategy_that_never_flies_ends_it_with_the_reason():
 
 def test_four_routers_are_too_few():
     fleet, demonstration = Fleet(routers=4), RepairDemonstration()
-    with pytest.raises(OrderRefused, match="a repair takes a gateway and 5 routers"):
+    with pytest.raises(OrderRefused, match="this demonstration needs a gateway and 5 routers"):
         fleet.watch(demonstration)

@@ -120,7 +120,7 @@ def test_two_programs_cannot_serve_the_same_node_and_the_second_goes_on_without(
     with pytest.raises(ConfigurationError, match="another program runs a node of this id"):
         LocalSocket(rig.desks[0], socket_path(0))
     assert local_socket(rig.desks[0]) is None
-    assert "node 0: no mesh_ping and the like" in caplog.text
+    assert "node 0: mesh_ping, mesh_send and the like cannot reach it" in caplog.text
 
 
 def test_a_socket_that_a_dead_program_left_is_replaced(rig, tmp_path):

@@ -87,7 +87,7 @@ class AirServer:
             elif opcode == Opcode.JOIN_CHIP:
                 self._serve_irq(connection, data)
         except (OSError, KeyError, ValueError, struct.error) as error:
-            _log.debug("emulated air: a connection ends: %s", error)
+            _log.debug("emulated air: a connection ended: %s", error)
         finally:
             connection.close()
             with self._lock:
@@ -131,7 +131,7 @@ def _carry_out(chip: EmulatedChip, opcode: int, data: bytes) -> bytes:
     """Raises ValueError or struct.error for an invalid request."""
     if opcode == Opcode.TRANSFER:
         if not data:
-            raise ValueError("a transfer of no bytes")
+            raise ValueError("invalid transfer: must have at least one byte")
         return bytes(chip.spi.xfer2(data))
     if opcode == Opcode.SET_CE:
         chip.ce.value = data == b"\1"

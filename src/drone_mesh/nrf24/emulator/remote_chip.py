@@ -67,7 +67,7 @@ class RemoteChip:
         """Whether IRQ is low within this time, or within a second. OSError as for `request`."""
         with self._irq_lock:
             if self._closed:
-                raise ConnectionError("the chip was given back")
+                raise ConnectionError("this chip was released")
             if self._irq_connection is None or self._irq_number != self._number:
                 self._join()
             assert self._irq_connection is not None

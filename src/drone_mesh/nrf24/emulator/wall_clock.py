@@ -85,7 +85,7 @@ class WallClock(EmulatorClock):
             try:
                 event(*arguments)
             except Exception:
-                logger.exception("an event of the emulated air failed; the air goes on")
+                logger.exception("an event of the emulated air failed; the emulation continues")
 
     def _run(self) -> None:
         with self._lock:

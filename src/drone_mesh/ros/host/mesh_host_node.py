@@ -64,7 +64,9 @@ def _obstacles_of(fleet: FactoryConfiguration) -> Obstacles | None:
     try:
         return configured_obstacles(fleet)
     except ConfigurationError as error:
-        _log.warning("%s; the world refuses orders into obstacles, the nodes do not", error)
+        _log.warning(
+            "%s; orders into obstacles are refused by the world only, not by these nodes", error
+        )
         return None
 
 

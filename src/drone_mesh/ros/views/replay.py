@@ -39,8 +39,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh replay",
         description="Play a recorded run as if it ran now, for rviz, the console and your own "
-        "nodes. The recorded clock is left out, since rosbag makes one: with both, time would run "
-        "backwards.",
+        "nodes. The recorded clock is skipped, because rosbag publishes its own: with both, time "
+        "would jump backwards.",
         epilog="The space bar pauses. Exit code: 2 unusable bag or no free master, otherwise that "
         "of rosbag play.",
     )

@@ -60,7 +60,7 @@ class FactoryParameters:
 def _check_emulated_radio(configuration: FactoryConfiguration, hosts: int) -> None:
     if configuration.obstacles:
         raise ConfigurationError(
-            "argument: obstacles need radio virtual: the emulated chips see no boxes"
+            "argument: obstacles need radio virtual: the emulated chips ignore boxes"
         )
     if hosts != 1:
         raise ConfigurationError(
