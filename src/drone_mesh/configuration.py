@@ -57,7 +57,7 @@ class FactoryConfiguration:
     )
     max_distance: float = Field(MAX_DISTANCE_M, gt=0, le=10_000, description="metres")
     obstacles: str = Field("", description="the absolute path of a file of boxes, or empty")
-    # block: a box between two nodes ends their link; wall: it damps, by its material
+    # block: a box between two nodes ends their link; wall: it attenuates, by its material
     obstacle_radio: Literal["block", "wall"] = Field("block")
     radio: Literal["virtual", "nrf24"] = Field("virtual")  # nrf24: the driver on emulated chips
     data_rate: Literal["250k", "1M", "2M"] = Field("250k")  # of the channel, with radio nrf24

@@ -72,7 +72,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Obstacles:
-    """All boxes, and by which model they damp a link.
+    """All boxes, and by which model they attenuate a link.
 
     A disc radio of range R has a margin of 10 n log10(R / d) dB at the distance d, with the path
     loss exponent n: the link is there while the boxes on its way take less than that.

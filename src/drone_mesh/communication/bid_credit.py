@@ -15,7 +15,7 @@ WINNERS_IN_VAIN = 3  # our choice: a winner may fail to fly for reasons of its o
 
 
 class BidCredit:
-    """What a router thinks of the neighbours that bring it bids."""
+    """Which neighbours a router trusts to relay bids."""
 
     def __init__(self) -> None:
         self._brought_by: dict[int, int] = {}  # creator of a bid -> neighbour that brought it
@@ -41,7 +41,7 @@ class BidCredit:
 def highest_plausible(own: Location | None, gateway: Location | None, range_m: float) -> float:
     """The highest bid that a node of the group can have, in metres.
 
-    The group hangs together, so none of its nodes is farther away than a chain of all ids.
+    The group is connected, so none of its nodes is farther away than a chain of all ids.
     """
     if own is None or gateway is None:
         return float("inf")

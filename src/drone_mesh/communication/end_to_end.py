@@ -1,4 +1,4 @@
-"""EndToEnd: proves who made a packet, over all relays (docs/security.md, "End-to-end seal").
+"""EndToEnd: proves which node made a packet, over all relays (docs/security.md, "End-to-end seal").
 
 The hop seal shows that some node of the mesh sent a packet. This one shows which, to the addressee:
 an order comes from a node that holds the mesh key, a place from the node whose place it is. Its tag
@@ -152,7 +152,7 @@ class EndToEnd:
     def open(self, payload: bytes) -> bytes:
         """A packet for this node or for all, without what belongs to this seal.
 
-        Raises NotProven for one that is not to be believed.
+        Raises NotProven for one that is not authentic.
         """
         creator, kind = payload[0], payload[2]
         at = _WITH_NONCE.get(kind)

@@ -8,15 +8,15 @@ from drone_mesh.drone.interfaces import Location
 
 
 class FlightNews:
-    """Who took off, and where a drone looked for the gateway."""
+    """Which drones took off, and where one looked for the gateway."""
 
     def __init__(self) -> None:
         self._quiet_until_s = -math.inf
         self._tries: dict[Location, float] = {}  # gateway's place -> when another one may fly there
-        self._in_vain_s: dict[int, float] = {}  # node -> when it said that it was there in vain
+        self._in_vain_s: dict[int, float] = {}  # node -> when it said that it found none there
 
     def took_off(self, quiet_until_s: float) -> None:
-        """A drone flies: until then the others wait for what comes of it."""
+        """A drone flies: until then the others wait for the outcome."""
         self._quiet_until_s = quiet_until_s
 
     def is_quiet(self, now_s: float) -> bool:
@@ -38,13 +38,13 @@ class FlightNews:
         )
 
     def is_new_in_vain(self, node: int, now_s: float, again_s: float) -> bool:
-        """Whether `node` has not said within `again_s` that it was there in vain; now it did."""
+        """Whether `node` has not reported a flight without success within `again_s`; now it did."""
         is_new = now_s >= self._in_vain_s.get(node, -math.inf) + again_s
         if is_new:
             self._in_vain_s[node] = now_s
         return is_new
 
     def clear(self) -> None:
-        """A gateway answers: what was in vain may be tried again one day."""
+        """A gateway answers: places tried without success may be tried again."""
         self._quiet_until_s = -math.inf
         self._tries.clear()

@@ -1,6 +1,6 @@
 """GroupRepair: the drones of a group elect the one that flies one step back.
 
-docs/protocol.md, "Negotiation". A strategy that derives from it decides by its score who flies.
+docs/protocol.md, "Negotiation". The score of a strategy that derives from it decides which one.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class GroupRepair(IRepairStrategy):
             self._fly(step)
 
     def on_gateway_found(self) -> None:
-        """The election is over, and what was in vain may be tried again one day."""
+        """The election is over; places tried without success may be tried again."""
         self._election.clear()
         self._rounds_without_flier = 0
         self._news.clear()
@@ -108,13 +108,13 @@ class GroupRepair(IRepairStrategy):
         for step in mesh.steps:
             if mesh.was_at(step):
                 if is_first_choice:
-                    reason = f"was at the place of {step.owner} in vain"
+                    reason = f"flew to the place of {step.owner} without success"
                 continue
             occupant = NO_ROUTE if alone else self._occupant(step)
             if occupant != NO_ROUTE:
                 reason = f"the place of {step.owner} is occupied by {occupant}"
             elif step.home and not alone and self._is_tried(step.place):
-                reason = "another drone flew to the gateway in vain"
+                reason = "another drone flew to the gateway without success"
             elif is_first_choice or self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER:
                 return step, ""
             is_first_choice = False
@@ -235,7 +235,7 @@ class GroupRepair(IRepairStrategy):
                 self._fly(step)
 
     def _on_take_off_of(self, node: int, code: float, from_: int, about: Location | None) -> None:
-        """A drone of the group flies: the others wait for what comes of it."""
+        """A drone of the group flies: the others wait for the outcome."""
         mesh = self.mesh
         if mesh.connected or self._news.is_quiet(mesh.now_s):
             return
@@ -251,7 +251,7 @@ class GroupRepair(IRepairStrategy):
             self._end_round()
 
     def _on_in_vain(self, node: int, from_: int, about: Location | None) -> None:
-        """A drone of the group was at the gateway's place in vain: no other one flies there."""
+        """A drone found no gateway at the gateway's place: no other of the group flies there."""
         mesh = self.mesh
         if mesh.connected or not self._news.is_new_in_vain(node, mesh.now_s, TAKE_OFF_WITHIN_S):
             return

@@ -60,7 +60,7 @@ class MeshKey(Keys):
         return self._derive(_PAIR + bytes(sorted((one, other))))
 
     def for_node(self, node: int) -> NodeKeys:
-        """What a router gets that must not give orders to others."""
+        """The keys for a router, with which it cannot give orders to others."""
         return NodeKeys(
             node,
             self._network,

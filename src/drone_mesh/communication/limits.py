@@ -30,7 +30,7 @@ class RateLimit:
 
 
 class Strangers:
-    """Nodes that never took a packet. When too many of those are lost, others get none."""
+    """Nodes that never acknowledged a packet. When too many are lost, others are sent none."""
 
     def __init__(self) -> None:
         self._known: set[int] = set()

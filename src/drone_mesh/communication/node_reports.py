@@ -70,7 +70,7 @@ class NodeReporter:
 
 
 class ReportedNode(NamedTuple):
-    """What a gateway was told by another node."""
+    """What another node reported to its gateway."""
 
     node_id: int
     report: NodeReport

@@ -1,4 +1,4 @@
-"""OrderBook: what became of the orders that a gateway sent.
+"""OrderBook: the outcome of the orders that a gateway sent.
 
 docs/protocol.md, "Orders".
 """
@@ -92,7 +92,7 @@ class OrderBook:
         ]
 
     def enter(self, drone: int, goal: Location) -> int:
-        """Note a new order; returns its number. An older one for that drone ends by it."""
+        """Note a new order; returns its number. It ends an older one for that drone."""
         now_s = self._parts.now_s
         for other in self._open_for(drone):
             self._move(other, OrderState.GIVEN_UP, "another order followed")
@@ -113,14 +113,14 @@ class OrderBook:
         return True
 
     def on_missing(self, drone: int) -> None:
-        """A relay says that it can take packets for this drone no further."""
+        """A relay reports that it has no route to this drone."""
         for order in self._open_for(drone):
             waits = order.state is not OrderState.ASKED or order.seeking
             if not waits and not self._seek(order):
                 self._no_route(order)
 
     def on_found(self, drone: int) -> None:
-        """A drone has said that it is there, along a path that works."""
+        """A drone has answered the search, along a path that works."""
         for order in self._open_for(drone):
             if order.seeking:
                 order.seeking = False
@@ -136,7 +136,7 @@ class OrderBook:
         return True
 
     def on_reply(self, drone: int, reply: OrderReply) -> None:
-        """A part of what a drone says; acts when the last missing part is there."""
+        """A part of a drone's reply; acts when the last missing part has arrived."""
         order = self._orders.get(reply.number)
         if order is None or order.drone != drone:
             return
@@ -145,7 +145,7 @@ class OrderBook:
             self.on_outcome(reply.number, reply.outcome, reason)
 
     def on_outcome(self, number: int, outcome: OrderOutcome, reason: str) -> None:
-        """A drone has said what became of an order."""
+        """A drone has reported the outcome of an order."""
         order = self._orders.get(number)
         if order is None or order.settled:
             return

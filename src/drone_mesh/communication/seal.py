@@ -152,7 +152,7 @@ class HopSeal:
 
     @property
     def crowded(self) -> bool:
-        """Whether so many challenges wait for an answer that many are to nobody."""
+        """Whether so many challenges are unanswered that many of those nodes cannot exist."""
         return len(self._challenges) > WAITING_CHALLENGES // 2
 
     def answer(self, challenge: bytes) -> bytes | None:

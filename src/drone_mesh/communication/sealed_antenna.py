@@ -1,7 +1,7 @@
 """SealedAntenna: an antenna of a mesh with a key (docs/security.md).
 
-It stands between an antenna and a mesh component, and looks like either to the other one. Neither
-knows of seals, except that the component puts less into a packet (`reserved_bytes`).
+It stands between an antenna and a mesh component, and has the interface of each for the other.
+Neither of them handles seals; the component only puts less into a packet (`reserved_bytes`).
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         challenge = self._seal.challenge(node, now_s)
         if challenge is None:
             return
-        if self._antenna.medium.shared and self._seal.crowded:  # no retransmissions to nobody
+        if self._antenna.medium.shared and self._seal.crowded:  # none to ids that may not exist
             self._antenna.broadcast_message(challenge)
         else:
             self._antenna.send_message_to(challenge)

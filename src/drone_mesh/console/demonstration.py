@@ -31,7 +31,7 @@ _SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss wh
 
 
 class RepairDemonstration:
-    """Gives orders and tells what happens. Belongs to one thread, which carries the orders out."""
+    """Gives orders and describes what happens. Belongs to one thread, which carries them out."""
 
     def __init__(self) -> None:
         self.story = RepairStory()

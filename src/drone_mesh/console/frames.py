@@ -45,7 +45,7 @@ NOTHING_MORE: Mapping[int, Mapping[str, Any]] = {}
 
 
 class FrameStore:
-    """Belongs to one thread, the server's event loop. Version 0 is a page that knows nothing."""
+    """Belongs to one thread, the server's event loop. Version 0: a page that has nothing yet."""
 
     def __init__(self, history: History | None = None) -> None:
         """`history` keeps what the store is given, for pages that look back."""
@@ -152,7 +152,7 @@ class FrameStore:
         self._sampled_at_s = float("-inf")
 
     def set_story(self, story: Mapping[str, Any]) -> None:
-        """Set what the page tells about a demonstration; empty: nothing."""
+        """Set the story of a demonstration that pages show; empty: none."""
         if story != self._story[1]:
             self._next_version()
             self._story = self.version, story

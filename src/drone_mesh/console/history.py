@@ -53,7 +53,7 @@ class History:
         return history
 
     def add(self, mesh: MeshStatus, wall_s: float) -> None:
-        """Keep this state of a live run, if the last one is old enough. A new run begins anew."""
+        """Keep this state of a live run, if the last one is old enough. A new run clears it."""
         if self.times and mesh.stamp_s < self.times[-1]:
             self._clear()
         stands_still = bool(self.times) and mesh.stamp_s == self.times[-1]

@@ -169,7 +169,7 @@ def make_api(
         dependencies=guards,
         responses={
             **order_refusals,
-            400: {"model": Refusal, "description": "The body is no text"},
+            400: {"model": Refusal, "description": "The body is not text"},
             409: {"model": Refusal, "description": "No origin"},
         },
     )

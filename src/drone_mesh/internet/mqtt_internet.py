@@ -114,7 +114,7 @@ class MqttInternet(IInternetConnection):
         self._watch.start()
 
     def disconnect(self) -> None:
-        """Say good-bye, and end the threads."""
+        """Disconnect from the broker, and end the threads."""
         self._stopped.set()
         self._end_subscription()
         if self._watch is not None:

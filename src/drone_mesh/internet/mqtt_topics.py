@@ -95,7 +95,7 @@ class Topics:
         return f"{self._prefix}/{node}/state"
 
     def event(self, node: str) -> str:
-        """Where it is said what became of a message for `node`."""
+        """Where the outcome of a message for `node` is published."""
         return f"{self._prefix}/{node}/event"
 
     @property
@@ -108,7 +108,7 @@ class Topics:
         return topic[len(self._prefix) + 1 :].partition("/")[0]
 
     def destination(self, topic: str) -> Destination | None:
-        """Where a message on a topic of `tx` is to go; None: the topic makes no sense."""
+        """Where a message on a topic of `tx` is to go; None: the topic is invalid."""
         node, _tx, rest = topic[len(self._prefix) + 1 :].partition("/tx")
         port = rest[1:] or "0"
         if not (port.isascii() and port.isdigit() and int(port) <= 255):

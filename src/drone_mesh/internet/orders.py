@@ -64,7 +64,7 @@ def add_order_requests(
         for report in (await desk.ask(_report_orders)).orders:
             if report.id == id:
                 return report
-        raise HTTPException(404, f"there is no order {id}, or it was forgotten")
+        raise HTTPException(404, f"unknown order {id}: the gateway keeps only the latest")
 
 
 def _report_orders(gateway: IGatewayCommands, now_s: float) -> OrderReports:

@@ -277,7 +277,7 @@ def give_orders(trial: AirTrial, kind: str, count: int, flight_m: float) -> Orde
     homes = {node: mesh.place(node) for node in range(1, trial.nodes)}
     sent: list[tuple[float, int]] = []
     for _ in range(count):
-        lately = {node for _, node in sent[-10:]}  # each order is told from the next by its drone
+        lately = {node for _, node in sent[-10:]}  # the drone's id identifies the order
         node = rng.choice([node for node in homes if node not in lately])
         home, direction = homes[node], 2.0 * math.pi * rng.random()
         sent.append((mesh.now_s(), node))

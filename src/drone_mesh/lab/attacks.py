@@ -49,7 +49,7 @@ def order_all_away(stranger: Stranger) -> dict[int, Location]:
 
 
 def false_gateway(stranger: Stranger) -> dict[int, Location]:
-    """A radio that says to be a gateway, and answers each heartbeat."""
+    """A radio that claims to be a gateway, and answers each heartbeat."""
     me = stranger.node_id
 
     def answer(payload: bytes) -> None:
@@ -121,8 +121,8 @@ def _bid(stranger: Stranger, score: float) -> dict[int, Location]:
     body = MovementNegotiationMessage.BODY.pack(score)
     for bid, _ in enumerate(stranger.every(3.0, BIDDING_S)):
         for node in stranger.in_range():
-            nobody = 100 + bid % 100
-            stranger.say(MessageType.MOVEMENT_NEGOTIATION, nobody, node, node, body)
+            absent = 100 + bid % 100
+            stranger.say(MessageType.MOVEMENT_NEGOTIATION, absent, node, node, body)
     return {}
 
 

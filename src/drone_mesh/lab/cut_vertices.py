@@ -18,7 +18,7 @@ from drone_mesh.lab.random_layouts import Point, cut_vertices, random_layout
 LAYOUTS = {20: 40, 50: 20, 100: 8}  # drones -> layouts, as many as in the ideal figures
 SIDE_M = {20: 24.0, 50: 37.5, 100: 56.25}  # of the square: 120 m of range scaled to 9 m
 HEALED_WITHIN_S = 300.0
-CALM_S = 30.0  # afterwards: who still follows has landed
+CALM_S = 30.0  # afterwards: a drone that still follows has landed
 IDEAL: dict[str, Callable[..., Flown]] = {
     "nearest": ideal_moves.nearest,
     "inward": ideal_moves.inward,

@@ -24,7 +24,7 @@ KEY = MeshKey(b"the key of a lab")
 
 
 class Case(enum.Enum):
-    """Whether there is a key, and who attacks."""
+    """Whether there is a key, and which kind of attacker."""
 
     NOBODY = "no attack"
     WITHOUT_KEY = "without key"
@@ -47,7 +47,7 @@ class Damage(NamedTuple):
 def trial(name: str, case: Case, seed: int) -> Damage:
     """One attack, on a mesh without a key, with one, or by a captured node of one with a key."""
     attack = ATTACKS[name]
-    shared = attack is invented_ids  # where an answer to nobody costs airtime
+    shared = attack is invented_ids  # where an answer to an absent node costs airtime
     radio = "shared" if shared else "disc"
     network = Network(
         seed, radio=radio, key=_keys_of if case in (Case.WITH_KEY, Case.CAPTURED) else None

@@ -1,4 +1,4 @@
-"""Mutated packets: whatever arrives, a node drops or handles it, and goes on."""
+"""Mutated packets: whatever arrives, a node drops or handles it, and keeps working."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def fuzz(
     key: Keys | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> FuzzResult:
-    """Let the nodes of a small mesh hear so many packets, each a recorded one with changes.
+    """Send so many packets to the nodes of a small mesh, each a recorded one with changes.
 
     An exception of a node ends it with an AssertionError that quotes the packet.
     """

@@ -270,7 +270,7 @@ class Fault(Part):
 
 
 class Obstacles(Part):
-    """Boxes that block or damp the radio, and block flight."""
+    """Boxes that block or attenuate the radio, and block flight."""
 
     path: Optional[str] = None  # a file of boxes, beside the experiment
     boxes: List[BoxRow] = []

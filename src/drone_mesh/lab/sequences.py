@@ -31,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
                 if arguments.csv is not None:
                     _append(arguments.csv, outcome)
     except KeyboardInterrupt:
-        print("stopped" + (": the same command goes on" if arguments.csv is not None else ""))
+        print("stopped" + (": the same command continues" if arguments.csv is not None else ""))
     print(summary(rows, arguments.repair))
     return int(any(harm(row) for row in rows))
 

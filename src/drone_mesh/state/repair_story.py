@@ -146,7 +146,7 @@ class RepairStory:
             self._has_taken_off.add(node.id)
         elif node.id in self._has_taken_off:
             text = (
-                f"{node.id} has landed at {place}; it looks whether another drone stands there, "
+                f"{node.id} has landed at {place}; it checks whether another drone stands there, "
                 "and introduces itself"
             )
             self._last(("landed", node.id), text, now_s)
@@ -158,7 +158,7 @@ class RepairStory:
         if not self._bids:
             why = f"{node.id} has no neighbours left and flies"
         elif list(bids) == [node.id]:
-            why = f"{node.id} alone bids, and flies"
+            why = f"only {node.id} bids, so it flies"
         else:
             bid = f" ({_bid(bids[node.id], unit)})" if node.id in bids else ""
             why = f"{node.id} {is_best}{bid} and flies"

@@ -1,4 +1,4 @@
-"""LocalClient: what a program says to a node of this machine; see local_socket."""
+"""LocalClient: a program's requests to a node of this machine; see local_socket."""
 
 from __future__ import annotations
 

@@ -819,7 +819,7 @@ def test_what_another_drone_found_in_vain_is_no_second_choice():
         rig.hear(bid(3, IN_VAIN), bid(2, -1.0))
         rig.wait(TO_DECISION_S)
     assert rig.engine.goals == []
-    assert "another drone flew to the gateway in vain" in rig.repair_in_words()
+    assert "another drone flew to the gateway without success" in rig.repair_in_words()
 
 
 def test_what_another_drone_found_in_vain_elsewhere_does_not_keep_this_one_from_the_gateway():

@@ -28,7 +28,7 @@ def test_an_order_without_a_route_is_in_the_list_with_that_state(make_mesh):
 def test_an_unknown_order_is_answered_404_with_the_reason(mesh):
     answer = mesh.client.get("/orders/65535")
     assert answer.status_code == 404
-    assert answer.json() == {"detail": "there is no order 65535, or it was forgotten"}
+    assert answer.json() == {"detail": "unknown order 65535: the gateway keeps only the latest"}
 
 
 def test_orders_need_the_token(guarded_mesh):

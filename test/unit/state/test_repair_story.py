@@ -64,7 +64,7 @@ def test_who_does_not_bid_is_told_with_its_reason():
     bids = next(text for text in texts if "bids" in text)
     assert "2 bids 12.0 m" in bids
     assert "3, 4 and 5 do not bid: the place of 2 is occupied by 2" in bids
-    assert "2 alone bids, and flies to node 1's place; 3, 4 and 5 wait for it" in texts
+    assert "only 2 bids, so it flies to node 1's place; 3, 4 and 5 wait for it" in texts
 
 
 def test_another_strategy_is_told_in_its_own_terms():

@@ -30,7 +30,7 @@ OnEchoAnswer = Callable[[EchoAnswer], None]
 
 
 class Echoes:
-    """Sends echoes, answers those of others, and tells who waits for an answer."""
+    """Sends echoes, answers those of others, and reports each answer to its caller."""
 
     def __init__(self, send: SendPacket, room: int) -> None:
         """`room`: bytes of a body."""

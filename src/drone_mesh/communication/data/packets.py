@@ -76,7 +76,7 @@ DONE_BITS = 32  # of Ack.done
 
 
 def identified(session: int, port: int, order: int, payload: bytes) -> bytes:
-    """A message behind what tells it from others with the same number."""
+    """A message behind the fields that distinguish it from others with the same number."""
     return struct.pack("<HBHH", session, port, order, len(payload)) + payload
 
 

@@ -57,5 +57,5 @@ class Ticket:
 
 
 def destination_in_words(to: int) -> str:
-    """A destination as people say it."""
+    """A destination in words."""
     return {TO_ALL: "all nodes", TO_GATEWAY: "the gateway"}.get(to, f"node {to}")

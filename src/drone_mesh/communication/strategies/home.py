@@ -13,13 +13,13 @@ class Home(IRepairStrategy):
     """Flies towards the gateway's place, once."""
 
     def on_emergency(self) -> None:
-        """Fly, if there is a way that was not in vain."""
+        """Fly, if there is a step that has not failed yet."""
         mesh = self.mesh
         self.reason = mesh.why_not_fly()
         home = [step for step in mesh.steps if step.home]
         if not home:
             self.reason = self.reason or "does not know where the gateway is"
         elif mesh.was_at(home[0]):
-            self.reason = self.reason or "was at the gateway's place in vain"
+            self.reason = self.reason or "flew to the gateway's place without success"
         if not self.reason:
             mesh.fly(home[0])

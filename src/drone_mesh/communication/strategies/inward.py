@@ -30,7 +30,7 @@ class Inward(Home):
         self._lost, self._moves, self._waits = None, 0, 0
 
     def on_emergency(self) -> None:
-        """Move inward; if that was in vain, fly home."""
+        """Move inward; if that did not help, fly home."""
         mesh, here = self.mesh, self.mesh.own_place()
         if self._lost is None and mesh.reaches(mesh.lost_next_hop) and self._waits < WAITS:
             self._waits += 1

@@ -1,4 +1,4 @@
-"""What a process and the server of an emulated air say to each other over TCP.
+"""What a process and the server of an emulated air exchange over TCP.
 
 A request is an opcode, the length of its data and the data; the answer is the length of its data
 and the data. A connection carries one request at a time. The first connection of a process makes

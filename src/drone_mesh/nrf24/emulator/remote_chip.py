@@ -1,7 +1,7 @@
 """RemoteChip: an emulated chip on an air that another process serves, with its SPI, CE and IRQ.
 
-A lost connection is one to a chip that does not answer: the driver says so and tries again, and
-gets a new chip as soon as the air is served again.
+After a lost connection the chip does not answer: the driver reports this and retries, and gets a
+new chip as soon as the air is served again.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class RemoteChip:
                 self.request(Opcode.MOVE, MAKE_CHIP.pack(*position))
 
     def close(self) -> None:
-        """Give the chip back; it loses its supply."""
+        """Release the chip; it loses its supply."""
         with self._lock:
             self._closed = True
             self._lose()
@@ -148,7 +148,7 @@ class RemoteSpi:
         return list(self._chip.request(Opcode.TRANSFER, bytes(data)))
 
     def close(self) -> None:
-        """Give the chip back."""
+        """Release the chip."""
         self._chip.close()
 
 

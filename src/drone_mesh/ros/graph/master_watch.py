@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 class MasterWatch:
     """Looks at the master in a thread of its own.
 
-    A new master knows nothing: connections between nodes stay, but no node finds topics, services
+    A new master starts empty: connections between nodes stay, but no node finds topics, services
     and parameters. The watch registers all topics and services of this process again, and restores
     its private parameters and those that it is given.
     """

@@ -27,7 +27,7 @@ from drone_mesh.srv import PowerSwitch
 
 LOOK_PERIOD_S = 0.1  # wall; our choice
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
-PROGRESS_PERIOD_S = 0.5  # wall; the world goes on without a host that is silent for two seconds
+PROGRESS_PERIOD_S = 0.5  # wall; the world continues without a host that is silent for two seconds
 
 _log = logging.getLogger(__name__)
 

@@ -201,7 +201,7 @@ def main() -> None:
         from drone_mesh.world.ray_links import RayLinks
 
         sees = RayLinks(obstacles, max_distance_m).sees
-        verb = "block" if obstacles.blocks else "damp"
+        verb = "block" if obstacles.blocks else "attenuate"
         _log.info("%d obstacles %s the radio", len(obstacles.boxes), verb)
     WirelessSignalSimulator(max_distance_m, sees)
     _log.info("nodes closer than %g m hear each other", max_distance_m)

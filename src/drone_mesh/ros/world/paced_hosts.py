@@ -17,7 +17,7 @@ from drone_mesh.world.under_way import UnderWay
 # Our choice, simulated: a timer is late by this and one step of the world at most, and so is the
 # last of all packets that follow from it. The mesh waits more than ten times as long for an answer.
 MAX_LAG_S = 0.03
-HOST_TIMEOUT_S = 2.0  # wall seconds; the world goes on without a host that is silent for longer
+HOST_TIMEOUT_S = 2.0  # wall seconds; the world continues without a host that is silent for longer
 LOOK_AGAIN_AFTER_S = 1.0  # wall seconds; between two looks at whether a stranger is a host
 
 _log = logging.getLogger(__name__)
