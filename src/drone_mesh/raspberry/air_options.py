@@ -32,14 +32,16 @@ def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
     node.add_argument(
         "--emulated-air",
         metavar="[HOST:]PORT",
-        help="without hardware: this node's radio is on the emulated air that another process "
-        "serves there; the node stands at --latitude and --longitude, by default in columns by id",
+        help="without hardware: put this node's radio on the emulated air that another process "
+        "serves at this address; the node stands at --latitude and --longitude, by default in "
+        "columns by id",
     )
     if gateway:
         node.add_argument(
             "--emulated-air-serve",
             metavar="[HOST:]PORT",
-            help="without hardware: serve an emulated air to other processes, and be a node on it",
+            help="without hardware: run this node on an emulated air, and serve that air to other "
+            "processes",
         )
 
 

@@ -13,7 +13,7 @@ from drone_mesh.errors import ConfigurationError
 def add_flight_options(parser: argparse.ArgumentParser) -> None:
     """Add the group to a parser."""
     limits = FlightLimits()
-    group = parser.add_argument_group("drone", "docs/flying.md explains them.")
+    group = parser.add_argument_group("drone", "docs/flying.md explains these options.")
     group.add_argument(
         "--drone",
         default=GROUND,
@@ -33,7 +33,12 @@ def add_flight_options(parser: argparse.ArgumentParser) -> None:
         ("--max-height", limits.max_height_m, "METRES", "maximum height above home"),
         ("--max-distance", limits.max_distance_m, "METRES", "maximum distance from home"),
         ("--speed", limits.speed_m_s, "M/S", "speed of a flight"),
-        ("--min-battery", limits.min_battery_percent, "PERCENT", "minimum charge; 0: none"),
+        (
+            "--min-battery",
+            limits.min_battery_percent,
+            "PERCENT",
+            "minimum battery charge for a flight; 0: none",
+        ),
         ("--cruise-height", limits.cruise_height_m, "METRES", "height of the lowest layer"),
         ("--layers", limits.layer_m, "METRES", "vertical distance between layers"),
     ):
@@ -48,7 +53,7 @@ def add_flight_options(parser: argparse.ArgumentParser) -> None:
     for name, text in (
         ("--may-arm", "arm the drone for a flight"),
         ("--may-take-off", "take off from the ground"),
-        ("--may-change-mode", "take a drone that holds its position into GUIDED or OFFBOARD"),
+        ("--may-change-mode", "switch a drone that holds its position to GUIDED or OFFBOARD"),
     ):
         group.add_argument(name, action="store_true", help=f"allow the program to {text}")
 

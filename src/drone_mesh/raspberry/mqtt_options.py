@@ -39,7 +39,7 @@ def add_mqtt_options(parser: argparse.ArgumentParser) -> None:
         "--mqtt-ca",
         type=Path,
         metavar="FILE",
-        help="certificate (PEM) of the authority that signed the broker's, if it is a private one",
+        help="certificate (PEM) of the private authority that signed the broker's certificate",
     )
 
 

@@ -131,25 +131,29 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "--channel",
         type=whole(0, 125),
         default=1,
-        help="0..125, at 2400 + CHANNEL MHz (default: %(default)s)",
+        help="radio channel, 0..125: 2400 + CHANNEL MHz (default: %(default)s)",
     )
     radio.add_argument(
-        "--rate", choices=DATA_RATES, default="250k", help="bits per second (default: %(default)s)"
+        "--rate",
+        choices=DATA_RATES,
+        default="250k",
+        help="data rate in bits per second (default: %(default)s)",
     )
     radio.add_argument(
         "--power",
         type=int,
         choices=[power.value for power in TxPower],
         default=TxPower.DBM_0.value,
-        help="dBm, into the amplifier where a module has one; 100 mW (20 dBm) in all is the limit "
-        "in Europe (default: %(default)s)",
+        help="transmit power in dBm, before the amplifier if the module has one; the limit in "
+        "Europe is 100 mW (20 dBm) in all (default: %(default)s)",
     )
     radio.add_argument(
         "--crc",
         type=int,
         choices=(8, 16),
         default=16,
-        help="bits; 8 for nodes of 2019 (default: %(default)s)",
+        help="length of the CRC in bits; 8 if a node runs the software of 2019 "
+        "(default: %(default)s)",
     )
     radio.add_argument(
         "--broadcast",
@@ -206,20 +210,20 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         type=float,
         default=RANGE_M,
         metavar="M",
-        help="how far the radio reaches, in metres, for the repair; raspberry_radio range measures "
+        help="range of the radio in metres, which the repair uses; raspberry_radio range measures "
         "it (default: %(default)g, for 250k)",
     )
     mesh.add_argument(
         "--key-file",
         type=Path,
         metavar="FILE",
-        help="file with the keys of this node, which only its owner may read; raspberry_key makes "
-        "one. Without it any radio in range can take part and give orders",
+        help="file with the keys of this node, accessible only to its owner; raspberry_key makes "
+        "one. Without a key, any radio in range can take part and give orders",
     )
     place = parser.add_argument_group(
         "place",
         "Position of a node on the ground, in metres, in the common frame of the drones. Without "
-        "it the node does not claim to be anywhere.",
+        "it the node reports no position.",
     )
     place.add_argument("--latitude", type=float, help="y in metres")
     place.add_argument("--longitude", type=float, help="x in metres")
@@ -236,7 +240,10 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(pcapng, for Wireshark)",
     )
     parser.add_argument(
-        "--log-level", choices=LOG_LEVELS, default="info", help="(default: %(default)s)"
+        "--log-level",
+        choices=LOG_LEVELS,
+        default="info",
+        help="lowest level that is logged (default: %(default)s)",
     )
     return parser
 

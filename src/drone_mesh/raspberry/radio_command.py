@@ -148,10 +148,14 @@ def _parser() -> argparse.ArgumentParser:
         "--id",
         type=whole(0, MAX_NODE_ID),
         default=MAX_NODE_ID,
-        help="own id (default: %(default)s)",
+        help="id of this radio (default: %(default)s)",
     )
-    parser.add_argument("--channel", type=whole(0, 125), default=1, help="(default: %(default)s)")
-    parser.add_argument("--rate", choices=DATA_RATES, default="250k", help="(default: %(default)s)")
+    parser.add_argument(
+        "--channel", type=whole(0, 125), default=1, help="channel (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--rate", choices=DATA_RATES, default="250k", help="data rate (default: %(default)s)"
+    )
     parser.add_argument(
         "--emulated",
         type=float,
