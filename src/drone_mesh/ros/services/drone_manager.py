@@ -156,6 +156,6 @@ def main() -> None:
     path = or_stop(lambda: file_parameter("casus", "casus.yaml"))
     layouts = or_stop(lambda: Layouts.load(path))
     DroneManager(layouts)
-    _log.info("%d layouts, built in and from %s", len(layouts.cases), path)
+    _log.info("%d layouts: the built-in ones and those in %s", len(layouts.cases), path)
     MasterWatch().start()
     rospy.spin()
