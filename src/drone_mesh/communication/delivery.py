@@ -96,7 +96,7 @@ class Delivery:
         self._routing.sent(to, True, tries)
 
     def undelivered(self, payload: bytes, tries: int) -> bool:
-        """The antenna gave a packet up. True if it goes on over another route.
+        """The antenna gave a packet up. True if it takes another route.
 
         A neighbour that was heard a moment ago is not lost by that: the channel was busy. The
         second time in a row it is.

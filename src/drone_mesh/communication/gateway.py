@@ -122,7 +122,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         return nodes
 
     def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
-        """A relay that can take an order no further says so to the gateway."""
+        """A relay that cannot forward an order reports this to the gateway."""
         super()._on_missing(creator, missing, told_by)
         self._book.on_missing(missing)
 

@@ -51,7 +51,7 @@ class RepairFlight:
 
     @property
     def on_ground(self) -> bool:
-        """Whether it has landed, and looks whether it stands clear."""
+        """Whether it has landed, and checks whether it stands clear of others."""
         return self.asks_left > 0
 
     def start(self) -> None:

@@ -89,8 +89,8 @@ class RepairDemonstration:
         )
         settled_s = mesh.stamp_s + _SETTLE_S
         self.story.tell(
-            "All are connected. Each asks where its next hop to the gateway stands: that is the "
-            "place to which it would fly",
+            "All are connected. Each asks for the position of its next hop to the gateway, because "
+            "it would fly to that place",
             mesh.stamp_s,
             settled_s,
         )
@@ -111,8 +111,8 @@ class RepairDemonstration:
         if self._resting:
             count = len(self._resting)
             self.story.tell(
-                f"{count} other drone{'s' if count > 1 else ''} would help, and "
-                f"{'are' if count > 1 else 'is'} switched off meanwhile",
+                f"{count} other drone{'s' if count > 1 else ''} could provide another route, and "
+                f"{'are' if count > 1 else 'is'} switched off during the demonstration",
                 mesh.stamp_s,
             )
         orders = [_power(node_id, False) for node_id in self._resting]

@@ -104,7 +104,7 @@ class Topics:
         return [f"{self._prefix}/+/tx", f"{self._prefix}/+/tx/+"]
 
     def node_of(self, topic: str) -> str:
-        """The level of the node, as it stands there."""
+        """The level of a topic that names the node."""
         return topic[len(self._prefix) + 1 :].partition("/")[0]
 
     def destination(self, topic: str) -> Destination | None:

@@ -29,7 +29,7 @@ SLURM = "slurm"
 
 
 class EngineError(MeshError):
-    """There are no workers to be had, or they are gone. Nothing that was yielded is lost."""
+    """No workers are available, or they have ended. Outcomes already yielded are kept."""
 
 
 def run_all(specs: Iterable[RunSpec], workers: int, cluster: str | None) -> Iterator[Outcome]:

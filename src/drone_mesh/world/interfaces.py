@@ -22,7 +22,7 @@ class Mover(Protocol):
 
 
 class World(abc.ABC):
-    """Bodies and simulated time, which goes on by one fixed tick per `step()`.
+    """Bodies and simulated time, which advances by one fixed tick per `step()`.
 
     Everything belongs to the thread that calls `step()`, except `wake()` and `now_s`, which any
     thread may use. Only movers that were woken cost time in a step. A world is a context manager

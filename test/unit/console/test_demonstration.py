@@ -60,7 +60,7 @@ def test_it_arranges_five_drones_and_follows_their_repair():
     fleet, demonstration = Fleet(), RepairDemonstration()
     fleet.watch(demonstration)
     told = texts(demonstration)
-    assert told[0].startswith("12 other drones would help")
+    assert told[0].startswith("12 other drones could provide another route")
     assert any("3 bids 18.0 m, 4 bids 15.5 m, 5 bids 15.3 m" in text for text in told)
     assert "3, 4 and 5 are connected again" in told[-1]
     assert 20.0 < fleet.wall_s < 60.0
@@ -77,7 +77,7 @@ def test_with_two_gateways_the_second_one_rests():
     fleet, demonstration = Fleet(gateways=2, routers=5), RepairDemonstration()
     fleet.watch(demonstration)
     told = texts(demonstration)
-    assert told[0].startswith("1 other drone would help, and is switched off")
+    assert told[0].startswith("1 other drone could provide another route, and is switched off")
     assert "4, 5 and 6 are connected again" in told[-1]
 
 

@@ -76,7 +76,7 @@ class GatewayRoutes(ChildTableTree):
         return super().gateway_lost(gateway)
 
     def node_moved_location(self) -> None:
-        """Forget everything but the time-out of old news."""
+        """Forget everything but the time-out of old entries."""
         for child in self.get_set_of_children():
             self.forget_neighbour(child)
         super().node_moved_location()

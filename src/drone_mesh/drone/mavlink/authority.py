@@ -88,7 +88,7 @@ class Authority:
         return self.we_landed and mode == autopilot.land_mode and on_ground
 
     def why_let_go(self, now_s: float, phase: Phase) -> str:
-        """Why what is under way has to end; empty: it goes on."""
+        """Why the present flight has to end; empty: it continues."""
         telemetry = self._telemetry
         trouble = self.trouble(now_s)
         autopilot = telemetry.autopilot

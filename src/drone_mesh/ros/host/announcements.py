@@ -29,7 +29,7 @@ def probe_of(node_id: int) -> bytes:
 class Announcements:
     """Announces antennas to the simulator until their own probes return.
 
-    Later it goes on announcing them in turn: another DroneInfo with their id could have taken their
+    Later it announces them in turn: another DroneInfo with their id could have taken their
     packets elsewhere.
 
     Any thread. `_lock` guards all fields. `_announcing` keeps the order of what is published that
