@@ -112,12 +112,14 @@ class RepairFlight:
         """On towards the goal.
 
         A flight that may end where the drone is connected goes in legs: it climbs by half of each
-        leg, and higher up it would hear no node on the ground.
+        leg, and higher up it would hear no node on the ground. No leg ends within LANDED_WITHIN_M
+        of the goal: the drone would rest there, and only the goal is clear of the others.
         """
         here = self._parts.pilot.location()
         self._leg_from = here
         goal = self.goal
-        if self.stops_when_connected and here is not None:
+        longest_m = self._leg_m + LANDED_WITHIN_M
+        if self.stops_when_connected and here is not None and here.distance_m(goal) > longest_m:
             goal = towards(here, goal, self._leg_m)
         self._parts.pilot.step_back_to(goal)
 

@@ -929,6 +929,20 @@ def test_to_the_gateway_it_flies_in_legs_and_presents_itself():
     assert rig.engine.goals[-1] == Location(5.3, 0.0, 0.0)
 
 
+def test_the_last_leg_ends_at_the_goal_and_not_just_before_it():
+    """Beside the goal there may be less than the clearance to another drone."""
+    rig = Rig()
+    rig.engine.place = Location(10.63, 0.0, 0.0)  # a leg of 6 m would end 8 cm before the goal
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 40")
+    rig.antenna.dead = {2}
+    rig.wait_until(EMERGENCY_S + 0.1)
+    fly(rig, rig.engine.goals[-1])
+    rig.wait(1.0)
+    assert rig.kinds().count("LANDED") == 1
+    assert rig.engine.goals == [BESIDE_GATEWAY]
+
+
 def test_in_flight_it_does_not_take_up_a_connection():
     rig = flying_rig()
     fly(rig, Location(10.0, 0.0, 2.0))
