@@ -173,7 +173,10 @@ class Relay(threading.Thread):
             if up:
                 self._vehicle = sender
             for message in codecs[up].parse_buffer(data) or ():
-                self._pass(message, up)
+                try:
+                    self._pass(message, up)
+                except OSError:  # closed meanwhile
+                    return
 
     def _pass(self, message, up: bool) -> None:
         to = self._engine if up else self._vehicle
