@@ -90,3 +90,10 @@ def test_a_recording_that_is_played_wears_a_badge_and_takes_no_orders(start_cons
     page.page.click("#nodes tr[data-id='5']")
     for order in ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate"):
         assert not page.page.is_visible(order)
+
+
+def test_the_map_stays_where_it_is_when_the_time_line_appears(start_console, visit):
+    page = visit(start_console().url)
+    before = page.page.locator("#map").bounding_box()
+    page.wait_for("a time line", lambda: page.page.is_visible("#time"), 20.0)
+    assert page.page.locator("#map").bounding_box() == before

@@ -35,7 +35,7 @@ export class TimeLine {
 
   #show() {
     const { start, end, now, live, paused, factor } = this.mesh.timeline;
-    byId("timeline").hidden = end - start < 1;
+    byId("timeline").classList.toggle("empty", end - start < 1);
     document.body.toggleAttribute("data-past", !live);
     this.slider.min = start;
     this.slider.max = end;
