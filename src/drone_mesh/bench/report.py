@@ -14,7 +14,6 @@ from drone_mesh.bench.soak import Sample, SoakResult
 
 UNKNOWN = "-"
 SMALL_CORES = 0.005  # a process that uses less gets no column
-SIMULATOR = "WirelessSignalSimulator"
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,10 @@ def read_key_file(path: Path) -> MeshKey | NodeKeys:
                     f"run: chmod 600 {path}"
                 )
             text = file.read()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"key file {path}: {error}") from error
+    except OSError as error:
+        raise ConfigurationError(f"key file {path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"key file {path}: not a text file") from error
     try:
         return keys_from_text(text)
     except ConfigurationError as error:
@@ -37,4 +39,4 @@ def write_key_file(path: Path, keys: MeshKey | NodeKeys) -> None:
         with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
             file.write(keys.to_text())
     except OSError as error:
-        raise ConfigurationError(f"key file {path}: {error}") from error
+        raise ConfigurationError(f"key file {path}: {error.strerror or error}") from error

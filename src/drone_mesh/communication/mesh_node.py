@@ -150,10 +150,6 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         """What the antenna does on a shared channel."""
         return self._antenna.channel_use()
 
-    def get_goal(self) -> Location | None:
-        """Where the drone is flying to; None while it is not."""
-        return self._pilot.goal
-
     # What a routing technique may ask for ----------------------------------------------------
 
     def search_other_nodes_in_range(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from pathlib import Path
@@ -12,9 +13,10 @@ from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
 from drone_mesh.users.local_client import LocalClient
-from drone_mesh.users.socket_path import existing_sockets, node_of, socket_folder, socket_path
+from drone_mesh.users.socket_path import node_of, served_sockets, socket_folder, socket_path
 
 NODE_VARIABLE = "DRONE_MESH_NODE"
+MOST_SECONDS = 86400.0  # our choice: a day
 _DESTINATIONS = {"all": TO_ALL, "gateway": TO_GATEWAY}
 
 
@@ -31,6 +33,19 @@ def parser_for(command: str, description: str) -> argparse.ArgumentParser:
         "--socket", type=Path, metavar="PATH", help="socket of the node, if not the usual one"
     )
     return parser
+
+
+def add_echo_arguments(parser: argparse.ArgumentParser) -> None:
+    """The node that is asked for an echo, and the time to wait for it."""
+    parser.add_argument("id", type=node_id, help="id of the node that answers")
+    parser.add_argument(
+        "-W",
+        "--timeout",
+        type=seconds,
+        default=5.0,
+        metavar="SECONDS",
+        help="time to wait for an answer (default: %(default)g)",
+    )
 
 
 def node_id(text: str) -> int:
@@ -52,14 +67,35 @@ def port(text: str) -> int:
     return int(text)
 
 
+def count(text: str) -> int:
+    """How many times, at least once, for argparse."""
+    if not text.isdigit() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"invalid number {text!r}: must be 1 or more")
+    return int(text)
+
+
+def seconds(text: str) -> float:
+    """A time in seconds, for argparse."""
+    try:
+        time_s = float(text)
+    except ValueError:
+        time_s = math.nan
+    if not 0.0 <= time_s <= MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"invalid time {text!r}: must be 0..{MOST_SECONDS:g} s")
+    return time_s
+
+
 def client(parsed: argparse.Namespace) -> LocalClient:
     """The node that the options name. Raises MeshError."""
     if parsed.socket is not None:
         return LocalClient(parsed.socket)
     chosen = parsed.node
     if chosen is None and os.environ.get(NODE_VARIABLE):
-        chosen = int(os.environ[NODE_VARIABLE])
-    found = existing_sockets()
+        try:
+            chosen = node_id(os.environ[NODE_VARIABLE])
+        except argparse.ArgumentTypeError as error:
+            raise MeshError(f"{NODE_VARIABLE}: {error}") from None
+    found = served_sockets()
     if chosen is not None:
         of_chosen = [path for path in found if node_of(path) == str(chosen)]
         return LocalClient(of_chosen[0] if of_chosen else socket_path(chosen))

@@ -14,7 +14,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = command_line.parser_for("mesh_listen", "Prints the messages that a node receives.")
     parser.add_argument("--port", type=command_line.port, help="print only messages for this port")
     parser.add_argument(
-        "--count", type=int, default=0, help="number of messages to print (default: until Ctrl-C)"
+        "--count",
+        type=command_line.count,
+        help="number of messages to print (default: until Ctrl-C)",
     )
     parser.add_argument(
         "--json",

@@ -26,7 +26,7 @@ from typing import Any
 
 from drone_mesh.errors import ConfigurationError, MessageRefused
 from drone_mesh.users.desk import UsersDesk
-from drone_mesh.users.socket_path import socket_path
+from drone_mesh.users.socket_path import is_served, socket_path
 
 MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
 MOST_CLIENTS = 32  # our choice
@@ -201,10 +201,6 @@ def _prepare(path: Path) -> None:
         return
     if not stat.S_ISSOCK(path.stat().st_mode):
         raise ConfigurationError(f"socket {path}: a file of that name is in the way")
-    with socket.socket(socket.AF_UNIX) as probe:
-        try:
-            probe.connect(str(path))
-        except OSError:
-            path.unlink()
-            return
-    raise ConfigurationError(f"socket {path}: another program runs a node of this id")
+    if is_served(path):
+        raise ConfigurationError(f"socket {path}: another program runs a node of this id")
+    path.unlink()

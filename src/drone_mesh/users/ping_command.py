@@ -14,25 +14,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = command_line.parser_for(
         "mesh_ping", "Sends echo requests to a node and prints round trip, hops and loss."
     )
-    parser.add_argument("id", type=command_line.node_id, help="id of the node that answers")
+    command_line.add_echo_arguments(parser)
     parser.add_argument(
-        "-c", "--count", type=int, default=0, help="number of requests (default: until Ctrl-C)"
+        "-c",
+        "--count",
+        type=command_line.count,
+        help="number of requests (default: until Ctrl-C)",
     )
     parser.add_argument(
         "-i",
         "--interval",
-        type=float,
+        type=command_line.seconds,
         default=1.0,
         metavar="SECONDS",
         help="time between two requests (default: %(default)g)",
-    )
-    parser.add_argument(
-        "-W",
-        "--timeout",
-        type=float,
-        default=5.0,
-        metavar="SECONDS",
-        help="time to wait for an answer (default: %(default)g)",
     )
     parsed = parser.parse_args(arguments)
     round_trips_s: list[float] = []
@@ -41,11 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def work() -> int:
         nonlocal asked
         node = command_line.client(parsed)
-        while parsed.count == 0 or asked < parsed.count:
+        while parsed.count is None or asked < parsed.count:
             if asked:
                 time.sleep(parsed.interval)
+            _ask(node, parsed.id, asked + 1, parsed.timeout, round_trips_s)
             asked += 1
-            _ask(node, parsed.id, asked, parsed.timeout, round_trips_s)
         return 0 if round_trips_s else 1
 
     status = command_line.run("mesh_ping", work)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Sequence
 
+from drone_mesh.communication.data.packets import check_size
 from drone_mesh.users import command_line
 
 
@@ -30,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--wait",
-        type=float,
+        type=command_line.seconds,
         default=30.0,
         metavar="SECONDS",
         help="time to wait for the delivery; 0: do not wait. The node keeps trying after that time "
@@ -41,6 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def work() -> int:
         text = parsed.text
         payload = sys.stdin.buffer.read() if text is None else text.encode()
+        check_size(payload)
         arrived, ticket = command_line.client(parsed).send(
             parsed.to, payload, port=parsed.port, reliable=not parsed.no_ack, wait_s=parsed.wait
         )

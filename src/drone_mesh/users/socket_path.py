@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from pathlib import Path
 from typing import Mapping
 
@@ -23,10 +24,23 @@ def socket_path(node_id: int) -> Path:
     return socket_folder() / _name(node_id)
 
 
-def existing_sockets() -> list[Path]:
-    """The sockets of nodes of this user and of the services, by name."""
+def served_sockets() -> list[Path]:
+    """The sockets of the nodes of this user and of the services that run now, by name."""
     folders = (socket_folder(), SYSTEM_FOLDER)
-    return sorted({path for folder in folders for path in folder.glob(_name("*"))})
+    found = {path for folder in folders for path in folder.glob(_name("*"))}
+    return sorted(path for path in found if is_served(path))
+
+
+def is_served(path: Path) -> bool:
+    """Whether a program answers at this socket; one that was killed leaves its socket behind."""
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(str(path))
+        except PermissionError:
+            return True  # of another user: the request says so
+        except OSError:
+            return False
+    return True
 
 
 def node_of(path: Path) -> str:

@@ -11,15 +11,7 @@ from drone_mesh.users import command_line
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the path to a node; the exit status is 1 if it does not answer."""
     parser = command_line.parser_for("mesh_trace", "Prints the path of packets to a node.")
-    parser.add_argument("id", type=command_line.node_id, help="id of the node that answers")
-    parser.add_argument(
-        "-W",
-        "--timeout",
-        type=float,
-        default=5.0,
-        metavar="SECONDS",
-        help="time to wait for the answer (default: %(default)g)",
-    )
+    command_line.add_echo_arguments(parser)
     parsed = parser.parse_args(arguments)
 
     def work() -> int:

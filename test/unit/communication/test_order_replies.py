@@ -117,7 +117,7 @@ def test_an_order_that_the_engine_refuses_starts_no_flight():
     said = replies(rig)
     assert "".join(text for _, _, text in said) == "farther than --max-distance"
     assert said[0][1] == 2
-    assert rig.mesh.get_goal() is None
+    assert "FLIGHT_ORDERED" not in rig.kinds()
     assert rig.mesh.get_connected_to_gateway()
 
 

@@ -111,6 +111,48 @@ def test_without_a_node_the_command_says_what_to_start(capsys):
     assert "no node runs here" in capsys.readouterr().err
 
 
+def test_a_node_that_was_killed_is_none_to_choose_from(rig, capsys):
+    for left in (4, 5):
+        with socket.socket(socket.AF_UNIX) as dead:
+            dead.bind(str(socket_path(left)))
+    assert trace_command.main(["3"]) == 1
+    assert "several nodes run here (0, 1, 2): choose one" in capsys.readouterr().err
+
+
+def test_a_ping_that_was_never_sent_is_not_counted(capsys):
+    assert ping_command.main(["3"]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+
+
+def test_a_message_far_too_large_is_named_as_that(rig, capsys):
+    assert send_command.main(["--node", "2", "0", "x" * 9000]) == 1
+    assert "too large: 9000 bytes" in capsys.readouterr().err
+
+
+def test_a_node_in_the_environment_that_is_none_is_one_line(monkeypatch, capsys):
+    monkeypatch.setenv("DRONE_MESH_NODE", "five")
+    assert trace_command.main(["3"]) == 1
+    assert capsys.readouterr().err == (
+        "mesh_trace: DRONE_MESH_NODE: invalid node 'five': must be 0..253\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["3", "-c", "-1"], "invalid number '-1': must be 1 or more"),
+        (["3", "-i", "-1"], "invalid time '-1': must be 0..86400 s"),
+        (["3", "-W", "nan"], "invalid time 'nan': must be 0..86400 s"),
+    ],
+)
+def test_numbers_that_make_no_sense_are_refused(capsys, arguments, reason):
+    with pytest.raises(SystemExit):
+        ping_command.main(arguments)
+    assert reason in capsys.readouterr().err
+
+
 def test_only_the_user_of_the_node_may_open_its_socket(rig):
     assert socket_path(0).stat().st_mode & 0o777 == 0o600
     assert socket_path(0).parent.stat().st_mode & 0o777 == 0o700

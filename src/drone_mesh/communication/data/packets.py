@@ -13,7 +13,7 @@ import struct
 from typing import NamedTuple
 
 from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RECORD_AT
-from drone_mesh.errors import PacketError
+from drone_mesh.errors import MessageRefused, PacketError
 
 MAX_MESSAGE_BYTES = 1024
 PROOF_BYTES = 4  # behind the payload of a message in a mesh with a key
@@ -32,6 +32,15 @@ MOST_BEHIND = (1 << 16 - _BEHIND_SHIFT) - 1
 _ACK = struct.Struct("<HBBQBI")
 _POLL = struct.Struct("<HBB")
 _TOKEN = struct.Struct("<H")
+
+
+def check_size(payload: bytes) -> None:
+    """Raises MessageRefused if a user's message is too large."""
+    if len(payload) > MAX_MESSAGE_BYTES:
+        raise MessageRefused(
+            f"the message is too large: {len(payload)} bytes, "
+            f"at most {MAX_MESSAGE_BYTES} are possible"
+        )
 
 
 class Head(NamedTuple):

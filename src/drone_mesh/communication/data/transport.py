@@ -293,11 +293,7 @@ class Transport:
             )
         if not 0 <= port <= 255:
             raise MessageRefused(f"invalid port {port}: must be 0..255")
-        if len(payload) > packets.MAX_MESSAGE_BYTES:
-            raise MessageRefused(
-                f"the message is too large: {len(payload)} bytes, "
-                f"at most {packets.MAX_MESSAGE_BYTES} are possible"
-            )
+        packets.check_size(payload)
         queued = len(self._for_gateway) + sum(map(len, self._lanes.values()))
         if queued >= MOST_QUEUED:
             raise QueueFull(f"the queue is full: {queued} messages wait or are on their way")

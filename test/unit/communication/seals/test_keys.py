@@ -111,3 +111,21 @@ def test_the_keys_of_a_node_make_no_keys_for_others(tmp_path, capsys):
     write_key_file(tmp_path / "node", KEY.for_node(3))
     assert main(["node", str(tmp_path / "node"), "4", str(tmp_path / "other")]) == 1
     assert "holds no mesh key" in capsys.readouterr().err
+
+
+def test_a_key_file_that_is_not_there_is_one_line(tmp_path, capsys):
+    with pytest.raises(ConfigurationError) as error:
+        read_key_file(tmp_path / "none")
+    assert str(error.value) == f"key file {tmp_path}/none: No such file or directory"
+    assert main(["new", str(tmp_path / "none" / "key")]) == 1
+    assert capsys.readouterr().err == (
+        f"raspberry_key: key file {tmp_path}/none/key: No such file or directory\n"
+    )
+
+
+def test_a_file_of_other_bytes_is_no_key_file(tmp_path):
+    path = tmp_path / "key"
+    path.write_bytes(b"\xff\xfe")
+    path.chmod(0o600)
+    with pytest.raises(ConfigurationError, match="not a text file"):
+        read_key_file(path)
