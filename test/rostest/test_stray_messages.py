@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import socket
 import struct
+import subprocess
 import unittest
 from xmlrpc.client import ServerProxy
 
@@ -19,6 +20,7 @@ from drone_mesh.msg import DroneInfo
 
 STUCK = 30
 TAKEN_AWAY = "/taken/away"
+AGAIN_AND_AGAIN = "/taken/again"
 
 
 def subscribe_and_never_read(number: int) -> socket.socket:
@@ -62,6 +64,24 @@ class StrayMessagesTest(unittest.TestCase):
             lambda: self.mesh.info(2).totalMessages > sent and self.mesh.connected(),
         )
         self.assertEqual(self.log.failures(), [])
+
+    def test_two_who_disagree_about_a_topic_leave_it_open_in_the_end(self) -> None:
+        def announce_for_ever(topic: str) -> subprocess.Popen[bytes]:
+            info = f"{{nodeID: 2, sub: {topic}, 'on': true}}"
+            command = ["rostopic", "pub", "-r", "500", "/WirelessSignalSimulator"]
+            announcer = subprocess.Popen([*command, "drone_mesh/DroneInfo", info])
+            self.addCleanup(announcer.wait)
+            self.addCleanup(announcer.terminate)
+            return announcer
+
+        announcers = [announce_for_ever(topic) for topic in (AGAIN_AND_AGAIN, "/Node/2")]
+        wait_for("it to be taken away", WALL_LIMIT_S, lambda: AGAIN_AND_AGAIN in published_topics())
+        self.mesh.pass_time(20.0)
+        for announcer in announcers:
+            announcer.terminate()
+        wait_for("its own topic", WALL_LIMIT_S, lambda: AGAIN_AND_AGAIN not in published_topics())
+        self.assertIn("/Node/2", published_topics())
+        self.mesh.wait("all connected again", 40, self.mesh.connected)
 
     def test_subscribers_of_the_clock_that_never_read_cost_the_world_no_thread(self) -> None:
         factory = psutil.Process(pid_of("/DroneFactory"))

@@ -56,8 +56,9 @@ class WirelessSignalSimulator:
     """
 
     # The handlers run in the threads of rospy's connections. `_lock` guards the node table, the
-    # rays that it casts and the counts, and is never held during a send; `_opening` guards the set
-    # of topics.
+    # rays that it casts and the counts, and is never held during a send. `_opening` guards the set
+    # of topics and lets in one antenna's DroneInfo at a time, so that the topic that is open is the
+    # one in the node table.
 
     def __init__(self, max_distance_m: float, sees: Sees = None) -> None:
         """`sees` as for NodeTable. Raises AirError for an invalid distance."""
@@ -79,29 +80,41 @@ class WirelessSignalSimulator:
     def _drone_info(self, info: DroneInfo) -> None:
         try:
             if info.sub:
-                self._check_topic_type(info)
-            with self._lock:
-                known = self._nodes.node(info.nodeID)
-                self._nodes.drone_info(info.nodeID, info.position, info.sub, info.on)
+                self._antenna_info(info)
+            else:
+                self._note(info)
         except AirError as error:
             self._complaints.warning("DroneInfo dropped", str(error))
-            return
-        if info.sub and (known is None or known.topic != info.sub):
-            if known is not None and known.topic:
-                self._complaints.warning(
-                    "topic changed", f"node {info.nodeID}: from {known.topic} to {info.sub}"
-                )
-            self._open(info.nodeID, info.sub)
 
-    def _open(self, node_id: int, topic: str) -> None:
+    def _antenna_info(self, info: DroneInfo) -> None:
+        self._check_topic_type(info)
         with self._opening:
-            old_topic = self._topics.get(node_id)
-            self._topics[node_id] = topic
-            if topic not in self._antenna_topics:
-                self._antenna_topics[topic] = AntennaTopic(topic)
-            if old_topic is not None and old_topic not in self._topics.values():
-                self._antenna_topics.pop(old_topic).close()
+            self._note(info)
+            old_topic = self._open(info.nodeID, info.sub)
+        if old_topic is not None:
+            self._complaints.warning(
+                "topic changed", f"node {info.nodeID}: from {old_topic} to {info.sub}"
+            )
+
+    def _note(self, info: DroneInfo) -> None:
+        with self._lock:
+            self._nodes.drone_info(info.nodeID, info.position, info.sub, info.on)
+
+    def _open(self, node_id: int, topic: str) -> str | None:
+        """Open the node's topic; the topic that it replaces, None if it replaces none."""
+        old_topic = self._topics.get(node_id)
+        if topic == old_topic:
+            return None
+        self._topics[node_id] = topic
+        if topic not in self._antenna_topics:
+            self._antenna_topics[topic] = AntennaTopic(topic)
+        # An antenna's usual topic stays open: whoever takes its packets elsewhere for a moment does
+        # not cost it the connection.
+        usual = (names.node_topic(node) for node in self._topics)
+        if old_topic is not None and old_topic not in {*usual, *self._topics.values()}:
+            self._antenna_topics.pop(old_topic).close()
         _log.debug("node %d listens on %s", node_id, topic)
+        return old_topic
 
     def _check_topic_type(self, info: DroneInfo) -> None:
         """Refuse to publish packets on a topic of another type, such as /clock."""
