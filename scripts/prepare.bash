@@ -148,5 +148,5 @@ prepare_checks() {
 prepare_everything() {
   apt_install "${ros_packages[@]}" "${screen_packages[@]}"
   prepare_checks
-  pip_install requirements/browser.txt
+  pip_install requirements/{browser,docs}.txt
 }

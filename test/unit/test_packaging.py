@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -30,6 +32,7 @@ def top_level_imports(source: Path) -> set[str]:
     return names
 
 
+@pytest.mark.slow
 def test_each_file_of_the_python_package_is_installed(tmp_path: Path) -> None:
     command = [sys.executable, "setup.py", "-q", "build_py", "--build-lib", str(tmp_path)]
     subprocess.run(command, cwd=str(ROOT), check=True, capture_output=True, timeout=60)

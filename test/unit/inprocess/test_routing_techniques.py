@@ -103,6 +103,7 @@ def share_of_tree():
     return connected_share(network, seconds=60)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", ["etx_tree", "babel", "batman", SHORTEST_PATH])
 def test_on_links_that_lose_a_fifth_more_nodes_are_connected_than_with_the_tree(
     technique, share_of_tree

@@ -80,6 +80,7 @@ def test_the_measured_file_has_these_losses():
     assert {round(m): round(loss, 4) for m, loss in measured_losses()} == MEASURED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance_m", sorted(MEASURED))
 def test_sends_fail_as_often_as_was_measured(distance_m):
     """After the chip's 15 retransmissions, as in 2019, without another try; within 1 point."""
@@ -104,6 +105,7 @@ def packets_per_s(distance_m, packets=600):
     return packets / (lab.clock.now_s() - begin_s)
 
 
+@pytest.mark.slow
 def test_packets_take_longer_from_400_m_on_as_was_measured():
     """The throughput of 2019 at 200, 450 and 600 m: 180, 103 and 70 kbit/s.
 

@@ -91,6 +91,7 @@ def test_row_60_our_packets_and_broadcasts_reach_them(lab, theirs):
     assert ours.chip.warnings == []
 
 
+@pytest.mark.slow
 def test_their_packets_are_acknowledged_in_the_middle_of_ten_of_ours(lab, theirs):
     """Ours send to each other all the time, by rules of access that theirs does not know."""
     rng = random.Random(1)

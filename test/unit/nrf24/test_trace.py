@@ -71,6 +71,7 @@ def test_the_file_is_pcapng_with_nanoseconds_and_a_comment_for_each_frame(traffi
     assert b"frame from node 5" in packets[0][1]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_opens_the_file(traffic, tmp_path):
     path = tmp_path / "air.pcapng"

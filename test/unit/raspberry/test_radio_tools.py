@@ -123,6 +123,7 @@ def test_the_channels_suggested_are_quiet_apart_and_in_the_band():
     assert set(chosen) == {32, 72}
 
 
+@pytest.mark.slow
 def test_the_range_tool_counts_what_is_lost_at_each_power(bench):
     node = bench.make(EmulatedChip(bench.air, "node", (60.0, 0.0, 0.0)), 5)
     node.set_up()
@@ -168,6 +169,7 @@ def test_a_packet_of_a_type_that_is_not_known_is_shown_as_bytes():
     )
 
 
+@pytest.mark.slow
 def test_a_report_holds_checks_scan_and_machine(tmp_path, capsys):
     file = tmp_path / "report.txt"
     assert main(["--emulated", "30", "report", str(file)]) == 0

@@ -109,6 +109,7 @@ def test_each_drone_is_where_it_stands_in_the_colour_of_its_condition(shoot):
         assert share_of_colour(pixels, drone.colour, place, radius=3) > 0.5, drone
 
 
+@pytest.mark.slow
 def test_a_fleet_of_254_is_all_in_the_picture(shoot):
     drones = [
         DronePicture(k, Role.ROUTER, (6.0 * (k % 16), 6.0 * (k // 16), 0.0)) for k in range(254)
