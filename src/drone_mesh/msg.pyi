@@ -232,6 +232,21 @@ class Obstacle(Message, ObstacleStatus):
         yaw: float = ...,
     ) -> None: ...
 
+class PacketSample(Message):
+    carried: int
+    senders: bytes
+    receivers: bytes
+    types: bytes
+    ages: Sequence[float]
+    def __init__(
+        self,
+        carried: int = ...,
+        senders: bytes | Sequence[int] = ...,
+        receivers: bytes | Sequence[int] = ...,
+        types: bytes | Sequence[int] = ...,
+        ages: Sequence[float] = ...,
+    ) -> None: ...
+
 class ReceivedData(Message):
     header: std_msgs.msg.Header
     sender: int

@@ -70,6 +70,7 @@ def main() -> None:
         if options.haste and not mesh.paused:
             mesh.skip(FRAME_PERIOD_S * mesh.factor * options.haste)
         feed(mesh, store)
+        server.show_packets(*mesh.packets(FRAME_PERIOD_S))
         is_fed.set()
 
     while not asked_to_stop:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import random
 import threading
 import time
 from dataclasses import replace
 
+from drone_mesh.console.dots import Dot
 from drone_mesh.console.orders import OrderRefused
 from drone_mesh.inprocess.network import Network
 from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.model import EventRecord, MeshStatus
+from drone_mesh.state.packets import PacketSampler
 
 STEP_S = 0.05  # wall time between two steps of the clock
 
@@ -28,10 +31,28 @@ class InProcessMesh:
         self._lock = threading.Lock()
         self._network = Network(seed=1, max_distance_m=max_distance)
         self._network.add_fleet(1, routers, gridsize, spacing)
+        self._sampler = PacketSampler(random.Random(1))
+        self._sampled_s = 0.0  # simulated: when the sample was last taken
+        self._carry, self._network.air.send = self._network.air.send, self._noted
         self._layouts = Layouts({})
         self._batcher = EventBatcher()
         self._told = 0
         self.factor, self.paused = 1.0, False
+
+    def _noted(self, packet: bytes) -> bool:
+        carried = self._carry(packet)
+        if carried:
+            self._sampler.note(packet, self._network.now_s())
+        return carried
+
+    def packets(self, within_s: float) -> tuple[int, list[Dot]]:
+        """The packets since the last call, as if they had been carried within so many seconds."""
+        with self._lock:
+            carried, sample = self._sampler.take()
+            now_s = self._network.now_s()
+        passed_s, self._sampled_s = now_s - self._sampled_s, now_s
+        scale = within_s / passed_s if passed_s else 0.0
+        return carried, [Dot(*p[:3], (now_s - p.at_s) * scale) for p in sample]
 
     def run(self, stop: threading.Event) -> None:
         """Let time pass until told to stop."""

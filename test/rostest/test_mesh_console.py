@@ -8,6 +8,7 @@ import threading
 import unittest
 from urllib.request import urlopen
 
+import rosgraph
 import rospy
 import rostest
 import websockets.exceptions
@@ -29,6 +30,7 @@ class Page:
         self.nodes: dict[str, dict] = {}
         self.clock: dict = {}
         self.layouts: list = []
+        self.packets: list[dict] = []
         self.answers: dict[int, dict] = {}
         self._socket = websockets.sync.client.connect(
             f"ws://{HOST}/ws", origin=f"http://{HOST}", proxy=None, max_size=None
@@ -45,12 +47,17 @@ class Page:
     def _apply(self, message: dict) -> None:
         if message["type"] == "hello":
             self.layouts = message["layouts"]
+        elif message["type"] == "packets":
+            self.packets.append(message)
         elif message["type"] == "answer":
             self.answers[message["number"]] = message
         elif message["type"] == "frame":
             self.clock = message["clock"]
             for node, fields in message.get("nodes", {}).items():
                 self.nodes.setdefault(node, {}).update(fields)
+
+    def ask(self, **request: object) -> None:
+        self._socket.send(json.dumps(request))
 
     def order(self, **request: object) -> dict:
         number = len(self.answers) + 1
@@ -120,7 +127,27 @@ class MeshConsoleTest(unittest.TestCase):
         self.assertFalse(absent["done"])
         self.assertIn("no answer from /Nodes/200/powerSwitch", absent["text"])
 
-    def test_3_after_a_crash_of_the_console_a_page_finds_it_again(self) -> None:
+    def test_3_packets_of_the_air_are_sampled_while_a_page_shows_them(self) -> None:
+        def subscribers() -> list[str]:
+            _publishers, subscribers, _services = rosgraph.Master("/test").getSystemState()
+            return dict(subscribers).get("/mesh/packets", [])
+
+        page = open_page()
+        self.assertEqual(subscribers(), [])
+        page.ask(do="packets", on=True)
+        wait_for(
+            "a heartbeat between two nodes",
+            WALL_LIMIT_S,
+            lambda: any(
+                dot[2] == "heartbeat" and {dot[0], dot[1]} <= {0, 1, 2} and dot[0] != dot[1]
+                for message in list(page.packets)
+                for dot in message["dots"]
+            ),
+        )
+        page.ask(do="packets", on=False)
+        wait_for("no subscriber is left", WALL_LIMIT_S, lambda: subscribers() == [])
+
+    def test_4_after_a_crash_of_the_console_a_page_finds_it_again(self) -> None:
         open_page()
         kill_and_wait_for_respawn("/mesh_console")
         open_page()

@@ -132,6 +132,13 @@ class Demonstrate(_Request):
     on: bool
 
 
+class PacketWatch(_Request):
+    """The page wants to be shown packets, or no longer."""
+
+    do: Literal["packets"]
+    on: bool
+
+
 class TimeLine(_Request):
     """The page wants to look at another moment; None: as it is."""
 
@@ -164,11 +171,21 @@ class _Numbered(_Request):
     number: int
 
 
-Request = Union[PageOrder, NeighbourWatch, Demonstrate, TimeLine]
+Request = Union[PageOrder, NeighbourWatch, PacketWatch, Demonstrate, TimeLine]
 
 _REQUESTS: TypeAdapter[Request] = TypeAdapter(
     Annotated[
-        Union[_Power, _Fly, _Layout, _Places, _Speed, NeighbourWatch, Demonstrate, TimeLine],
+        Union[
+            _Power,
+            _Fly,
+            _Layout,
+            _Places,
+            _Speed,
+            NeighbourWatch,
+            PacketWatch,
+            Demonstrate,
+            TimeLine,
+        ],
         Field(discriminator="do"),
     ]
 )

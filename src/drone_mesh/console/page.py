@@ -8,6 +8,7 @@ from typing import Any, Iterator
 
 from starlette.websockets import WebSocket
 
+from drone_mesh.console.dots import PacketDots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import TimeLine
@@ -23,6 +24,7 @@ class Page:
         """`is_live`: there is a present, to which the page can return."""
         self.socket = socket
         self.watching: int | None = None  # the node whose neighbours it shows
+        self.packets = PacketDots()
         self.orders: set[asyncio.Task[None]] = set()
         self._live, self._history, self._is_live = live, history, is_live
         self._player = None if is_live else Player(history, history.times[0])
@@ -46,6 +48,7 @@ class Page:
             yield frame
             if self.watching is not None:
                 yield self.detail(self.watching)
+        yield from self.packets.messages(self._player is None)
         if self._history.times:
             yield from self._time_line_messages()
 

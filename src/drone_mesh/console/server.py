@@ -25,6 +25,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import (
@@ -33,6 +34,7 @@ from drone_mesh.console.orders import (
     MeshControls,
     NeighbourWatch,
     OrderRefused,
+    PacketWatch,
     PageOrder,
     TimeLine,
     number_of,
@@ -51,7 +53,7 @@ SEND_TIMEOUT_S = 10.0
 MOST_PAGES = 32
 MOST_ORDERS_WAITING = 16  # per page
 ORDER_THREADS = 8
-ALL_ACTIONS = ("fly", "power", "layout", "speed", "demonstrate")
+ALL_ACTIONS = ("fly", "power", "layout", "speed", "demonstrate", "packets")
 COOKIE = "drone_mesh_token"
 POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1
 TRY_LATER = 1013  # registry of close codes of RFC 6455
@@ -147,6 +149,16 @@ class ConsoleServer:
             middleware=[Middleware(Guard, access=access)],
         )
 
+    @property
+    def packets_wanted(self) -> bool:
+        """Whether a page draws packets. Any thread."""
+        return any(page.packets.wanted for page in tuple(self._pages))
+
+    def show_packets(self, carried: int, dots: Sequence[Dot]) -> None:
+        """So many packets arrived; `dots` are a sample of them."""
+        for page in self._pages:
+            page.packets.add(carried, dots)
+
     def close(self) -> None:
         """Accept no more orders. Those under way end by themselves."""
         self._workers.shutdown(wait=False)
@@ -239,6 +251,8 @@ class ConsoleServer:
                 await self._send(page, page.detail(request.node))
         elif isinstance(request, TimeLine):
             page.move(request)
+        elif isinstance(request, PacketWatch):
+            page.packets.wanted = request.on
         elif isinstance(request, Demonstrate):
             try:
                 text = self._stage.begin() if request.on else self._stage.end()

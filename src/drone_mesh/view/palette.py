@@ -8,6 +8,7 @@ from typing import Mapping
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
+from drone_mesh.state.packets import PacketKind
 from drone_mesh.state.trouble import Severity
 
 Colour = str  # "#rrggbb"
@@ -45,6 +46,10 @@ class Palette:
     def of_link(self, use: LinkUse) -> Colour:
         """The colour of a link."""
         return self.named(_LINK_COLOUR_NAMES[use])
+
+    def of_packet(self, kind: PacketKind) -> Colour:
+        """The colour of a packet."""
+        return self.named(_PACKET_COLOUR_NAMES[kind])
 
     @property
     def path(self) -> Colour:
@@ -84,6 +89,17 @@ _LINK_COLOUR_NAMES: Mapping[LinkUse, str] = {
     LinkUse.KNOWN: "known",
     LinkUse.LOST: "disconnected",
 }
+# Of dots, which have an edge in the colour of the card: they also run along lines of their colour.
+_PACKET_COLOUR_NAMES: Mapping[PacketKind, str] = {
+    PacketKind.HEARTBEAT: "accent",
+    PacketKind.INTRODUCTION: "connected",
+    PacketKind.POSITION: "silent",
+    PacketKind.REPAIR: "disconnected",
+    PacketKind.ORDER: "flying",
+    PacketKind.REPORT: "gateway",
+    PacketKind.DATA: "crashed",
+    PacketKind.OTHER: "off",
+}
 _ANSI_OF_SEVERITY: Mapping[Severity, int] = {
     Severity.OK: 32,  # green
     Severity.WARN: 33,  # yellow
@@ -118,6 +134,7 @@ def css_variables(palette: Palette) -> str:
     colours.update(
         {f"{use.name.lower()}-link": palette.of_link(use) for use in LinkUse}, path=palette.path
     )
+    colours.update({f"packet-{kind.value}": palette.of_packet(kind) for kind in PacketKind})
     variables = " ".join(f"--{name}: {colour};" for name, colour in colours.items())
     return f"color-scheme: {'dark' if palette is DARK else 'light'}; {variables}"
 

@@ -9,6 +9,7 @@ from typing import Any, Awaitable, Callable
 import pytest
 
 from drone_mesh.console import server as server_module
+from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import OrderRefused
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
@@ -115,7 +116,7 @@ def test_a_page_is_greeted_and_then_gets_everything():
             "type": "hello",
             "layouts": [[0, "0: field case"]],
             "limits": {"coordinate": 5000.0, "height": 500.0},
-            "actions": ["fly", "power", "layout", "speed", "demonstrate"],
+            "actions": ["fly", "power", "layout", "speed", "demonstrate", "packets"],
             "recording": "",
         }
         assert page.received[1]["full"]
@@ -231,5 +232,32 @@ def test_so_many_pages_and_no_more_and_the_place_of_one_that_vanished_is_free():
         await until("it is forgotten", pages[0].task.done)
         later = FakePage(server).open()
         await until("greeted", lambda: later.received)
+
+    run(scenario)
+
+
+def test_packets_are_shown_only_to_pages_that_want_them_and_look_at_the_present():
+    async def scenario(server: ConsoleServer, store: FrameStore) -> None:
+        page, other = FakePage(server).open(), FakePage(server).open()
+        await until("both pages", lambda: page.of_type("frame") and other.of_type("frame"))
+        assert not server.packets_wanted
+        page.say(do="packets", on=True)
+        await until("the wish", lambda: server.packets_wanted)
+        server.show_packets(7, [Dot(1, 0, 4, 0.1234)])
+        await until("the packets", lambda: page.of_type("packets"))
+        assert page.of_type("packets") == [
+            {"type": "packets", "carried": 7, "dots": [[1, 0, "heartbeat", 0.123]]}
+        ]
+        page.say(do="packets", on=False)
+        await until("no wish", lambda: not server.packets_wanted)
+        server.show_packets(7, [Dot(1, 0, 4, 0.1234)])
+        store.set_link("a sign")
+        await until("the sign", lambda: page.of_type("frame")[-1]["link"] == "a sign")
+        assert len(page.of_type("packets")) == 1
+        assert other.of_type("packets") == []
+        page.say(do="packets", on=True)
+        await until("the wish", lambda: server.packets_wanted)
+        page.vanish()
+        await until("no page wants any", lambda: not server.packets_wanted)
 
     run(scenario)

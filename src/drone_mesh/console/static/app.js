@@ -7,6 +7,7 @@ import { Flights } from "./flights.js";
 import { EventLog } from "./log.js";
 import { MapView } from "./map.js";
 import { Mesh } from "./mesh.js";
+import { PacketDots } from "./packets.js";
 import { NodePanel } from "./panel.js";
 import { Story } from "./story.js";
 import { NodeTable } from "./table.js";
@@ -63,6 +64,7 @@ const panel = new NodePanel(
 );
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
+const packets = new PacketDots(mesh, map, connection, byId("map-card"));
 new TimeLine(mesh, (request) => connection.ask({ do: "time", ...request }));
 new Story(mesh, (on) => order({ do: "demonstrate", on }));
 mesh.addEventListener("story", () => mesh.story.running && !map.moved && map.fit());
@@ -245,6 +247,7 @@ function showTheme() {
     localStorage.getItem(THEME_KEY) ?? (dark.matches ? "dark" : "light");
   map.themeChanged();
   charts.themeChanged();
+  packets.themeChanged();
 }
 dark.addEventListener("change", showTheme);
 byId("theme").addEventListener("click", () => {

@@ -62,6 +62,7 @@ export class Connection extends EventTarget {
 
   #receive(message) {
     if (message.type === "frame") this.mesh.apply(message);
+    else if (message.type === "packets") this.mesh.applyPackets(message);
     else if (message.type === "detail") this.mesh.applyDetail(message);
     else if (message.type === "timeline") this.mesh.applyTimeLine(message);
     else if (message.type === "marks") this.mesh.applyMarks(message);

@@ -22,6 +22,7 @@ export class MapView {
     this.legendObstacle = card.querySelector("#legend-obstacle");
     this.fly = fly;
     this.camera = new Camera();
+    this.radius = 0; // of a drone, px
     this.following = false; // keeps the selected node in the middle
     this.held = []; // [{id, x, y}] that are about to leave
     this.options = { known: true, ranges: false };
@@ -111,6 +112,7 @@ export class MapView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const options = { ...this.options, covered: this.#covered() };
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.#goals());
+    this.radius = drawn.radius;
     this.#describe(drawn);
     this.#keepTurning(drawn);
   }

@@ -100,6 +100,10 @@ export class Mesh extends EventTarget {
     this.#notify("marks");
   }
 
+  applyPackets(packets) {
+    this.#notify("packets", packets);
+  }
+
   applyHello({ layouts, limits, actions, recording }) {
     this.recording = recording;
     this.actions = actions;

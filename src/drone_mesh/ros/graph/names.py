@@ -30,6 +30,7 @@ FLEET_PARAM = "/drone_mesh/fleet"  # the factory's configuration, for hosts in o
 REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
 STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> people
 EVENTS_TOPIC = "/mesh/events"  # MeshEvent: DroneFactory -> people
+PACKETS_TOPIC = "/mesh/packets"  # PacketSample: simulator -> people, while there is a subscriber
 DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> people
 
 MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz

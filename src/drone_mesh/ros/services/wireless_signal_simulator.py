@@ -22,6 +22,7 @@ from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_stop
 from drone_mesh.ros.services.antenna_topic import AntennaTopic
+from drone_mesh.ros.services.packet_samples import PacketSamples
 from drone_mesh.srv import (
     AreaScan,
     AreaScanRequest,
@@ -48,7 +49,8 @@ class WirelessSignalSimulator:
                 and ~obstacle_radio (block or wall), overriding the YAML file in ~config
                 (config/factory.yaml by default)
     Subscribes: /WirelessSignalSimulator (DroneInfo)
-    Publishes:  the topic in each antenna's DroneInfo, usually /Node/<id> (NRF24)
+    Publishes:  the topic in each antenna's DroneInfo, usually /Node/<id> (NRF24); while there is
+                a subscriber, a sample of all packets on /mesh/packets (PacketSample)
     Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
                 (AreaScan), /SignalSimulator/messages (WirelessMessages),
                 /SignalSimulator/broadcast (Broadcast)
@@ -69,6 +71,8 @@ class WirelessSignalSimulator:
         self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
         self._complaints = ThrottledLog(_log)
         self._delivered = self._lost = 0
+        self._samples = PacketSamples()
+        self._samples.start()
         # The services first: a host that sees the subscription may call at once.
         rospy.Service(names.MESSAGE_SERVICE, WirelessMessage, self._message)
         rospy.Service(names.MESSAGES_SERVICE, WirelessMessages, self._messages)
@@ -186,6 +190,8 @@ class WirelessSignalSimulator:
     def _carry(self, topic: str, message: NRF24) -> bool:
         listener = self._antenna_topics.get(topic)
         delivered = listener is not None and listener.deliver(message)
+        if delivered and self._samples.watched:
+            self._samples.note(message.payload)
         with self._lock:
             if delivered:
                 self._delivered += 1

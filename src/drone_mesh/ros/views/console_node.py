@@ -11,6 +11,7 @@ from functools import partial
 import rosgraph
 import rospy
 
+from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import MeshControls, Recorded
@@ -18,7 +19,7 @@ from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
-from drone_mesh.msg import MeshEvent, MeshState
+from drone_mesh.msg import MeshEvent, MeshState, PacketSample
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node, run_tool
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
@@ -38,21 +39,24 @@ log = logging.getLogger(__name__)
 
 
 class MeshFeed:
-    """Passes states and events from ROS to the store, which the runner's loop owns.
+    """Passes what ROS says to the store and the server, which the runner's loop owns.
 
-    Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent)
+    Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent); while a page draws packets,
+                /mesh/packets (PacketSample)
 
     A restarted master does not know our subscriptions, so they are made again. `_latest` passes
     from the subscriber's thread to the loop; a loop that lags behind skips states.
     """
 
-    def __init__(self, store: FrameStore, runner: ConsoleRunner) -> None:
+    def __init__(self, store: FrameStore, server: ConsoleServer, runner: ConsoleRunner) -> None:
         self._store = store
+        self._server = server
         self._runner = runner
         self._latest: MeshState | None = None
         self._heard_s = float("-inf")
         self._run_id: str | None = None
         self._subscribers: list[rospy.Subscriber] = []
+        self._packets: rospy.Subscriber | None = None
 
     def watch_master(self, stop: StopRequest) -> None:
         """Keep the subscriptions alive until the program is to end; for the main thread."""
@@ -67,14 +71,29 @@ class MeshFeed:
                 self._subscribe()
             elif time.monotonic() - self._heard_s > OLD_STATE_S:
                 self._report("no data from the simulation")
+            self._watch_packets()
 
     def _subscribe(self) -> None:
         for subscriber in self._subscribers:
             subscriber.unregister()
+        if self._packets is not None:
+            self._packets.unregister()
+            self._packets = None
         self._subscribers = [
             rospy.Subscriber(names.STATE_TOPIC, MeshState, self._on_state, queue_size=1),
             rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._on_event),
         ]
+
+    def _watch_packets(self) -> None:
+        """The simulator samples packets for as long as there is a subscriber."""
+        wanted = self._server.packets_wanted
+        if wanted and self._packets is None:
+            self._packets = rospy.Subscriber(
+                names.PACKETS_TOPIC, PacketSample, self._on_packets, queue_size=1
+            )
+        elif not wanted and self._packets is not None:
+            self._packets.unregister()
+            self._packets = None
 
     def _report(self, text: str) -> None:
         self._runner.in_loop(partial(self._store.set_link, text))
@@ -92,6 +111,11 @@ class MeshFeed:
 
     def _on_event(self, message: MeshEvent) -> None:
         self._runner.in_loop(partial(self._store.add_events, [event_record(message)]))
+
+    def _on_packets(self, message: PacketSample) -> None:
+        packets = zip(message.senders, message.receivers, message.types, message.ages)
+        dots = [Dot(*packet) for packet in packets]
+        self._runner.in_loop(partial(self._server.show_packets, message.carried, dots))
 
 
 def layout_names(layouts: Layouts) -> list[tuple[int, str]]:
@@ -148,7 +172,7 @@ def _run() -> int:
         print("the demonstration begins when a browser opens this page:", flush=True)
     print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
     try:
-        MeshFeed(store, runner).watch_master(stop)
+        MeshFeed(store, server, runner).watch_master(stop)
     finally:
         runner.stop()
     return 0

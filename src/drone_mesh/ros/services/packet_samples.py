@@ -1,0 +1,78 @@
+"""PacketSamples: publishes a sample of the packets in the air while there is a subscriber."""
+
+from __future__ import annotations
+
+import random
+import threading
+import time
+
+import rospy
+
+from drone_mesh.msg import PacketSample
+from drone_mesh.ros.graph import names
+from drone_mesh.state.packets import PacketSampler
+
+PERIOD_S = 0.2  # wall time; as often as pages are sent anything
+QUEUE = 2  # samples that may wait for a slow subscriber
+
+
+class PacketSamples(rospy.SubscribeListener):
+    """Publishes in a thread of its own, which sleeps while there is no subscriber.
+
+    Publishes: /mesh/packets (PacketSample)
+
+    Any thread may call `note`; `_lock` guards the sampler.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._sampler = PacketSampler(random.Random())  # what is seen of a run, not the run
+        self._watched = threading.Event()
+        self._publisher = rospy.Publisher(
+            names.PACKETS_TOPIC, PacketSample, subscriber_listener=self, queue_size=QUEUE
+        )
+        self._thread = threading.Thread(target=self._run, name="packet samples", daemon=True)
+
+    @property
+    def watched(self) -> bool:
+        """Whether there is a subscriber; only then is `note` worth a call."""
+        return self._watched.is_set()
+
+    def note(self, packet: bytes) -> None:
+        """A packet was delivered."""
+        with self._lock:
+            self._sampler.note(packet, time.monotonic())
+
+    def start(self) -> None:
+        """Start publishing, until the node shuts down."""
+        rospy.on_shutdown(self._watched.set)
+        self._thread.start()
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """A subscriber has come (a thread of rospy)."""
+        self._watched.set()
+
+    def peer_unsubscribe(self, _topic: str, peers: int) -> None:
+        """A subscriber has left, and so many are still there (a thread of rospy)."""
+        if not peers and not rospy.is_shutdown():
+            self._watched.clear()
+
+    def _run(self) -> None:
+        while self._watched.wait() and not rospy.is_shutdown():
+            time.sleep(PERIOD_S)
+            try:
+                self._publisher.publish(self._message())
+            except rospy.ROSException:  # the topic was closed: the node shuts down
+                return
+
+    def _message(self) -> PacketSample:
+        with self._lock:
+            carried, packets = self._sampler.take()
+        now_s = time.monotonic()
+        return PacketSample(
+            carried=carried,
+            senders=bytes(packet.sender for packet in packets),
+            receivers=bytes(packet.receiver for packet in packets),
+            types=bytes(packet.type for packet in packets),
+            ages=[now_s - packet.at_s for packet in packets],
+        )

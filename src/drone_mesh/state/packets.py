@@ -1,0 +1,89 @@
+"""Packets of the air, for people who watch: what kind each one is, and a sample of bounded size."""
+
+from __future__ import annotations
+
+import enum
+import random
+from typing import Mapping, NamedTuple, Sequence
+
+from drone_mesh.communication.messages import (
+    DATA_TYPES,
+    MessageType,
+    receiver,
+    sender,
+    type_of,
+)
+
+MOST_SAMPLED = 120  # our choice, for a fifth of a second: more dots cannot be followed
+
+
+class PacketKind(enum.Enum):
+    """What a packet is about, as a legend shows it."""
+
+    HEARTBEAT = "heartbeat"
+    INTRODUCTION = "introduction"
+    POSITION = "position"
+    REPAIR = "repair"  # a node is missing, or a bid to fly
+    ORDER = "order"  # to fly, and the answers to it
+    REPORT = "report"  # of a node to the gateway
+    DATA = "data"  # of users
+    OTHER = "other"  # of a routing technique, of keys, or of unknown type
+
+
+_KINDS: Mapping[int, PacketKind] = {
+    MessageType.LOCATION: PacketKind.POSITION,
+    MessageType.REQUESTLOCATION: PacketKind.POSITION,
+    MessageType.GATEWAY_PLACE: PacketKind.POSITION,
+    MessageType.PRESENT: PacketKind.INTRODUCTION,
+    MessageType.HEARTBEAT: PacketKind.HEARTBEAT,
+    MessageType.MISSING: PacketKind.REPAIR,
+    MessageType.MOVEMENT_NEGOTIATION: PacketKind.REPAIR,
+    MessageType.MOVE_TO_LOCATION: PacketKind.ORDER,
+    MessageType.ORDER_REPLY: PacketKind.ORDER,
+    MessageType.ORDER_QUERY: PacketKind.ORDER,
+    MessageType.NODE_REPORT: PacketKind.REPORT,
+    MessageType.NODE_WORDS: PacketKind.REPORT,
+    MessageType.NODE_SEARCH: PacketKind.REPORT,
+}
+
+
+def kind_of(packet_type: int) -> PacketKind:
+    """The kind of a packet with this byte 2."""
+    if packet_type in DATA_TYPES:
+        return PacketKind.DATA
+    return _KINDS.get(packet_type, PacketKind.OTHER)
+
+
+class SampledPacket(NamedTuple):
+    """One packet that arrived."""
+
+    sender: int  # of this hop
+    receiver: int
+    type: int
+    at_s: float  # when, by the clock of whoever notes it
+
+
+class PacketSampler:
+    """A sample of the packets since it was last taken, each as likely as any other."""
+
+    def __init__(self, rng: random.Random, most: int = MOST_SAMPLED) -> None:
+        self._rng, self._most = rng, most
+        self._carried = 0
+        self._sample: list[SampledPacket] = []
+
+    def note(self, packet: bytes, at_s: float) -> None:
+        """A packet arrived."""
+        self._carried += 1
+        place = len(self._sample)
+        if place >= self._most:  # Vitter's algorithm R
+            place = self._rng.randrange(self._carried)
+            if place >= self._most:
+                return
+        sampled = SampledPacket(sender(packet), receiver(packet), type_of(packet), at_s)
+        self._sample[place : place + 1] = [sampled]
+
+    def take(self) -> tuple[int, Sequence[SampledPacket]]:
+        """How many packets arrived, and those of the sample, oldest first."""
+        carried, sample = self._carried, self._sample
+        self._carried, self._sample = 0, []
+        return carried, sorted(sample, key=lambda packet: packet.at_s)
