@@ -26,6 +26,21 @@ def feed(mesh: InProcessMesh, store: FrameStore) -> None:
         store.add_events(events)
 
 
+def recorded(options: argparse.Namespace) -> History:
+    """All of a run of the same mesh; node 5 goes off in its middle."""
+    mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
+    states, events = [], []
+    steps = int(options.recorded * 2)
+    for step in range(steps):
+        if step == steps // 2:
+            mesh.power(5, False)
+        mesh.skip(0.5)
+        state, happened = mesh.look()
+        states.append(state)
+        events += happened
+    return History.of(states, events)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, default=8181)
@@ -43,14 +58,24 @@ def main() -> None:
     )
     parser.add_argument("--demonstrate", action="store_true")
     parser.add_argument("--recording", default="")
+    parser.add_argument(
+        "--recorded", type=float, default=0.0, help="simulated seconds of a recording; 2 a second"
+    )
     options = parser.parse_args()
     logging.basicConfig(level=logging.INFO)
     mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
+    whole = recorded(options) if options.recorded else None
     mesh.skip(options.skip)
-    store = FrameStore(History())
+    store = FrameStore(History() if whole is None else None)
     access = access_for(options.address, options.token)
     server = ConsoleServer(
-        store, mesh, access, LAYOUTS, options.demonstrate, recording=options.recording
+        store,
+        mesh,
+        access,
+        LAYOUTS,
+        options.demonstrate,
+        recording=options.recording,
+        whole=whole,
     )
     runner = ConsoleRunner(server, options.address, options.port)
     stop = threading.Event()

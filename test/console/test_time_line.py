@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
 from conftest import Visit
 
@@ -82,14 +80,29 @@ def test_one_page_looks_back_while_another_stays_in_the_present(start_console, v
     assert clock_s(other) > 12.0
 
 
-def test_a_recording_that_is_played_wears_a_badge_and_takes_no_orders(start_console, visit):
-    page = visit(start_console(*HASTE, "--recording", "run.bag").url)
+def test_all_of_a_recording_that_is_played_can_be_looked_at_at_once(start_console, visit):
+    recording = ("--recording", "run.bag", "--recorded", "80")
+    page = visit(start_console("--skip", "2", "--haste", "1", *recording).url)
     page.wait_for_drones(18)
     page.wait_for("the badge", lambda: page.page.is_visible("#badge"))
-    assert re.match("run.bag", page.page.title())
+    assert page.page.title() == "run.bag: recording"
     page.page.click("#nodes tr[data-id='5']")
     for order in ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate"):
         assert not page.page.is_visible(order)
+    assert page.page.inner_text("#time-now").endswith(" of 80 s")
+    assert clock_s(page) < 40.0
+    drag_to(page, 0.9)
+    page.wait_for("later than what was played", lambda: clock_s(page) > 65.0)
+    page.wait_for("5 is off by then", lambda: page.row(5, 2) == "off")
+    page.page.click("#time-play")
+    page.wait_for("it is paused", lambda: page.page.inner_text("#time-play") == "Play")
+    page.page.click("#time-live")
+    page.wait_for("where it is played", lambda: clock_s(page) < 60.0)
+    assert page.row(5, 2) == "connected"
+    before_s = clock_s(page)
+    page.page.click("#time-play")
+    page.wait_for("a pause there", lambda: page.page.inner_text("#time-play") == "Play")
+    assert before_s - 0.5 <= clock_s(page) < 60.0  # the recording has two states a second
 
 
 def test_the_map_stays_where_it_is_when_the_time_line_appears(start_console, visit):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -14,12 +15,15 @@ import genpy
 import rosbag
 import rospy
 import rostest
+import websockets.exceptions
+import websockets.sync.client
 from rosgraph_msgs.msg import Clock
 from rostest_support import WALL_LIMIT_S, wait_for
 
 from drone_mesh.msg import MeshState, NodeState
 
 BEGIN_S, LENGTH_S = 100.0, 4.0
+PORT = 18182
 
 
 def record(path: Path) -> None:
@@ -41,9 +45,10 @@ class ReplayTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.bag = Path(folder.name, "run.bag")
 
-    def launch(self, *arguments: str) -> subprocess.Popen[str]:
+    def launch(self, *arguments: str, console: bool = False) -> subprocess.Popen[str]:
+        shown = f"console:={str(console).lower()}"
         process = subprocess.Popen(
-            ["roslaunch", "drone_mesh", "replay.launch", "console:=false", *arguments],
+            ["roslaunch", "drone_mesh", "replay.launch", shown, *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             start_new_session=True,
@@ -80,6 +85,28 @@ class ReplayTest(unittest.TestCase):
         self.assertGreaterEqual(ticks[0], BEGIN_S - 0.1)
         refused, _ = self.launch(f"bag:={self.bag}").communicate(timeout=60)
         self.assertIn("/mesh_replay already publishes /clock", refused)
+
+    def test_3_the_page_has_all_of_the_bag_on_its_time_line_while_it_is_played(self) -> None:
+        record(self.bag)
+        self.launch(f"bag:={self.bag}", "rate:=0.1", f"port:={PORT}", console=True)
+        lines: list[dict] = []
+
+        def looked() -> bool:
+            try:
+                with websockets.sync.client.connect(
+                    f"ws://127.0.0.1:{PORT}/ws", origin=f"http://127.0.0.1:{PORT}", proxy=None
+                ) as page:
+                    lines.append(json.loads(page.recv(timeout=1.0)))
+                    while lines[-1]["type"] != "timeline":
+                        lines.append(json.loads(page.recv(timeout=1.0)))
+            except (OSError, TimeoutError, websockets.exceptions.WebSocketException):
+                return False
+            return lines[-1]["end"] > BEGIN_S + LENGTH_S - 0.5
+
+        wait_for("the end of the bag on the time line", 60, looked)
+        self.assertEqual(lines[-1]["start"], BEGIN_S)
+        self.assertLess(lines[-1]["now"], BEGIN_S + LENGTH_S - 0.5)
+        self.assertTrue(lines[-1]["live"])
 
 
 if __name__ == "__main__":

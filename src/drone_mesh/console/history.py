@@ -47,10 +47,15 @@ class History:
     def of(cls, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> History:
         """A whole recorded run, oldest first."""
         history = cls(math.inf, math.inf)
-        for state in states:
-            history._append(state)
+        history.extend(states)
         history.add_events(sorted(events, key=lambda event: event.stamp_s))
         return history
+
+    def extend(self, states: Iterable[MeshStatus]) -> None:
+        """Keep these of a recording, oldest first; of several at the same time only the first."""
+        for state in states:
+            if not self.times or state.stamp_s > self.times[-1]:
+                self._append(state)
 
     def add(self, mesh: MeshStatus, wall_s: float) -> None:
         """Keep this state of a live run, if the last one is old enough. A new run clears it."""

@@ -21,7 +21,7 @@ class Page:
     def __init__(
         self, socket: WebSocket, live: FrameStore, history: History, is_live: bool
     ) -> None:
-        """`is_live`: there is a present, to which the page can return."""
+        """`is_live`: there is a present, to which the page can return; else there is a history."""
         self.socket = socket
         self.watching: int | None = None  # the node whose neighbours it shows
         self.packets = PacketDots()
@@ -60,7 +60,7 @@ class Page:
         if not self._history.times:
             return
         if self._player is None:
-            self._look_at(Player(self._history, self._history.times[-1]))
+            self._look_at(Player(self._history, self._present_s()))
         player = self._player
         assert player is not None
         if request.factor is not None:
@@ -83,19 +83,26 @@ class Page:
             return
         player.advance(wall_s)
         if self._is_live and player.at_end and not player.paused:
-            self._look_at(None)
+            mesh = self._live.mesh
+            if mesh is not None and mesh.stamp_s >= player.now_s:
+                self._look_at(None)
+
+    def _present_s(self) -> float:
+        """Simulated seconds; of a recording that is played, how far that has come."""
+        mesh = self._live.mesh
+        return self._history.times[0] if mesh is None else mesh.stamp_s
 
     def _look_at(self, player: Player | None) -> None:
         self._player, self._version = player, 0
 
     def _time_line_messages(self) -> Iterator[str]:
         times, player = self._history.times, self._player
-        now_s = times[-1] if player is None else player.now_s
+        now_s = self._present_s() if player is None else player.now_s
         time_line = {
             "type": "timeline",
             "start": times[0],
             "end": times[-1],
-            "now": now_s,
+            "now": min(max(now_s, times[0]), times[-1]),
             "live": player is None,
             "paused": player is not None and player.paused,
             "factor": 1.0 if player is None else player.factor,

@@ -123,17 +123,20 @@ class ConsoleServer:
         demonstrate: bool = False,
         actions: Sequence[str] = ALL_ACTIONS,
         recording: str = "",
+        whole: History | None = None,
+        is_played: bool = True,
     ) -> None:
         """`demonstrate`: show a repair as soon as a page is open; `actions`: what it offers.
 
-        `recording`: its name, if the console shows one. A recording that is in the store's history
-        as a whole, and not played, is shown from its start.
+        `recording`: its name, if the console shows one; `whole`: all of it. Without it, pages look
+        back at the store's history. A recording that is not played is shown from its start.
         """
         self._actions = actions
         self._store = store
         self._controls = controls
         self._layouts = layouts
-        self._history = History() if store.history is None else store.history
+        self._history = whole or store.history or History()
+        self._is_played = is_played
         self._recording = recording
         self._pages: set[Page] = set()
         self._workers = ThreadPoolExecutor(ORDER_THREADS, thread_name_prefix="order")
@@ -179,8 +182,7 @@ class ConsoleServer:
         if len(self._pages) >= MOST_PAGES:
             await socket.close(TRY_LATER)
             return
-        is_live = not (self._recording and self._store.mesh is None and self._history.times)
-        page = Page(socket, self._store, self._history, is_live)
+        page = Page(socket, self._store, self._history, self._is_played)
         self._pages.add(page)
         sender = None
         try:

@@ -21,8 +21,10 @@ def serve_replay(
     states: Sequence[MeshStatus], events: Sequence[EventRecord], title: str, port: int
 ) -> None:
     """Serve until Ctrl-C. Raises ConfigurationError if the port is not available."""
-    store = FrameStore(History.of(states, events))
-    server = ConsoleServer(store, Recorded(), Access(), recording=title)
+    whole = History.of(states, events)
+    server = ConsoleServer(
+        FrameStore(), Recorded(), Access(), recording=title, whole=whole, is_played=False
+    )
     runner = ConsoleRunner(server, LOOPBACK, port)
     runner.start()
     print(f"{title}: {runner.url}  (Ctrl-C ends it)", flush=True)

@@ -104,3 +104,8 @@ def test_the_store_fills_the_history_that_it_is_given():
     store.add_events([EventRecord(1.0, 0, "flight decided", (2,))])
     assert history.times == [1.0]
     assert history.marks == [{"t": 1.0, "kind": "flight", "node": 0}]
+
+
+def test_a_recording_keeps_one_state_of_each_time_and_none_that_goes_back():
+    history = History.of([mesh(1.0), mesh(1.0), mesh(2.0), mesh(1.5), mesh(3.0)], [])
+    assert history.times == [1.0, 2.0, 3.0]

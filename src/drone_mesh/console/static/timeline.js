@@ -30,7 +30,10 @@ export class TimeLine {
     const { recording } = this.mesh;
     document.body.toggleAttribute("data-recording", Boolean(recording));
     byId("badge").hidden = !recording;
-    if (recording) document.title = `${recording}: recording`;
+    if (!recording) return;
+    document.title = `${recording}: recording`;
+    byId("time-live").textContent = "As played";
+    byId("time-live").title = "Return to where the recording is being played";
   }
 
   #show() {
@@ -41,7 +44,8 @@ export class TimeLine {
     this.slider.max = end;
     if (!this.dragging) this.slider.value = now;
     this.slider.setAttribute("aria-valuetext", `${now.toFixed(1)} s`);
-    byId("time-now").textContent = live ? "now" : `${now.toFixed(1)} of ${end.toFixed(0)} s`;
+    const isNow = live && !this.mesh.recording;
+    byId("time-now").textContent = isNow ? "now" : `${now.toFixed(1)} of ${end.toFixed(0)} s`;
     const play = byId("time-play");
     play.textContent = paused ? "Play" : "Pause";
     play.setAttribute("aria-label", paused ? "play" : "pause");

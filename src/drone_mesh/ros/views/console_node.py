@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+import math
 import secrets
 import socket
 import time
 from functools import partial
+from pathlib import Path
 
 import rosgraph
 import rospy
@@ -26,6 +28,7 @@ from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import manager_layouts
 from drone_mesh.ros.views.console_controls import RosControls
+from drone_mesh.ros.views.recording import Recording
 from drone_mesh.stopping import StopRequest
 from drone_mesh.web.access import access_for, is_loopback
 
@@ -135,7 +138,7 @@ def main() -> None:
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
     (str): password of the console; if none is given, an address that other machines can reach
     gets a random one; ~demo (str): "repair" shows a repair as soon as a page is open;
-    ~recording (str): the name of the recording that is played, which takes no orders.
+    ~recording (str): path of the bag that is played; its page takes no orders.
     /DroneManager/casus (str): the file of the layouts.
     """
     prepare_node(main.__doc__)
@@ -154,12 +157,19 @@ def _run() -> int:
     if demo not in ("", REPAIR_DEMO):
         raise ConfigurationError(f"invalid demo {demo!r}: must be {REPAIR_DEMO} or empty")
     recording = str(rospy.get_param("~recording", ""))
-    store = FrameStore(History())
+    whole = History(math.inf, math.inf) if recording else None
+    store = FrameStore(History() if whole is None else None)
     layouts = layout_names(manager_layouts())
     access = access_for(address, token)
     controls: MeshControls = Recorded() if recording else RosControls()
     server = ConsoleServer(
-        store, controls, access, layouts, demo == REPAIR_DEMO, recording=recording
+        store,
+        controls,
+        access,
+        layouts,
+        demo == REPAIR_DEMO,
+        recording=Path(recording).name,
+        whole=whole,
     )
     runner = ConsoleRunner(server, address, port)
     stop = StopRequest()  # rospy's signal handler makes it, in the thread that waits for it
@@ -171,9 +181,14 @@ def _run() -> int:
     if demo:
         print("the demonstration begins when a browser opens this page:", flush=True)
     print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
+    reading = None if whole is None else Recording(Path(recording), whole, runner)
     try:
+        if reading is not None:
+            reading.start()
         MeshFeed(store, server, runner).watch_master(stop)
     finally:
+        if reading is not None:
+            reading.stop()
         runner.stop()
     return 0
 
