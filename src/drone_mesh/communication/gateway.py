@@ -31,7 +31,7 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused
 
-SEARCH_WITHIN_S = 60.0  # our choice: a node that was heard so lately is still looked for
+SEARCH_WITHIN_S = 600.0  # our choice: a node that was heard so lately is searched for
 
 
 class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
@@ -54,7 +54,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
         self._reports = ReportBook()
-        self._book = OrderBook(self._parts, self._search_known)
+        self._book = OrderBook(self._parts, self._may_find, self._search.search)
         self._orders.on_own_reply = self._book.on_outcome
 
     def stop(self) -> None:
@@ -139,11 +139,11 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         else:
             self._book.on_reply(creator, reply)
 
-    def _search_known(self, node: int) -> bool:
-        """Look for a node that was there lately. False: that is not possible, or of no use."""
+    def _may_find(self, node: int) -> bool:
+        """Whether a search could find this node. One that relays for others, and learns from their
+        packets that it is connected, may send nothing to the gateway for minutes."""
         _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
-        recent = self._deadlines.now_s - heard_s < SEARCH_WITHIN_S
-        return recent and self._search.search(node)
+        return self._antenna.medium.shared and self._deadlines.now_s - heard_s < SEARCH_WITHIN_S
 
     def _begin(self) -> None:
         self._internet.connect(self)

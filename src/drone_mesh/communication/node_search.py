@@ -33,9 +33,9 @@ class NodeSearch:
         self._seen_s: dict[tuple[int, int, int], float] = {}  # creator, node, number
 
     def search(self, node: int) -> bool:
-        """Ask all nodes for it. False: not on this medium, or not so soon after another search."""
+        """Ask all nodes for it. False: not so soon after another search."""
         now_s = self._parts.now_s
-        if not self._parts.antenna.medium.shared or now_s - self._searched_s < SEARCH_EVERY_S:
+        if now_s - self._searched_s < SEARCH_EVERY_S:
             return False
         self._searched_s = now_s
         number = int(now_s * NUMBERS_PER_S) % 2**16

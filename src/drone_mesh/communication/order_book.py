@@ -13,6 +13,7 @@ from typing import Callable
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import GoToLocationMessage, with_order_number
+from drone_mesh.communication.node_search import SEARCH_EVERY_S
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_messages import OrderOutcome, OrderQuery, OrderReply
 from drone_mesh.communication.order_record import OrderRecord, OrderState
@@ -24,7 +25,8 @@ OLD_ORDERS_KEPT = 100  # our choice: beside the latest of each drone
 HIGHEST_NUMBER = 2**16 - 1
 NUMBERS_PER_S = 16  # our choice: a gateway that is restarted does not begin where it began before
 REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # our choice: without a reply, so long after each try
-FOUND_WITHIN_S = 2.0  # our choice: a search passes through 100 nodes within half a second
+FOUND_WITHIN_S = 1.0  # our choice: a search passes through 100 nodes within half a second
+MOST_SEARCHES = 3  # our choice: for one order; the path that a search found may break at once
 QUERY_PERIOD_S = 15.0  # our choice: how often a drone under way is asked
 MOST_QUERIES = 20  # our choice: without an answer; five minutes
 
@@ -59,8 +61,8 @@ class _Order:
     reason: str = ""
     changed_s: float = 0.0
     due_s: float = math.inf  # next repeat or query
-    sought: bool = False  # there was no route, and the drone was or is looked for
-    seeking: bool = False  # it is looked for now
+    searches: int = 0  # how often the drone was searched for because there was no route
+    seeking: bool = False  # it is searched for now, or will be in a moment
     unanswered: int = 0  # packets since the drone was last heard about it
     settled: bool = False  # the drone itself has said how it ended
     reason_parts: TextAssembly = field(default_factory=TextAssembly)
@@ -69,9 +71,13 @@ class _Order:
 class OrderBook:
     """The orders of one gateway. Only its component calls it."""
 
-    def __init__(self, parts: NodeParts, search: Callable[[int], bool]) -> None:
-        """`search` looks for a drone without a route; False: it is not looked for."""
+    def __init__(
+        self, parts: NodeParts, may_find: Callable[[int], bool], search: Callable[[int], bool]
+    ) -> None:
+        """`may_find`: whether a search could find this drone, which has no route. `search` starts
+        one; False: not so soon after another."""
         self._parts = parts
+        self._may_find = may_find
         self._search = search
         self._orders: dict[int, _Order] = {}  # oldest first
         self._last_number = 0
@@ -128,11 +134,15 @@ class OrderBook:
                 self._wait(order, REPEAT_AFTER_S[0])
 
     def _seek(self, order: _Order) -> bool:
-        """Look for the drone, once per order; it is lost if the drone is not found in time."""
-        if order.sought or not self._search(order.drone):
+        """Search for the drone; the order is lost if no search finds it in time."""
+        if order.searches >= MOST_SEARCHES or not self._may_find(order.drone):
             return False
-        order.sought = order.seeking = True
-        self._wait(order, FOUND_WITHIN_S)
+        order.seeking = True
+        if self._search(order.drone):
+            order.searches += 1
+            self._wait(order, FOUND_WITHIN_S)
+        else:
+            self._wait(order, SEARCH_EVERY_S)
         return True
 
     def on_reply(self, drone: int, reply: OrderReply) -> None:
@@ -169,7 +179,8 @@ class OrderBook:
         order.unanswered += 1
         order.due_s = math.inf
         if order.seeking:
-            self._no_route(order)
+            if not self._seek(order):
+                self._no_route(order)
         elif order.state is OrderState.ASKED:
             if order.unanswered >= len(REPEAT_AFTER_S):
                 self._move(order, OrderState.GIVEN_UP, "the drone did not reply")
