@@ -14,7 +14,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.lab.attacks import ATTACKS
 from drone_mesh.lab.campaign import Campaign
 from drone_mesh.lab.damage import KEY, table
-from drone_mesh.lab.estimate import estimate
+from drone_mesh.lab.estimate import Estimate, estimate
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.fuzz import NODES, fuzz
 from drone_mesh.lab.merge import merge
@@ -232,13 +232,21 @@ def _plan(options: argparse.Namespace) -> int:
     if stop is not None:
         print(f"more seeds, up to {stop.max_seeds}, until {stop.metric} is known closely enough")
     if not options.no_estimate:
-        guess = estimate(plan, max(1, options.workers))
+        guess = estimate(plan, options.workers)
+        workers = max(1, options.workers)
         print(
-            f"about {as_duration(guess.wall_s)} on {max(1, options.workers)} workers, "
-            f"{guess.run_s * 1000:.0f} ms per run "
+            f"about {as_duration(guess.wall_s)} on {workers} free core{'s' * (workers != 1)} "
             f"(from {guess.trials} trial runs; nothing was written)"
         )
+        print(f"processor time per run: {_milliseconds(guess)}")
     return 0
+
+
+def _milliseconds(guess: Estimate) -> str:
+    whole = f"{guess.run_s * 1000:.0f} ms"
+    if guess.outside_s is None:
+        return whole
+    return f"{whole}, of which {guess.outside_s * 1000:.1f} ms are not the simulation"
 
 
 def _run(options: argparse.Namespace) -> int:

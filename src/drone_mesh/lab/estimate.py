@@ -1,25 +1,41 @@
-"""How long an experiment will take, from a few trial runs of its own."""
+"""How long an experiment will take, from trial runs of its own cells."""
 
 from __future__ import annotations
 
 import statistics
 import time
-from typing import NamedTuple
+from typing import Callable, NamedTuple, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.plan import Plan, RunSpec
-from drone_mesh.lab.worker import execute
+from drone_mesh.lab.quiet import quiet_nodes
+from drone_mesh.lab.worker import execute, measured, scenario_of, simulation_of
 
-BUDGET_S = 6.0  # of trial runs
+BUDGET_S = 20.0  # of trial runs
+MOST_CELLS = 60  # that get a trial; of more, every n-th
+MOST_TRIALS = 8  # of one cell, if there are several
+ENOUGH_TRIALS = 40  # of a few cells together
+LEAST_SHARE = 0.25  # of a run is simulated before a trial is cut off: its start is not typical
 START_S = 2.5  # until local workers have started and loaded the code
 TASK_S = 0.004  # per run beside its own time: scheduling, storing
 
+Clock = Callable[[], float]
+"""Seconds of processor time of this process: other processes do not count."""
+
+
+class Trial(NamedTuple):
+    """What one run costs, in seconds of processor time."""
+
+    run_s: float
+    outside_s: float | None  # of these, outside the simulation; None: cut off, or without packets
+
 
 class Estimate(NamedTuple):
-    """Wall time."""
+    """Seconds that the experiment needs on cores that have nothing else to do."""
 
     wall_s: float
     run_s: float  # mean of one run
+    outside_s: float | None  # of these, outside the simulation; None: no trial came to its end
     trials: int
 
 
@@ -27,35 +43,82 @@ class EstimateError(MeshError):
     """A run of this experiment fails."""
 
 
-def estimate(plan: Plan, workers: int) -> Estimate:
-    """Times runs that are spread over the plan's cells, each cell as often as the others.
+def estimate(plan: Plan, workers: int, clock: Clock = time.process_time) -> Estimate:
+    """Try every cell once, or every n-th of many, and all of them again while there is time.
 
-    Raises EstimateError when one of them fails.
+    A trial of a long run is cut off and extrapolated, so that each cell has one. Raises
+    EstimateError when a trial fails.
     """
+    most_trials = min(plan.seeds, max(MOST_TRIALS, ENOUGH_TRIALS // len(plan.cells)))
     by_cell: dict[int, list[RunSpec]] = {}
     for planned in plan:
-        if planned.spec.repetition >= 8:
+        if planned.spec.repetition >= most_trials:
             break
         by_cell.setdefault(planned.cell, []).append(planned.spec)
-    cells = list(by_cell)
-    stride = max(1, len(cells) // 40)
-    chosen = cells[::stride]
-    spent = {cell: [] for cell in chosen}  # type: dict[int, list[float]]
-    started = time.perf_counter()
-    execute(by_cell[chosen[0]][0])  # loads what a first run loads
-    for repetition in range(8):
-        for cell in chosen:
-            specs = by_cell[cell]
-            if repetition < len(specs):
-                outcome = execute(specs[repetition])
-                if outcome.failure:
-                    raise EstimateError(f"a trial run failed: {outcome.message}")
-                spent[cell].append(outcome.wall_s)
-            if time.perf_counter() - started > BUDGET_S:
+    stride = -(-len(by_cell) // MOST_CELLS)
+    cells = [by_cell[cell] for cell in list(by_cell)[::stride]]
+    most_s = BUDGET_S / len(cells)
+    _trial(cells[0][0], most_s, clock)  # loads what a first run loads
+    trials: list[list[Trial]] = [[] for _ in cells]
+    started_s = clock()
+    for repetition in range(most_trials):
+        for specs, found in zip(cells, trials):
+            if repetition and clock() - started_s > BUDGET_S:
                 break
-        if time.perf_counter() - started > BUDGET_S:
-            break
-    means = [statistics.mean(times) for times in spent.values() if times]
-    run_s = statistics.mean(means)
-    wall_s = START_S + len(plan) * (run_s + TASK_S) / workers
-    return Estimate(wall_s, run_s, sum(map(len, spent.values())))
+            found.append(_trial(specs[repetition], most_s, clock))
+    run_s = statistics.mean(statistics.mean(t.run_s for t in found) for found in trials)
+    outside = [t.outside_s for found in trials for t in found if t.outside_s is not None]
+    wall_s = len(plan) * (run_s + TASK_S) / max(1, workers) + (START_S if workers else 0.0)
+    return Estimate(
+        wall_s, run_s, statistics.mean(outside) if outside else None, sum(map(len, trials))
+    )
+
+
+def _trial(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
+    started_s = clock()
+    if scenario_of(spec.scenario).model == "ideal":
+        outcome = execute(spec)
+        if outcome.failure:
+            raise EstimateError(f"a trial run failed: {outcome.message}")
+        return Trial(clock() - started_s, None)
+    try:
+        with quiet_nodes():
+            return _try_packets(spec, most_s, clock)
+    except Exception as error:  # a user's technique may raise anything
+        message = " ".join(str(error).split())
+        raise EstimateError(f"a trial run failed: {type(error).__name__}: {message}") from error
+
+
+def _try_packets(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
+    started_s = clock()
+    simulation = simulation_of(spec)
+    virtual = simulation.network.clock
+    run_until, simulating_s = virtual.run_until, 0.0
+
+    def timed(until_s: float) -> None:
+        nonlocal simulating_s
+        before_s = clock()
+        run_until(until_s)
+        simulating_s += clock() - before_s
+
+    virtual.run_until = timed  # type: ignore[method-assign]
+    duration_s = simulation.scenario.duration_s
+    samples = [(0.0, clock() - started_s)]  # simulated seconds, processor time until then
+    for now_s in simulation.samples():
+        samples.append((now_s, clock() - started_s))
+        if samples[-1][1] > most_s and LEAST_SHARE * duration_s <= now_s < duration_s:
+            return Trial(_extrapolated(samples, duration_s), None)
+    measured(simulation.record(), spec.own_metrics)
+    simulation.event_hash()
+    run_s = clock() - started_s
+    return Trial(run_s, run_s - simulating_s)
+
+
+def _extrapolated(samples: Sequence[tuple[float, float]], duration_s: float) -> float:
+    """The whole run, by the second half of what was simulated: a start costs more than the rest."""
+    now_s, spent_s = samples[-1]
+    half_s, spent_at_half_s = next(sample for sample in samples if sample[0] >= now_s / 2)
+    if half_s == now_s:
+        half_s, spent_at_half_s = samples[0]
+    rate = (spent_s - spent_at_half_s) / (now_s - half_s)
+    return spent_s + rate * (duration_s - now_s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import replace
-from typing import Any, Callable
+from typing import Any, Callable, Iterator
 
 import numpy as np
 
@@ -52,8 +52,15 @@ class Simulation:
 
     def run(self, on_status: OnStatus | None = None) -> RunRecord:
         """Let all of it happen. `on_status` gets the state after each sample, for pictures."""
+        boxes = describe_obstacles(obstacles_of(self.scenario.obstacles).boxes)
+        for _now_s in self.samples():
+            if on_status is not None:
+                on_status(replace(self.network.status(), obstacles=boxes))
+        return self.record()
+
+    def samples(self) -> Iterator[float]:
+        """Let time pass up to the end; yields the time (s) of each sample, once it is taken."""
         network, scenario = self.network, self.scenario
-        boxes = describe_obstacles(obstacles_of(scenario.obstacles).boxes)
         end_s = scenario.duration_s
         step = 0
         while network.clock.now_s < end_s:
@@ -63,8 +70,11 @@ class Simulation:
             if self._start is None:
                 self._start = self._scene(look)._replace(places=self._start_places)
             self.timeline.check(look)
-            if on_status is not None:
-                on_status(replace(network.status(), obstacles=boxes))
+            yield network.clock.now_s
+
+    def record(self) -> RunRecord:
+        """What has happened, once all samples are taken."""
+        network, scenario = self.network, self.scenario
         assert self._start is not None  # a run has at least one sample
         return RunRecord(
             scenario=scenario,
@@ -82,7 +92,7 @@ class Simulation:
             orders=self.timeline.orders,
             collisions=len(self._pairs),
             min_distance_m=self._min_distance_m,
-            end_s=end_s,
+            end_s=scenario.duration_s,
             airtime_s=getattr(network.air, "airtime_s", None),
             frames_destroyed=getattr(network.air, "collisions", None),
             refused_flights=0 if self._planner is None else len(self._planner.refused),

@@ -17,6 +17,7 @@ from drone_mesh.lab.metrics import METRICS, measure_all
 from drone_mesh.lab.plan import RunSpec
 from drone_mesh.lab.provenance import code_version
 from drone_mesh.lab.quiet import quiet_nodes
+from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.simulation import Simulation
 from drone_mesh.lab.streams import Streams
@@ -77,22 +78,29 @@ def execute(spec: RunSpec) -> Outcome:
 
 
 def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[OutageRow, ...]]:
-    if spec.search_path:
-        extensions.search_in_text(spec.search_path)
-    scenario = scenario_of(spec.scenario)
-    streams = Streams(spec.seed, spec.repetition)
-    if scenario.model == "ideal":
+    if scenario_of(spec.scenario).model == "ideal":
         from drone_mesh.lab.ideal import run_ideal  # needs scipy, which a mesh does not
 
-        return (*run_ideal(scenario, streams), ())
-    simulation = Simulation(scenario, streams)
+        return (*run_ideal(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition)), ())
+    simulation = simulation_of(spec)
     record = simulation.run()
-    values = measure_all(record)
-    for name in spec.own_metrics:
-        value = float(extensions.own_metric(name)(record))
-        values[extensions.own_column(name)] = value
     gaps = tuple(OutageRow(gap.node, gap.lost_s, gap.restored_s) for gap in record.gaps())
-    return values, simulation.event_hash(), gaps
+    return measured(record, spec.own_metrics), simulation.event_hash(), gaps
+
+
+def simulation_of(spec: RunSpec) -> Simulation:
+    """The run, before its start. Raises ConfigurationError for a layout that cannot be drawn."""
+    if spec.search_path:
+        extensions.search_in_text(spec.search_path)
+    return Simulation(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition))
+
+
+def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float]:
+    """All metrics of a run, the user's own ones behind the others."""
+    values = measure_all(record)
+    for name in own_metrics:
+        values[extensions.own_column(name)] = float(extensions.own_metric(name)(record))
+    return values
 
 
 @functools.lru_cache(maxsize=1024)

@@ -20,7 +20,7 @@ from drone_mesh.lab.template import write_template
 from drone_mesh.lab.worker import execute
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
-SUITES = ["air", "heal", "obstacles", "published", "routing", "timing"]
+SUITES = ["air", "cost", "heal", "obstacles", "published", "routing", "timing"]
 
 
 @pytest.mark.parametrize("name", SUITES)

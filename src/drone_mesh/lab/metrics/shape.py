@@ -71,14 +71,12 @@ def coverage(run: RunRecord) -> float:
 def covered(points: Sequence[Sequence[float]], range_m: float) -> int:
     """Cells of a grid, an eighth of the range wide, whose middle a drone reaches."""
     cell = range_m / 8
-    offsets = np.arange(-8, 9)
-    dx, dy = np.meshgrid(offsets, offsets)
-    corners = np.floor(np.asarray(points) / cell).astype(np.int64)
-    cells = corners[:, None, :] + np.stack([dx.ravel(), dy.ravel()], axis=1)[None]
-    middles = (cells + 0.5) * cell
-    inside = ((middles - np.asarray(points)[:, None, :]) ** 2).sum(axis=2) < range_m**2
-    reached = cells[inside]
-    return len(np.unique(reached[:, 0] * 10_000_019 + reached[:, 1]))
+    places = np.asarray(points, dtype=float)
+    cells = np.floor(places / cell).astype(np.int64)[:, :, None] + np.arange(-8, 9)  # (n, 2, 17)
+    squares = ((cells + 0.5) * cell - places[:, :, None]) ** 2
+    inside = squares[:, 0, :, None] + squares[:, 1, None, :] < range_m**2
+    numbers = cells[:, 0, :, None] * 10_000_019 + cells[:, 1, None, :]
+    return len(set(numbers[inside].tolist()))  # cheaper than sorting them
 
 
 def _before(run: RunRecord) -> Scene:
