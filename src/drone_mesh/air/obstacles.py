@@ -1,73 +1,20 @@
-"""Boxes that stand in the world: what they do to radio links and to flights. Pure geometry."""
+"""All boxes of the world: what they do to radio links and to flights. Pure geometry."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Sequence
+from typing import Iterator, Sequence
 
+from drone_mesh.air.box import Box
+from drone_mesh.air.way_round import way_round
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 
-# dB per surface crossed. brick: Sommer et al., "A Computationally Inexpensive Empirical Model of
-# IEEE 802.11p Radio Shadowing in Urban Environments", WONS 2011, the defaults of Veins. The others:
-# external walls in ns-3's building model, after COST 231.
-CUT_DB = {"brick": 9.0, "wood": 4.0, "window": 7.0, "stone": 12.0, "concrete": 15.0}
 METRE_DB = 0.4  # dB per metre inside, the same source as brick
 NO_WAY = "obstacles leave no way there"  # why a goal is refused
 CLEARANCE_M = 0.5  # our choice: a flight keeps so far from a box, above it and beside it
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box, turned about its vertical axis by `yaw_rad`. Metres, world frame."""
-
-    center: Vector
-    size: Vector  # along its own x, y and z
-    yaw_rad: float = 0.0
-    cut_db: float = CUT_DB["brick"]
-
-    @property
-    def top_m(self) -> float:
-        """Height of its upper side."""
-        return self.center[2] + self.size[2] / 2
-
-    def grown(self, metres: float) -> Box:
-        """The same box, larger by this much on each side but the lower one."""
-        x, y, z = self.size
-        center = (self.center[0], self.center[1], self.center[2] + metres / 2)
-        size = (x + 2 * metres, y + 2 * metres, z + metres)
-        return Box(center, size, self.yaw_rad, self.cut_db)
-
-    def chord(self, a: Vector, b: Vector) -> tuple[float, float] | None:
-        """The part of the segment a..b inside the box, as shares of it; None: it misses the box.
-
-        Kay and Kajiya's slab test (SIGGRAPH 1986) in the frame of the box.
-        """
-        start, end = self._to_own_frame(a), self._to_own_frame(b)
-        enters, leaves = 0.0, 1.0
-        for one, other, size in zip(start, end, self.size):
-            half, step = size / 2, other - one
-            if abs(step) < 1e-12:
-                if abs(one) > half:
-                    return None
-                continue
-            near, far = (-half - one) / step, (half - one) / step
-            if near > far:
-                near, far = far, near
-            enters, leaves = max(enters, near), min(leaves, far)
-            if enters >= leaves:
-                return None
-        return enters, leaves
-
-    def contains(self, point: Vector) -> bool:
-        """Whether a point is inside or on its surface."""
-        return all(abs(c) <= s / 2 for c, s in zip(self._to_own_frame(point), self.size))
-
-    def _to_own_frame(self, point: Vector) -> Vector:
-        x, y = point[0] - self.center[0], point[1] - self.center[1]
-        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return (cos * x + sin * y, -sin * x + cos * y, point[2] - self.center[2])
+ABOVE_M = CLEARANCE_M + 1e-6  # so high above a box a flight does not touch its clearance
 
 
 @dataclass(frozen=True)
@@ -115,29 +62,61 @@ class Obstacles:
     def plan_flight(
         self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
     ) -> FlightPath | None:
-        """A flight over everything that is in the way; None where there is none.
+        """The quickest flight over what is in the way, or round it; None where there is none.
 
         It climbs at its start and descends at its goal: with a box above one of these, or the goal
-        inside one, or a box that reaches the ceiling, there is no way.
+        inside one, there is no way. Over a box that reaches the ceiling there is none either.
         """
         if not self.is_free(goal):
             return None
+        over = self._over(start, goal, start_s, speed_m_s)
+        if over is not None and over.across_m == -math.inf:
+            return over  # nothing is in the way
+        ways = [over, *self._ways_round(start, goal, start_s, speed_m_s)]
+        flights = [way for way in ways if way is not None]
+        return min(flights, key=lambda way: way.duration_s) if flights else None
+
+    def _over(
+        self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
+    ) -> FlightPath | None:
         across_m = -math.inf
         for _ in range(len(self.boxes) + 1):
             path = FlightPath(start, goal, start_s, speed_m_s, across_m)
-            if max(path.above_start[2], path.above_goal[2]) > self.ceiling_m:
+            if not self._rises_freely(path):
                 return None
-            if self._hits(start, path.above_start) or self._hits(path.above_goal, goal):
-                return None
-            in_the_way = [
-                box.top_m
-                for box in self.boxes
-                if box.grown(CLEARANCE_M).chord(path.above_start, path.above_goal) is not None
-            ]
+            in_the_way = self._met(path)
             if not in_the_way:
                 return path
-            across_m = max(across_m, max(in_the_way) + CLEARANCE_M + 1e-6)
+            across_m = max(across_m, max(box.top_m for box in in_the_way) + ABOVE_M)
         return None
 
-    def _hits(self, a: Vector, b: Vector) -> bool:
-        return any(box.chord(a, b) is not None for box in self.boxes)
+    def _ways_round(
+        self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
+    ) -> Iterator[FlightPath]:
+        """As low as the flight usually is, and above each box on the straight way that is lower
+        than another one there."""
+        usual = FlightPath(start, goal, start_s, speed_m_s)
+        lowest_m = max(usual.above_start[2], usual.above_goal[2])
+        tops = {box.top_m + ABOVE_M for box in self._met(usual)}
+        wide = [box.grown(CLEARANCE_M) for box in self.boxes]
+        for height_m in sorted({lowest_m, *(top for top in tops if top > lowest_m)}):
+            corners = way_round(wide, start[:2], goal[:2], height_m)
+            if corners is not None:
+                path = FlightPath(start, goal, start_s, speed_m_s, height_m, corners)
+                if self._rises_freely(path):
+                    yield path
+
+    def _met(self, path: FlightPath) -> list[Box]:
+        """The boxes on a straight way across, or too near to it."""
+        return [
+            box
+            for box in self.boxes
+            if box.grown(CLEARANCE_M).chord(path.above_start, path.above_goal) is not None
+        ]
+
+    def _rises_freely(self, path: FlightPath) -> bool:
+        """Whether its ways up and down meet no box, and stay below the ceiling."""
+        if max(path.above_start[2], path.above_goal[2]) > self.ceiling_m:
+            return False
+        ends = ((path.start, path.above_start), (path.above_goal, path.goal))
+        return not any(box.chord(a, b) is not None for box in self.boxes for a, b in ends)

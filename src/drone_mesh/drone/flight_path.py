@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Callable, Optional, Tuple
+from typing import Callable, Optional, Sequence, Tuple
 
 Vector = Tuple[float, float, float]  # x (longitude), y (latitude), z (up): metres, world frame
+Point = Tuple[float, float]  # x and y of a Vector
 
 SPEED_M_S = 2.0
 CLIMB_ENDS_AT = 0.1  # share of the flight's duration
@@ -28,7 +29,8 @@ class FlightPath:
 
     A flight over a straight distance d takes d / speed_m_s and climbs d / 2. The way flown is
     longer than d, so a drone is faster than that for most of it. Climbing higher than d / 2, as
-    `across_m` asks, takes the time of the extra metres.
+    `across_m` asks, takes the time of the extra metres; and so does the way round something, over
+    the corners `around`, which are all at the greater height of the two ends.
     """
 
     start: Vector
@@ -36,6 +38,7 @@ class FlightPath:
     start_s: float  # when it leaves `start`, simulated seconds
     speed_m_s: float = SPEED_M_S
     across_m: float = -math.inf  # the way across is at least so high, to pass over something
+    around: tuple[Point, ...] = ()  # x, y: corners of the way across
     duration_s: float = field(init=False)
     above_start: Vector = field(init=False)  # where it is at 10 %
     above_goal: Vector = field(init=False)  # where it is at 90 %
@@ -45,7 +48,12 @@ class FlightPath:
         climb_m = distance_m / 2
         usual = (self.start[2] + climb_m, self.goal[2] + climb_m)
         heights = [max(height, self.across_m) for height in usual]
+        if self.around:
+            heights = [max(heights)] * 2
         extra_m = sum(height - least for height, least in zip(heights, usual))
+        if self.around:
+            over_ground = (self.start[:2], *self.around, self.goal[:2])
+            extra_m += _length(over_ground) - math.dist(self.start[:2], self.goal[:2])
         derived = {
             "duration_s": (distance_m + extra_m) / self.speed_m_s,
             "above_start": (self.start[0], self.start[1], heights[0]),
@@ -55,9 +63,43 @@ class FlightPath:
             object.__setattr__(self, name, value)
 
     @property
-    def waypoints(self) -> tuple[Vector, Vector, Vector, Vector]:
+    def across(self) -> tuple[Vector, ...]:
+        """The corners of the way across, both ends included."""
+        height_m = self.above_start[2]
+        return (self.above_start, *((x, y, height_m) for x, y in self.around), self.above_goal)
+
+    @property
+    def waypoints(self) -> tuple[Vector, ...]:
         """The corners of the path, to draw it."""
-        return (self.start, self.above_start, self.above_goal, self.goal)
+        return (self.start, *self.across, self.goal)
+
+    @property
+    def ground_m(self) -> float:
+        """Its length over ground."""
+        return _length([corner[:2] for corner in self.across])
+
+    def ground_flown_m(self, now_s: float) -> float:
+        """Metres over ground until this time."""
+        return self.ground_m * self._share_across(self.share_flown(now_s))
+
+    def ahead(self, now_s: float) -> list[Vector]:
+        """The corners that it has not passed at this time, the goal last."""
+        share = self.share_flown(now_s)
+        if share >= DESCENT_STARTS_AT:
+            return [self.goal]
+        left = self.across if share < CLIMB_ENDS_AT else self._left(self._share_across(share))
+        return [*left, self.goal]
+
+    def _left(self, share: float) -> tuple[Vector, ...]:
+        """The corners of the way across that are behind this share of it."""
+        flown_m = share * _length(self.across)
+        passed = (_length(self.across[:count]) <= flown_m for count in range(1, len(self.across)))
+        return self.across[sum(passed) :]
+
+    @staticmethod
+    def _share_across(share: float) -> float:
+        """Of the way across, at this share of the flight's time."""
+        return min(1.0, max(0.0, (share - CLIMB_ENDS_AT) / (DESCENT_STARTS_AT - CLIMB_ENDS_AT)))
 
     def share_flown(self, now_s: float) -> float:
         """How much of the flight's time is over: 0.0 before the start, 1.0 from the end on."""
@@ -73,14 +115,30 @@ class FlightPath:
         if share < CLIMB_ENDS_AT:
             return between(self.start, self.above_start, share / CLIMB_ENDS_AT)
         if share < DESCENT_STARTS_AT:
-            across = (share - CLIMB_ENDS_AT) / (DESCENT_STARTS_AT - CLIMB_ENDS_AT)
-            return between(self.above_start, self.above_goal, across)
+            return _along(self.across, self._share_across(share))
         descent = (share - DESCENT_STARTS_AT) / (1.0 - DESCENT_STARTS_AT)
         return between(self.above_goal, self.goal, descent)
 
     def is_descending(self, now_s: float) -> bool:
         """Whether the last, vertical part has begun."""
         return self.share_flown(now_s) >= DESCENT_STARTS_AT
+
+
+def _length(corners: Sequence[Sequence[float]]) -> float:
+    return sum(math.dist(one, other) for one, other in zip(corners, corners[1:]))
+
+
+def _along(corners: Sequence[Vector], share: float) -> Vector:
+    """The point at `share` (0..1) of the length of these straight lines."""
+    if len(corners) == 2:
+        return between(corners[0], corners[1], share)
+    left_m = share * _length(corners)
+    for start, end in zip(corners, corners[1:]):
+        leg_m = math.dist(start, end)
+        if left_m <= leg_m > 0.0:
+            return between(start, end, left_m / leg_m)
+        left_m -= leg_m
+    return corners[-1]
 
 
 PlanFlight = Callable[[Vector, Vector, float, float], Optional[FlightPath]]

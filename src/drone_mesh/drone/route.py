@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from drone_mesh.drone.flight_path import between
+from typing import Sequence
+
+from drone_mesh.drone.flight_path import Point, between
 from drone_mesh.drone.interfaces import Location
 
 LEAD_S = 1.5  # our choice: the target is at most so far ahead, in seconds of flight
@@ -18,11 +20,20 @@ class Route:
     """
 
     def __init__(
-        self, start: Location, goal: Location, cross_at_m: float, lands: bool, speed_m_s: float
+        self,
+        start: Location,
+        goal: Location,
+        cross_at_m: float,
+        lands: bool,
+        speed_m_s: float,
+        around: Sequence[Point] = (),
     ) -> None:
-        """`cross_at_m` is the height between; `lands` leaves the last way down out."""
+        """`cross_at_m` is the height between; `lands` leaves the last way down out; `around` are
+        corners (x, y) in between."""
         height = max(cross_at_m, start.height, goal.height)
-        corners = [start, start._replace(height=height), goal._replace(height=height)]
+        between_ends = [Location.from_vector((x, y, height)) for x, y in around]
+        corners = [start, start._replace(height=height), *between_ends]
+        corners.append(goal._replace(height=height))
         if not lands:
             corners.append(goal)
         self._corners = corners

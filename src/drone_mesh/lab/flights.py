@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass
 from typing import Callable
 
@@ -33,8 +32,7 @@ class Leg:
 
     def metres_until(self, now_s: float) -> float:
         """Distance flown over ground."""
-        end = self.path.position_at(min(now_s, self.end_s))
-        return math.dist(self.path.start[:2], end[:2])
+        return self.path.ground_flown_m(min(now_s, self.end_s))
 
 
 class Flights:
@@ -98,7 +96,7 @@ class Flights:
         if leg.node not in self._may_fly_m:
             return
         left_m = self._may_fly_m[leg.node] - self._flown_m.get(leg.node, 0.0)
-        way_m = math.dist(leg.path.start[:2], leg.path.goal[:2])
+        way_m = leg.path.ground_m
         if left_m < way_m:
             clock = self._network.clock
             across = DESCENT_STARTS_AT - CLIMB_ENDS_AT  # share of the time that it takes

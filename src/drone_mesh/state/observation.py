@@ -7,11 +7,11 @@ from typing import Iterable
 
 import numpy as np
 
-from drone_mesh.air.obstacles import Box
+from drone_mesh.air.box import Box
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR
 from drone_mesh.communication.router_states import Repair
-from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath, Vector
+from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, NodeStatus, ObstacleStatus
 from drone_mesh.state.roster import DroneView
@@ -69,8 +69,4 @@ def describe_obstacles(boxes: Iterable[Box]) -> list[ObstacleStatus]:
 
 def path_ahead(path: FlightPath, now_s: float, lower_by_m: float = 0.0) -> tuple[float, ...]:
     """x y z of each waypoint that is still ahead, the goal last, in metres."""
-    share = path.share_flown(now_s)
-    _start, above_start, above_goal, goal = path.waypoints
-    waypoints = [(CLIMB_ENDS_AT, above_start), (DESCENT_STARTS_AT, above_goal), (1.0, goal)]
-    ahead = [waypoint for reached_at, waypoint in waypoints if share < reached_at] or [goal]
-    return tuple(value for x, y, z in ahead for value in (x, y, z - lower_by_m))
+    return tuple(value for x, y, z in path.ahead(now_s) for value in (x, y, z - lower_by_m))

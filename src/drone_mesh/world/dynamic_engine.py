@@ -128,7 +128,9 @@ class DynamicEngine(DroneEngine):
             return
         # As high as the flight that a kinematic drone would make.
         across_m = max(path.above_start[2], path.above_goal[2])
-        self._route = Route(here, goal, across_m, lands=False, speed_m_s=SPEED_M_S)
+        self._route = Route(
+            here, goal, across_m, lands=False, speed_m_s=SPEED_M_S, around=path.around
+        )
         self._hover = None
         self._tell(position, path, now_s)
 

@@ -7,7 +7,8 @@ import random
 
 import pytest
 
-from drone_mesh.air.obstacles import CLEARANCE_M, Box, Obstacles
+from drone_mesh.air.box import Box
+from drone_mesh.air.obstacles import CLEARANCE_M, Obstacles
 
 WALL = Box(center=(5.0, 0.0, 1.5), size=(0.2, 4.0, 3.0))
 
@@ -69,15 +70,60 @@ def test_both_directions_are_the_same_to_the_last_bit() -> None:
 # Flights
 
 
-def test_a_flight_climbs_over_what_is_in_its_way() -> None:
-    house = Box((10.0, 0.0, 10.0), (4.0, 4.0, 20.0))
-    path = Obstacles([house]).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0)
+LONG_HOUSE = Box((10.0, 0.0, 10.0), (4.0, 80.0, 20.0))
+TOWER = Box((10.0, 0.0, 10.0), (4.0, 4.0, 20.0))
+
+
+def test_a_flight_climbs_over_what_is_long() -> None:
+    path = Obstacles([LONG_HOUSE]).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0)
     assert path is not None
+    assert path.around == ()
     assert path.above_start[2] == pytest.approx(20 + CLEARANCE_M, abs=1e-3)
     assert path.duration_s == pytest.approx((20 + 2 * (20.5 - 10)) / 2.0, abs=1e-3)
     for share in range(101):
         place = path.position_at(path.duration_s * share / 100)
-        assert not house.contains(place)
+        assert not LONG_HOUSE.contains(place)
+
+
+@pytest.mark.parametrize("ceiling_m", [500.0, 15.0])
+def test_a_flight_goes_round_what_is_high_and_takes_the_time_of_the_detour(
+    ceiling_m: float,
+) -> None:
+    path = Obstacles([TOWER], ceiling_m=ceiling_m).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0)
+    assert path is not None
+    assert [corner[2] for corner in path.across] == [10.0] * 4
+    side = math.copysign(2.51, path.around[0][1])
+    for corner, expected in zip(path.around, [(7.49, side), (12.51, side)]):
+        assert corner == pytest.approx(expected)
+    assert len(path.around) == 2
+    round_m = 2 * math.hypot(7.49, 2.51) + 5.02
+    assert path.ground_m == pytest.approx(round_m)
+    assert path.duration_s == pytest.approx(round_m / 2.0)
+    for share in range(101):
+        place = path.position_at(path.duration_s * share / 100)
+        assert not TOWER.grown(CLEARANCE_M).contains(place)
+
+
+def test_the_way_round_a_low_wall_with_a_tower_in_it_is_over_the_wall() -> None:
+    wall = Box((10.0, 0.0, 6.0), (2.0, 80.0, 12.0))
+    obstacles = Obstacles([wall, TOWER], ceiling_m=15.0)
+    path = obstacles.plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0)
+    assert path is not None
+    assert path.around
+    assert path.above_start[2] == pytest.approx(12.5, abs=1e-3)
+    for share in range(101):
+        assert obstacles.is_free(path.position_at(path.duration_s * share / 100))
+
+
+def test_out_of_a_yard_under_the_ceiling_there_is_no_way() -> None:
+    walls = [
+        Box((x, y, 10.0), (12.0, 1.0, 20.0), yaw)
+        for x, y, yaw in ((0, 5, 0.0), (0, -5, 0.0), (5, 0, math.pi / 2), (-5, 0, math.pi / 2))
+    ]
+    yard = Obstacles(walls, ceiling_m=19.0)
+    assert yard.plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0) is None
+    assert yard.plan_flight((0, 0, 0), (2, 2, 0), 0.0, 2.0) is not None
+    assert Obstacles(walls).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0) is not None
 
 
 def test_a_flight_that_passes_above_or_beside_is_as_without_the_box() -> None:
@@ -89,13 +135,13 @@ def test_a_flight_that_passes_above_or_beside_is_as_without_the_box() -> None:
 
 
 def test_there_is_no_way_into_a_box_nor_up_through_one_nor_over_the_ceiling() -> None:
-    house = Box((10.0, 0.0, 10.0), (4.0, 4.0, 20.0))
     roof = Box((0.0, 0.0, 5.0), (4.0, 4.0, 1.0))
-    assert Obstacles([house]).plan_flight((0, 0, 0), (10, 0, 0), 0.0, 2.0) is None
+    assert Obstacles([TOWER]).plan_flight((0, 0, 0), (10, 0, 0), 0.0, 2.0) is None
     assert Obstacles([roof]).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0) is None
-    low = Obstacles([house], ceiling_m=15.0)
-    assert low.plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0) is None
-    assert low.plan_flight((0, 5, 0), (20, 5, 0), 0.0, 2.0) is not None
+    low = Obstacles([LONG_HOUSE], ceiling_m=11.0)
+    assert low.plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0) is not None  # round its end
+    assert low.plan_flight((0, 0, 0), (24, 0, 0), 0.0, 2.0) is None  # this far it climbs 12 m
+    assert low.plan_flight((0, 45, 0), (20, 45, 0), 0.0, 2.0) is not None
 
 
 def test_no_flight_ever_passes_through_a_box() -> None:

@@ -66,3 +66,41 @@ def test_a_drone_never_flies_lower_than_the_lower_end_and_never_jumps(start, goa
     assert here[2] >= min(start[2], goal[2]) - 1e-6
     # the fastest leg is at most half the distance and the height between, in a tenth of the time
     assert math.dist(here, soon) <= 0.01 * 2.0 / 0.1 + 1e-6
+
+
+# Round something: 3 m along x, 4 m along y, 3 m back along x
+
+ROUND = FlightPath((0.0, 0.0, 0.0), (0.0, 4.0, 0.0), 100.0, around=((3.0, 0.0), (3.0, 4.0)))
+
+
+def test_a_way_round_takes_the_time_of_its_metres_over_ground():
+    assert ROUND.ground_m == 10.0
+    assert ROUND.duration_s == 5.0
+    assert [ROUND.ground_flown_m(100.0 + 5.0 * share) for share in (0, 0.1, 0.5, 0.9, 1)] == (
+        pytest.approx([0.0, 0.0, 5.0, 10.0, 10.0])
+    )
+
+
+@pytest.mark.parametrize(
+    ("share", "place"),
+    [
+        (0.10, (0.0, 0.0, 2.0)),
+        (0.34, (3.0, 0.0, 2.0)),
+        (0.50, (3.0, 2.0, 2.0)),
+        (0.66, (3.0, 4.0, 2.0)),
+        (0.78, (1.5, 4.0, 2.0)),
+        (0.90, (0.0, 4.0, 2.0)),
+    ],
+)
+def test_a_way_round_leads_over_its_corners_at_one_height(share, place):
+    assert ROUND.position_at(100.0 + share * 5.0) == pytest.approx(place)
+
+
+def test_a_way_round_is_as_high_as_the_higher_of_its_ends():
+    path = FlightPath((0.0, 0.0, 0.0), (0.0, 3.0, 4.0), 0.0, around=((3.0, 0.0),))
+    assert [corner[2] for corner in path.waypoints] == [0.0, 6.5, 6.5, 6.5, 4.0]
+
+
+@pytest.mark.parametrize(("share", "corners"), [(0.0, 5), (0.2, 4), (0.5, 3), (0.7, 2), (0.95, 1)])
+def test_the_corners_that_are_passed_are_not_ahead(share, corners):
+    assert ROUND.ahead(100.0 + share * 5.0) == list(ROUND.waypoints[-corners:])

@@ -7,8 +7,9 @@ import random
 import numpy as np
 import pytest
 
+from drone_mesh.air.box import Box
 from drone_mesh.air.node_table import NodeTable
-from drone_mesh.air.obstacles import Box, Obstacles
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess import Network
