@@ -75,11 +75,6 @@ class FactoryConfiguration:
     connection_lost_after: float = Field(30.0, ge=0.1, le=3600, description="seconds")
     debug: bool = Field(True)
 
-    @property
-    def fleet_size(self) -> int:
-        """Number of drones; their ids are 0 to one less."""
-        return self.gateways + self.routers
-
     @field_validator("*", mode="before")
     @classmethod
     def _not_a_switch_for_a_number(cls, value: object, info: Any) -> object:

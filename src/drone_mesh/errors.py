@@ -19,6 +19,10 @@ class ConfigurationError(MeshError):
     """A parameter or a file is wrong. The message names it and what is allowed: show it, stop."""
 
 
+class FleetRefused(MeshError):
+    """A drone cannot be added or removed. The fleet is as it was; report it to the user."""
+
+
 class MessageRefused(MeshError):
     """A user's message cannot be sent as it is. Nothing was sent; report it to the user."""
 

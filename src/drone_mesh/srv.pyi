@@ -1,10 +1,34 @@
 """Written by scripts/message_stubs from the files in srv/."""
 
-from typing import Sequence
+from typing import Final, Sequence
 
 from genpy import Message
 
 from drone_mesh.msg import NRF24
+
+class AddDroneRequest(Message):
+    LOWEST_FREE: Final = 255
+    id: int
+    gateway: bool
+    latitude: float
+    longitude: float
+    def __init__(
+        self,
+        id: int = ...,
+        gateway: bool = ...,
+        latitude: float = ...,
+        longitude: float = ...,
+    ) -> None: ...
+
+class AddDroneResponse(Message):
+    success: bool
+    id: int
+    message: str
+    def __init__(self, success: bool = ..., id: int = ..., message: str = ...) -> None: ...
+
+class AddDrone:
+    _request_class = AddDroneRequest
+    _response_class = AddDroneResponse
 
 class AreaScanRequest(Message):
     id: int
@@ -71,6 +95,19 @@ class PowerSwitchResponse(Message): ...
 class PowerSwitch:
     _request_class = PowerSwitchRequest
     _response_class = PowerSwitchResponse
+
+class RemoveDroneRequest(Message):
+    id: int
+    def __init__(self, id: int = ...) -> None: ...
+
+class RemoveDroneResponse(Message):
+    success: bool
+    message: str
+    def __init__(self, success: bool = ..., message: str = ...) -> None: ...
+
+class RemoveDrone:
+    _request_class = RemoveDroneRequest
+    _response_class = RemoveDroneResponse
 
 class RequestDroneFlightRequest(Message):
     ID: int

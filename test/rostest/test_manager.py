@@ -78,8 +78,9 @@ class ManagerTest(unittest.TestCase):
 
     def test_drones_that_are_not_in_the_fleet_are_not_ordered(self) -> None:
         self.listen()
-        rospy.set_param("/drone_mesh/fleet", {"gateways": 1, "routers": 4, "seed": "1"})
-        self.addCleanup(rospy.delete_param, "/drone_mesh/fleet")
+        drones = {"gateways": [0], "routers": [1, 2, 3, 4], "added": [], "hosts": []}
+        rospy.set_param("/drone_mesh/drones", drones)
+        self.addCleanup(rospy.delete_param, "/drone_mesh/drones")
         with self.assertRaisesRegex(
             rospy.ServiceException, "drone 99 is not in this fleet: .* 0..4"
         ):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Iterable, NamedTuple
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
@@ -19,6 +19,17 @@ class StartPlace(NamedTuple):
     role: Role
     longitude: float  # x, metres
     latitude: float  # y, metres
+
+
+def ids_in_words(ids: Iterable[int]) -> str:
+    """For example: 0..3, 5."""
+    runs: list[list[int]] = []
+    for node_id in sorted(ids):
+        if runs and node_id == runs[-1][1] + 1:
+            runs[-1][1] = node_id
+        else:
+            runs.append([node_id, node_id])
+    return ", ".join(str(a) if a == b else f"{a}..{b}" for a, b in runs)
 
 
 def plan_fleet(

@@ -49,6 +49,13 @@ class MeshRoster:
         for node in reported:
             self._heard_at_s[node] = wall_s
 
+    def forget(self, node_id: int) -> None:
+        """This node was removed. Not known: nothing changes."""
+        self._nodes.pop(node_id, None)
+        self._heard_at_s.pop(node_id, None)
+        for ids in self._ids_of_host.values():
+            ids.discard(node_id)
+
     def snapshot(self, drones: Iterable[DroneView], wall_s: float) -> list[NodeStatus]:
         """All nodes by id, with positions, paths, routes and report ages filled in.
 

@@ -49,6 +49,9 @@ class BulletWorld(World):
     def move_box(self, box: int, centre: Vector) -> None:
         pybullet.resetBasePositionAndOrientation(box, centre, UPRIGHT, physicsClientId=self.client)
 
+    def remove_box(self, box: int) -> None:
+        pybullet.removeBody(box, physicsClientId=self.client)
+
     def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
         """A box that physics moves; it stays upright, as a drone's controller keeps it."""
         body = int(

@@ -91,7 +91,7 @@ class DynamicEngine(DroneEngine):
             raise GoalRefused(f"the drone cannot fly: {why_not}")
         super().set_goal(latitude, longitude, height)
 
-    def step(self, now_s: float) -> bool:
+    def _take_turn(self, now_s: float) -> bool:
         """One step of physics has passed: look where it is, and push. Wants every turn."""
         passed_s, self._stepped_s = now_s - self._stepped_s, now_s
         position, velocity = self._physics.body_state(self._box)

@@ -67,6 +67,7 @@ class DroneEngine(IDroneEngine):
         self._listeners: list[StateListener] = []
         self._observers: list[EngineObserver] = []
         self._state = DroneState(centre, None, world.now_s)
+        self._has_left = False  # its body is not in the world any more
 
     @property
     def state(self) -> DroneState:
@@ -98,6 +99,13 @@ class DroneEngine(IDroneEngine):
         """
         self._listeners.append(listener)
 
+    def leave(self) -> None:
+        """Take the body out of the world; goals change nothing any more. World's thread."""
+        self._has_left = True
+        self._listeners.clear()
+        self._observers.clear()
+        self._world.remove_box(self._box)
+
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly to this place (metres, world frame, height of the underside). Returns at once.
 
@@ -124,6 +132,9 @@ class DroneEngine(IDroneEngine):
 
     def step(self, now_s: float) -> bool:
         """Take the goals that wait, fly on to `now_s`; True while in flight. For the world."""
+        return not self._has_left and self._take_turn(now_s)
+
+    def _take_turn(self, now_s: float) -> bool:
         while self._goals:
             self._take_goal(self._goals.popleft(), now_s)
         followed, self._followed = self._followed, None

@@ -1,14 +1,16 @@
-"""DroneFactory: puts a fleet into a world (docs/protocol.md, "Fleet")."""
+"""DroneFactory: puts a fleet into a world, and changes it (docs/protocol.md, "Fleet")."""
 
 from __future__ import annotations
 
+import math
 from typing import Iterable
 
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.drone.fleet import StartPlace, plan_fleet
+from drone_mesh.drone.fleet import MAX_DRONES, StartPlace, plan_fleet
 from drone_mesh.drone.flight_path import FlightPath, PlanFlight, Vector
+from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.roles import Role
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, FleetRefused, GoalRefused
 from drone_mesh.world.drones import GatewayDrone, RouterDrone, VirtualDrone
 from drone_mesh.world.interfaces import World
 
@@ -17,7 +19,11 @@ _KINDS = {Role.GATEWAY: GatewayDrone, Role.ROUTER: RouterDrone}
 
 
 class DroneFactory:
-    """Puts a fleet into a world. `drones[n]` is the drone with node id n."""
+    """Puts a fleet into a world, adds drones to it and removes them.
+
+    `drones` holds them by id. It is replaced as a whole: any thread may read it; everything else
+    is for the world's thread.
+    """
 
     def __init__(
         self,
@@ -30,32 +36,104 @@ class DroneFactory:
         wind: Vector | None = None,
         obstacles: Obstacles | None = None,
     ) -> None:
-        """Call in the world's thread. Parameters and errors as for `plan_fleet`.
+        """Parameters and errors as for `plan_fleet`.
 
         `debug`: whether the nodes of the drones publish debug information; `wind`: as VirtualDrone.
         The `obstacles` are put into the world too. Raises ConfigurationError if a drone would start
         in or against one.
         """
         self.debug = debug
+        self._world = world
+        self._wind = wind
+        self._obstacles = obstacles
+        self._plan_flight: PlanFlight = FlightPath
         fleet = plan_fleet(gateways, routers, gridsize, spacing)
-        plan_flight: PlanFlight = FlightPath
         if obstacles is not None:
             check_starts(fleet, obstacles)
-            plan_flight = obstacles.for_flights(HALF_WIDTH_M).plan_flight
+            self._plan_flight = obstacles.for_flights(HALF_WIDTH_M).plan_flight
             for box in obstacles.boxes:
                 world.add_obstacle(box)
-        self.drones: tuple[VirtualDrone, ...] = tuple(
-            _KINDS[role](world, node_id, longitude, latitude, wind, plan_flight)
-            for node_id, role, longitude, latitude in fleet
+        self.drones: tuple[VirtualDrone, ...] = tuple(self._make(place) for place in fleet)
+
+    def add(
+        self, role: Role, longitude: float, latitude: float, node_id: int | None = None
+    ) -> VirtualDrone:
+        """Put one more drone on the ground at this place (metres, world frame).
+
+        None: it gets the lowest free id. Raises FleetRefused for an id that is taken or invalid, a
+        full fleet, and a place that is out of bounds, blocked by an obstacle or taken.
+        """
+        drones = {drone.node_id: drone for drone in self.drones}
+        if len(drones) == MAX_DRONES:
+            raise FleetRefused(f"the fleet is full: node ids allow at most {MAX_DRONES} drones")
+        if node_id is None:
+            node_id = min(set(range(MAX_DRONES)) - drones.keys())
+        if not 0 <= node_id < MAX_DRONES:
+            raise FleetRefused(f"invalid drone id {node_id}: must be 0..{MAX_DRONES - 1}")
+        if node_id in drones:
+            raise FleetRefused(f"drone {node_id} exists already: choose another id")
+        place = StartPlace(node_id, role, longitude, latitude)
+        self._check_place(place)
+        drones[node_id] = self._make(place)
+        self.drones = tuple(drones[n] for n in sorted(drones))
+        return drones[node_id]
+
+    def check_removal(self, node_id: int) -> VirtualDrone:
+        """The drone with this id. Raises FleetRefused if there is none, or it has to stay.
+
+        The last gateway stays while there are routers, which nothing could order any more. Any
+        thread.
+        """
+        drones = {drone.node_id: drone for drone in self.drones}
+        if node_id not in drones:
+            raise FleetRefused(f"drone {node_id} does not exist")
+        gateways = [n for n, drone in drones.items() if drone.ROLE is Role.GATEWAY]
+        if gateways == [node_id] and len(drones) > 1:
+            raise FleetRefused(
+                f"drone {node_id} is the last gateway: no order would reach a router any more; "
+                "add another gateway first, or switch this one off"
+            )
+        return drones[node_id]
+
+    def remove(self, node_id: int) -> None:
+        """Take a drone out of the world. Raises FleetRefused as `check_removal`."""
+        drone = self.check_removal(node_id)
+        self.drones = tuple(other for other in self.drones if other is not drone)
+        drone.engine.leave()
+
+    def _make(self, place: StartPlace) -> VirtualDrone:
+        node_id, role, longitude, latitude = place
+        return _KINDS[role](
+            self._world, node_id, longitude, latitude, self._wind, self._plan_flight
         )
+
+    def _check_place(self, place: StartPlace) -> None:
+        try:
+            check_goal(place.latitude, place.longitude, 0.0)
+        except GoalRefused as error:
+            raise FleetRefused(f"invalid place: {error}") from None
+        if self._obstacles is not None and not _is_free(place, self._obstacles):
+            raise FleetRefused(
+                f"invalid place: x {place.longitude:g} m, y {place.latitude:g} m is in or against "
+                "an obstacle"
+            )
+        centre = (place.longitude, place.latitude, place.role.size_m[2] / 2)
+        for drone in self.drones:
+            if math.dist(centre, drone.engine.state.position) < 2 * HALF_WIDTH_M:
+                raise FleetRefused(f"invalid place: drone {drone.node_id} is there")
 
 
 def check_starts(fleet: Iterable[StartPlace], obstacles: Obstacles) -> None:
     """Raise ConfigurationError if a drone would start in or against an obstacle."""
-    free = obstacles.for_flights(HALF_WIDTH_M).is_free
-    for node_id, role, longitude, latitude in fleet:
-        if not free((longitude, latitude, role.size_m[2] / 2)):
+    for place in fleet:
+        if not _is_free(place, obstacles):
             raise ConfigurationError(
-                f"obstacles: drone {node_id} would start in or against a box, at "
-                f"x {longitude:g} m, y {latitude:g} m; move the box, or change spacing and gridsize"
+                f"obstacles: drone {place.node_id} would start in or against a box, at "
+                f"x {place.longitude:g} m, y {place.latitude:g} m; move the box, or change spacing "
+                "and gridsize"
             )
+
+
+def _is_free(place: StartPlace, obstacles: Obstacles) -> bool:
+    free = obstacles.for_flights(HALF_WIDTH_M).is_free
+    return free((place.longitude, place.latitude, place.role.size_m[2] / 2))

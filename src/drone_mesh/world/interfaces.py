@@ -70,6 +70,10 @@ class World(abc.ABC):
         """Put a box's centre at this place; it stays upright."""
 
     @abc.abstractmethod
+    def remove_box(self, box: int) -> None:
+        """Take a body away. Its handle may be given to a later body: do not use it again."""
+
+    @abc.abstractmethod
     def close(self) -> None:
         """Free what the world holds. Closing twice changes nothing; a closed world cannot step."""
 

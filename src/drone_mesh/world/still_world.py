@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 from drone_mesh.air.box import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.world.interfaces import World
@@ -12,17 +14,22 @@ class StillWorld(World):
 
     def __init__(self) -> None:
         super().__init__()
-        self.centres: list[Vector] = []  # by handle
+        self.centres: dict[int, Vector] = {}  # by handle
+        self._handles = itertools.count()
 
     def add_box(self, size: Vector, centre: Vector) -> int:
-        self.centres.append(centre)
-        return len(self.centres) - 1
+        handle = next(self._handles)
+        self.centres[handle] = centre
+        return handle
 
     def add_obstacle(self, box: Box) -> None:
         """Nothing can hit it."""
 
     def move_box(self, box: int, centre: Vector) -> None:
         self.centres[box] = centre
+
+    def remove_box(self, box: int) -> None:
+        del self.centres[box]
 
     def close(self) -> None:
         """There is nothing to free."""

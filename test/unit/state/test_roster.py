@@ -65,3 +65,13 @@ def test_a_node_without_a_drone_has_no_place():
 def test_a_drone_without_a_report_is_listed_as_switched_off():
     (drone,) = MeshRoster().snapshot([DroneView(3, Role.ROUTER, (1.0, 2.0, 0.0))], wall_s=0.0)
     assert (drone.id, drone.on, drone.position) == (3, False, (1.0, 2.0, 0.0))
+
+
+def test_a_node_that_was_removed_is_gone_even_if_its_host_fell_silent():
+    roster = MeshRoster()
+    roster.merge_report("host", gateway_and_router(), wall_s=0.0)
+    roster.forget(1)
+    roster.forget(9)
+    assert [node.id for node in roster.snapshot([], wall_s=1.0)] == [0]
+    roster.merge_report("host", [], wall_s=2.0)
+    assert roster.snapshot([], wall_s=2.0) == []

@@ -72,7 +72,7 @@ def test_the_body_in_the_world_is_where_the_engine_says(world, engine):
     engine.set_goal(5.0, 5.0, 1.0)
     for _ in range(200):
         world.step()
-        assert world.centres == [engine.state.position]
+        assert list(world.centres.values()) == [engine.state.position]
 
 
 def test_a_flight_straight_up_does_not_stop_when_it_passes_its_goal(world, engine):

@@ -1,4 +1,8 @@
-"""The parameter /drone_mesh/fleet: how the factory configures hosts in other processes."""
+"""The parameters by which the factory describes its fleet to other processes.
+
+/drone_mesh/fleet: the configuration that the factory was started with.
+/drone_mesh/drones: the drones that are there now (PresentDrones.to_parameter).
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,11 @@ import rospy
 
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.present_drones import PresentDrones
 
 
 def set_fleet_parameter(configuration: FactoryConfiguration) -> None:
-    """Publish the drones and the settings of their nodes to hosts in other processes."""
+    """Publish the settings of the nodes to hosts in other processes."""
     fleet = dataclasses.asdict(configuration)
     fleet["seed"] = str(configuration.seed)  # XML-RPC has no integers above 2**31
     rospy.set_param(names.FLEET_PARAM, fleet)
@@ -23,9 +28,14 @@ def get_fleet_parameter() -> FactoryConfiguration:
     return FactoryConfiguration(**{**fleet, "seed": int(fleet["seed"])})
 
 
-def fleet_if_known() -> FactoryConfiguration | None:
-    """The configuration that the factory has set; None: there is no factory, or not yet."""
+def get_present_drones() -> PresentDrones:
+    """The drones that are there now. Raises KeyError before the factory has made any."""
+    return PresentDrones.from_parameter(rospy.get_param(names.DRONES_PARAM))
+
+
+def drones_if_known() -> PresentDrones | None:
+    """The drones that are there now; None: there is no factory, or not yet."""
     try:
-        return get_fleet_parameter()
+        return get_present_drones()
     except KeyError:
         return None

@@ -6,6 +6,7 @@ import http.client
 import logging
 import threading
 import xmlrpc.client
+from typing import Any
 
 import rosgraph
 import rospy
@@ -17,7 +18,7 @@ from rospy.impl.registration import (
 )
 
 PERIOD_S = 2.0  # wall; our choice
-_NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException)
+NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException)
 
 _log = logging.getLogger(__name__)
 
@@ -33,17 +34,20 @@ class MasterWatch:
     def __init__(self, *parameters: str) -> None:
         """`parameters`: names of public parameters to restore, if they exist when it starts."""
         self._names = [rospy.resolve_name(name) for name in (rospy.get_name(), *parameters)]
-        self._values: dict[str, object] = {}
+        self._values: dict[str, Any] = {}  # replaced as a whole
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="master watch", daemon=True)
 
     def start(self) -> None:
         """Note the parameters, and look from now on, until the node shuts down."""
-        self._values = {
-            name: rospy.get_param(name) for name in self._names if rospy.has_param(name)
-        }
+        present = {name: rospy.get_param(name) for name in self._names if rospy.has_param(name)}
+        self._values = {**present, **self._values}
         rospy.on_shutdown(self._stopped.set)
         self._thread.start()
+
+    def keep(self, parameter: str, value: Any) -> None:
+        """Restore this value of a public parameter from now on. One thread after the start."""
+        self._values = {**self._values, rospy.resolve_name(parameter): value}
 
     def _run(self) -> None:
         master = rosgraph.Master(rospy.get_name())
@@ -53,7 +57,7 @@ class MasterWatch:
             except rosgraph.MasterException:  # it answers, and does not know this node
                 if not (self._stopped.is_set() or rospy.is_shutdown()):
                     self._register_again()
-            except _NO_ANSWER as error:
+            except NO_ANSWER as error:
                 _log.debug("the master does not answer: %s", error)
 
     def _register_again(self) -> None:
@@ -61,7 +65,7 @@ class MasterWatch:
         try:
             for name, value in self._values.items():
                 rospy.set_param(name, value)
-        except _NO_ANSWER as error:
+        except NO_ANSWER as error:
             _log.debug("the master does not answer: %s", error)
             return
         topics, services = get_topic_manager(), get_service_manager()

@@ -23,9 +23,12 @@ ALL_DEBUG_TOPIC = "/debug"  # NodeDebugInfo of all nodes, only while there is a 
 CLOCK_TOPIC = "/clock"
 FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the factor achieved, once a second
 SPEED_SERVICE = "/DroneFactory/setSpeed"  # SetSpeed
+ADD_DRONE_SERVICE = "/DroneFactory/addDrone"  # AddDrone
+REMOVE_DRONE_SERVICE = "/DroneFactory/removeDrone"  # RemoveDrone
 PROGRESS_TOPIC = "/mesh/progress"  # Header: up to when a host in another process has done its work
 SIM_TIME_PARAM = "/use_sim_time"
 FLEET_PARAM = "/drone_mesh/fleet"  # the factory's configuration, for hosts in other processes
+DRONES_PARAM = "/drone_mesh/drones"  # the ids of the present drones, see fleet_parameter.py
 
 REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
 STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> people

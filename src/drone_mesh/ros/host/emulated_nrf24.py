@@ -48,6 +48,7 @@ class EmulatedNRF24(IWirelessCommunication):
         """Power the chip down, and leave the ROS graph."""
         self._panel.stop()
         self._antenna.stop_antenna()
+        self._received.unregister()
 
     @property
     def medium(self) -> Medium:

@@ -55,17 +55,21 @@ class EmulatedRadios:
         self._executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_node")
         self._airtime_s, self._measured_s = 0.0, 0.0
         self._chips: dict[int, EmulatedChip] = {}
-        self._antennas: list[EmulatedNRF24] = []
+        self._antennas: dict[int, EmulatedNRF24] = {}
         for drone in drones:
-            chip = EmulatedChip(self._air, f"node {drone.node_id}", drone.engine.state.position)
-            drone.engine.add_listener(functools.partial(_carry, chip))
-            self._chips[drone.node_id] = chip
+            self.place(drone)
         _log.info(
             "radio nrf24: the real driver on %d emulated chips, range %g m, %d kbit/s",
             len(self._chips),
             max_distance_m,
             rate.value // 1000,
         )
+
+    def place(self, drone: VirtualDrone) -> None:
+        """Put a chip on this drone. The world's thread."""
+        chip = EmulatedChip(self._air, f"node {drone.node_id}", drone.engine.state.position)
+        drone.engine.add_listener(functools.partial(_carry, chip))
+        self._chips[drone.node_id] = chip
 
     @property
     def under_way(self) -> int:
@@ -79,7 +83,7 @@ class EmulatedRadios:
             airtime_s, now_s = self._air.airtime_s, self._wall_clock.now_ns / NS_PER_S
         share = (airtime_s - self._airtime_s) / max(now_s - self._measured_s, 1e-9)
         self._airtime_s, self._measured_s = airtime_s, now_s
-        radios = [antenna.statistics() for antenna in list(self._antennas)]
+        radios = [antenna.statistics() for antenna in list(self._antennas.values())]
         tries, sent = (sum(r.tries for r in radios), sum(r.sent for r in radios))
         return {
             "frames": frames,
@@ -111,8 +115,13 @@ class EmulatedRadios:
             rng=random.Random(f"{self._seed} radio {node_id}"),
         )
         antenna = EmulatedNRF24(node_id, radio, seat)
-        self._antennas.append(antenna)
+        self._antennas[node_id] = antenna
         return antenna
+
+    def remove(self, node_id: int) -> None:
+        """The chip of this node has no power any more: forget it."""
+        self._antennas.pop(node_id, None)
+        self._chips.pop(node_id, None)
 
     def time_advanced(self) -> None:
         """Simulated time was moved."""
@@ -120,7 +129,7 @@ class EmulatedRadios:
 
     def fall_silent(self) -> None:
         """Make every send of every node fail at once from now on."""
-        for antenna in list(self._antennas):
+        for antenna in list(self._antennas.values()):
             antenna.fall_silent()
 
     def close(self) -> None:

@@ -57,6 +57,11 @@ class RosDroneEngineConnector(IDroneEngine):
         except ServiceGone as error:
             _log.debug("drone %d: %s", self._node_id, error)
 
+    def disconnect(self) -> None:
+        """Close the connection, and withdraw the topic of the goals with the last of them."""
+        self._gps.close()
+        self._goal.unregister()
+
     def why_not_fly(self) -> str:
         """As the world says: crashed, or out of battery; empty while it can fly."""
         return self._why_not_fly()

@@ -31,7 +31,8 @@ class HostReports:
     Publishes: /mesh/reports (HostReport), once or twice a second of wall time, also while time
                stands still
 
-    `add` and `observe` may be called by any thread. Each node's NodeState belongs to the thread.
+    The workers call `add` and `drop`, any thread `observe`. Each node's NodeState belongs to the
+    thread.
     """
 
     def __init__(self) -> None:
@@ -48,6 +49,10 @@ class HostReports:
         role = NodeState.GATEWAY if gateway else NodeState.ROUTER
         state = NodeState(id=component.get_node_id(), role=role)
         self._hosted.append((state, component, antenna_on))
+
+    def drop(self, node_id: int) -> None:
+        """Report on this node no longer."""
+        self._hosted = [hosted for hosted in self._hosted if hosted[0].id != node_id]
 
     def observe(self, event: MeshEvent) -> None:
         """The observer of all components of this process."""

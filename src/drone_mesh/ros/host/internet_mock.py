@@ -31,9 +31,7 @@ class RosInternetMock(IInternetConnection):
         self._node_id = node_id
         self._seat = seat
         self._subscriber: rospy.Subscriber | None = None
-        self._answers = rospy.Publisher(
-            names.GATEWAY_ANSWERS_TOPIC, FlightOrderAnswer, tcp_nodelay=True, queue_size=_QUEUE
-        )
+        self._answers: rospy.Publisher | None = None
 
     def connect(self, commands: IGatewayCommands) -> None:
         """Subscribe; orders go to `commands`."""
@@ -42,19 +40,25 @@ class RosInternetMock(IInternetConnection):
             self._seat.submit(lambda now_s: self._order(commands, request, now_s))
 
         self.disconnect()
+        self._answers = rospy.Publisher(
+            names.GATEWAY_ANSWERS_TOPIC, FlightOrderAnswer, tcp_nodelay=True, queue_size=_QUEUE
+        )
         self._subscriber = rospy.Subscriber(
             names.GATEWAY_TOPIC, RequestGatewayDroneFlight, order, tcp_nodelay=True
         )
 
     def disconnect(self) -> None:
-        """Unsubscribe. A second call changes nothing."""
-        if self._subscriber is not None:
+        """Leave both topics. A second call changes nothing."""
+        if self._subscriber is not None and self._answers is not None:
             self._subscriber.unregister()
-            self._subscriber = None
+            self._answers.unregister()
+        self._subscriber = self._answers = None
 
     def _order(
         self, commands: IGatewayCommands, request: RequestGatewayDroneFlight, now_s: float
     ) -> None:
+        if self._answers is None:
+            return  # the gateway has ended meanwhile
         goal = location_of(request)
         try:
             taken = commands.send_goal_request_to_drone(
@@ -69,4 +73,5 @@ class RosInternetMock(IInternetConnection):
             _log.info("gateway %d sent drone %d to %s", self._node_id, request.ID, goal.in_words())
 
     def _answer(self, drone: int, outcome: int) -> None:
-        self._answers.publish(FlightOrderAnswer(self._node_id, drone, outcome))
+        if self._answers is not None:
+            self._answers.publish(FlightOrderAnswer(self._node_id, drone, outcome))

@@ -7,8 +7,9 @@ import functools
 import logging
 import threading
 import time
-from typing import Callable, Iterable
+from typing import Callable, Mapping
 
+from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros.graph.figures import Figures
@@ -25,6 +26,7 @@ from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 RADIOS_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
 _LOOK_PERIOD_S = 0.02  # wall; our choice
+_KINDS = {Role.GATEWAY: VirtualRaspberryPiGateway, Role.ROUTER: VirtualRaspberryPiRouter}
 
 _log = logging.getLogger(__name__)
 
@@ -100,20 +102,33 @@ class MeshHost:
                 return
             time.sleep(_LOOK_PERIOD_S)
 
-    def serve(self, node_ids: Iterable[int]) -> None:
-        """Start these nodes, one after the other."""
+    def serve(self, nodes: Mapping[int, Role]) -> None:
+        """Start these nodes, one after the other; given are their ids and what they are."""
         begun_s = time.monotonic()
-        ids = list(node_ids)
-        if not ids:
+        if not nodes:
             return
-        left = threading.Semaphore(len(ids) - 1)  # with emulated radios they start side by side
+        left = threading.Semaphore(len(nodes) - 1)  # with emulated radios they start side by side
 
         def on_start() -> None:
             if not left.acquire(blocking=False) and not self._stopping:
-                _log.info("started %d nodes in %.1f s", len(ids), time.monotonic() - begun_s)
+                noun = "node" if len(nodes) == 1 else "nodes"
+                _log.info("started %d %s in %.1f s", len(nodes), noun, time.monotonic() - begun_s)
 
-        for node_id in ids:
-            self._submit_start(node_id, on_start)
+        for node_id, role in nodes.items():
+            self._submit_start(node_id, role, on_start)
+
+    def dismiss(self, node_id: int) -> None:
+        """End this node for good; returns at once. Not served: nothing changes."""
+
+        def end(now_s: float) -> None:
+            node = self.nodes.pop(node_id, None)
+            if node is not None:
+                self._reports.drop(node_id)
+                node.stop(now_s)
+                self._radios.remove(node_id)
+                _log.info("ended node %d", node_id)
+
+        self._radios.seat().submit(end)  # the worker of all nodes: after the start of this one
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
@@ -124,7 +139,7 @@ class MeshHost:
         self._radios.fall_silent()
         for node in list(self.nodes.values()):
             # Only these have threads of their own; the others end with the executor.
-            if self._radios.own_threads or node.node_id < self._settings.gateways:
+            if self._radios.own_threads or isinstance(node, VirtualRaspberryPiGateway):
                 node.seat.submit(node.stop)
         self._radios.close()
         self.executor.stop()
@@ -136,10 +151,8 @@ class MeshHost:
             **self._radios.figures(),
         }
 
-    def _submit_start(self, node_id: int, on_start: Callable[[], None]) -> None:
+    def _submit_start(self, node_id: int, role: Role, on_start: Callable[[], None]) -> None:
         seat = self._radios.seat()
-        is_gateway = node_id < self._settings.gateways
-        kind = VirtualRaspberryPiGateway if is_gateway else VirtualRaspberryPiRouter
 
         def start(now_s: float) -> None:
             if self._stopping:
@@ -147,7 +160,7 @@ class MeshHost:
             try:
                 antenna = self._radios.antenna(node_id, seat)
                 why_not_fly = functools.partial(self._grounded.reason, node_id)
-                node = kind(node_id, self._settings, antenna, seat, why_not_fly)
+                node = _KINDS[role](node_id, self._settings, antenna, seat, why_not_fly)
                 self._reports.add(node.component, node.antenna.on)
                 node.start(now_s)
             except MeshError as error:  # does not go away by itself

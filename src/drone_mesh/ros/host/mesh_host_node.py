@@ -11,19 +11,21 @@ import rospy
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
-from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter
+from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter, get_present_drones
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.node_presence import node_runs
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import configured_obstacles, or_stop
-from drone_mesh.ros.graph.persistent_service import PersistentService, ServiceGone
+from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.host.followed_clock import FollowedClock
+from drone_mesh.ros.host.followed_fleet import FollowedFleet
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.mesh_settings import MeshSettings
-from drone_mesh.srv import PowerSwitch
 
 LOOK_PERIOD_S = 0.1  # wall; our choice
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
@@ -49,16 +51,6 @@ def _whole_parameter(name: str) -> int:
         raise ConfigurationError(f"invalid {name} {value!r}: must be a whole number") from None
 
 
-def _is_served(node_id: int) -> bool:
-    switch = PersistentService(names.power_switch(node_id), PowerSwitch)
-    try:
-        switch.connect()
-    except ServiceGone:
-        return False
-    switch.close()
-    return True
-
-
 def _obstacles_of(fleet: FactoryConfiguration) -> Obstacles | None:
     """The boxes of the world; None, with a warning, if this machine does not have their file."""
     try:
@@ -70,10 +62,11 @@ def _obstacles_of(fleet: FactoryConfiguration) -> Obstacles | None:
         return None
 
 
-def ids_to_serve(fleet: FactoryConfiguration) -> range:
+def share_of_host(fleet: FactoryConfiguration, drones: PresentDrones) -> range:
     """The ids that the parameters select: ~first..~last, or share ~index of ~hosts equal shares.
 
-    Raises ConfigurationError for ids that the world does not have or another process serves.
+    The shares are those of the drones at the start. Raises ConfigurationError for ids that the
+    world does not have or another process serves.
     """
     count = fleet.gateways + fleet.routers
     if rospy.has_param("~hosts"):
@@ -85,11 +78,12 @@ def ids_to_serve(fleet: FactoryConfiguration) -> range:
         ids = range(count * (index - 1) // hosts, count * index // hosts)
     else:
         ids = range(_whole_parameter("first"), _whole_parameter("last") + 1)
-        if len(ids) == 0 or ids[0] < 0 or ids[-1] >= count:
+        if len(ids) == 0 or not drones.roles.keys() >= set(ids):
             raise ConfigurationError(
-                f"invalid first..last {ids.start}..{ids.stop - 1}: the drones are 0..{count - 1}"
+                f"invalid first..last {ids.start}..{ids.stop - 1}: the drones are "
+                f"{ids_in_words(drones.roles)}"
             )
-    served = [node_id for node_id in ids if _is_served(node_id)]
+    served = [n for n in drones.of_host(rospy.get_name(), ids) if node_runs(n)]
     if served:
         raise ConfigurationError(f"node {served[0]} is already hosted by another process")
     return ids
@@ -112,7 +106,7 @@ def main() -> None:
         if stop.requested():
             return
         fleet = get_fleet_parameter()
-        ids = or_stop(lambda: ids_to_serve(fleet))
+        ids = or_stop(lambda: share_of_host(fleet, get_present_drones()))
         _log.info("serving %s", f"drones {ids.start}..{ids.stop - 1}" if ids else "no drones")
         settings = or_stop(lambda: MeshSettings.of(fleet, _obstacles_of(fleet)))
         host = MeshHost(settings, lambda: clock.now_s, stop.fail)
@@ -128,8 +122,10 @@ def main() -> None:
                 "/DroneFactory to subscribe to the progress", clock.is_followed, stop.requested
             )
             clock.report_progress()
-            host.serve(ids)
+            drones = FollowedFleet(host, ids)
+            drones.follow()
             while not stop.wait(PROGRESS_PERIOD_S):
                 clock.report_progress()
+                drones.follow()
         finally:
             host.stop()

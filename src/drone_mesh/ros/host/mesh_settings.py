@@ -23,7 +23,6 @@ from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_bro
 class MeshSettings:
     """Settings of every node of a simulation."""
 
-    gateways: int  # ids below are gateways, the others routers
     routing: str  # name of the routing technique
     repair: str  # name of the repair strategy
     repair_options: RepairOptions
@@ -47,7 +46,6 @@ class MeshSettings:
         create_routing_technique(configuration.routing)  # one error now instead of one per node
         create_repair_strategy(configuration.repair)
         return cls(
-            gateways=configuration.gateways,
             routing=configuration.routing,
             repair=configuration.repair,
             repair_options=RepairOptions(

@@ -40,6 +40,9 @@ class Radios(Protocol):
     def antenna(self, node_id: int, seat: Seat) -> IWirelessCommunication:
         """The antenna of a node, which is driven in `seat`."""
 
+    def remove(self, node_id: int) -> None:
+        """The antenna of this node has stopped for good."""
+
     def time_advanced(self) -> None:
         """The clock was moved."""
 
@@ -89,6 +92,9 @@ class VirtualRadios:
     def antenna(self, node_id: int, seat: Seat) -> IWirelessCommunication:
         """The antenna of a node."""
         return VirtualNRF24(node_id, self._link, seat)
+
+    def remove(self, node_id: int) -> None:
+        """Nothing to do: the antenna has left the link."""
 
     def time_advanced(self) -> None:
         """Nothing to do: the host moves its executor itself."""

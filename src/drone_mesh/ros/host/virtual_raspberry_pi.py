@@ -79,6 +79,7 @@ class VirtualRaspberryPi(abc.ABC):
         """Switch off."""
         self._users_of_node.stop()
         self.component.stop()
+        self.engine.disconnect()
 
     @abc.abstractmethod
     def _make_internet(self) -> IInternetConnection | None:

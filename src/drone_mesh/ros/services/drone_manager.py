@@ -9,7 +9,7 @@ from typing import Sequence
 import rospy
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.configuration import FactoryConfiguration
+from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.errors import GoalRefused
 from drone_mesh.layouts import Layouts, Order, UnknownCase
@@ -17,10 +17,11 @@ from drone_mesh.msg import RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.conversions import flight_order, location_of
-from drone_mesh.ros.graph.fleet_parameter import fleet_if_known
+from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import file_parameter, or_stop
+from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.services.order_answers import OrderAnswers
 from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.srv import (
@@ -80,10 +81,10 @@ class DroneManager:
             raise rospy.ServiceException(str(error)) from None
         if request.ID > MAX_NODE_ID:
             raise rospy.ServiceException(f"invalid drone id {request.ID}: must be 0..{MAX_NODE_ID}")
-        fleet = fleet_if_known()
-        if fleet is not None and fleet.fleet_size <= request.ID:
+        fleet = drones_if_known()
+        if fleet is not None and request.ID not in fleet.roles:
             raise rospy.ServiceException(
-                f"drone {request.ID} is not in this fleet: its ids are 0..{fleet.fleet_size - 1}"
+                f"drone {request.ID} is not in this fleet: its ids are {ids_in_words(fleet.roles)}"
             )
         if not self._gateway_is_there():
             _log.warning("drone %d: order dropped, there is no gateway", request.ID)
@@ -110,10 +111,10 @@ class DroneManager:
             raise rospy.ServiceException(str(error)) from None
         if not self._gateway_is_there():
             raise rospy.ServiceException("no gateway is running")
-        fleet = fleet_if_known()
-        drones = MAX_NODE_ID + 1 if fleet is None else fleet.fleet_size
-        missing = [order.node_id for order in orders if order.node_id >= drones]
-        sent, no_route = self._order([o for o in orders if o.node_id < drones], fleet)
+        fleet = drones_if_known()
+        known = [o for o in orders if fleet is None or o.node_id in fleet.roles]
+        missing = [order.node_id for order in orders if order not in known]
+        sent, no_route = self._order(known, fleet)
         summary = OrderSummary(sent, no_route, missing)
         complete = len(sent) == len(orders)
         _log.log(
@@ -122,7 +123,7 @@ class DroneManager:
         return summary
 
     def _order(
-        self, orders: Sequence[Order], fleet: FactoryConfiguration | None
+        self, orders: Sequence[Order], fleet: PresentDrones | None
     ) -> tuple[list[int], list[int]]:
         """Publish these orders, in this order; returns the ids that were sent, or have no route."""
 
@@ -130,7 +131,7 @@ class DroneManager:
             for node_id, goal in orders:
                 self._gateways.publish(flight_order(node_id, goal))
 
-        gateways = self._gateways.get_num_connections() if fleet is None else fleet.gateways
+        gateways = self._gateways.get_num_connections() if fleet is None else len(fleet.gateways)
         drones = [order.node_id for order in orders]
         return self._answers.await_outcomes(drones, publish, gateways, ANSWERS_TIMEOUT_S)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Sequence
 
+from drone_mesh.drone.fleet import ids_in_words
+
 
 @dataclass(frozen=True)
 class OrderSummary:
@@ -32,11 +34,4 @@ def _counted(number: int, noun: str) -> str:
 
 def _named(ids: Sequence[int]) -> str:
     """drone 3; drones 3, 5..9."""
-    runs: list[list[int]] = []
-    for node_id in sorted(ids):
-        if runs and node_id == runs[-1][1] + 1:
-            runs[-1][1] = node_id
-        else:
-            runs.append([node_id, node_id])
-    words = [str(a) if a == b else f"{a}..{b}" for a, b in runs]
-    return f"drone{'' if len(ids) == 1 else 's'} {', '.join(words)}"
+    return f"drone{'' if len(ids) == 1 else 's'} {ids_in_words(ids)}"

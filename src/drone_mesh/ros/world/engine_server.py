@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import Callable
+from typing import Callable, Sequence
 
 import rospy
 
@@ -32,7 +32,8 @@ class PositionReporter(rospy.SubscribeListener):
     Publishes /WirelessSignalSimulator (DroneInfo). Any thread.
     """
 
-    def __init__(self, drones: tuple[VirtualDrone, ...]) -> None:
+    def __init__(self, drones: Callable[[], Sequence[VirtualDrone]]) -> None:
+        """`drones` gives all drones of the moment."""
         self._drones = drones
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
@@ -55,10 +56,12 @@ class PositionReporter(rospy.SubscribeListener):
         self._report_all()
 
     def _report_all(self) -> None:
-        for drone in self._drones:
-            self.report(
-                engine_info(drone.node_id, drone.engine.state.position, drone.engine.is_flat)
-            )
+        for drone in self._drones():
+            self.report_drone(drone)
+
+    def report_drone(self, drone: VirtualDrone) -> None:
+        """Report the position of this drone now."""
+        self.report(engine_info(drone.node_id, drone.engine.state.position, drone.engine.is_flat))
 
 
 class EngineServer:
@@ -85,8 +88,13 @@ class EngineServer:
         self._complaints = ThrottledLog(_log)
         self._engine.add_listener(self._moved)
         self._engine.observe(self._observed)
-        rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
-        rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps)
+        self._goals = rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
+        self._service = rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps)
+
+    def close(self) -> None:
+        """Withdraw the topic and the service."""
+        self._goals.unregister()
+        self._service.shutdown()
 
     def _goal(self, goal: LocationMsg) -> None:
         try:
@@ -109,3 +117,24 @@ class EngineServer:
         if is_due or kind != self._reported:
             self._reported_s, self._reported = state.now_s, kind
             self._reporter.report(engine_info(self._node_id, state.position, self._engine.is_flat))
+
+
+class EngineServers:
+    """The engines of all drones. After the start, one thread offers and withdraws them."""
+
+    def __init__(
+        self, drones: Callable[[], Sequence[VirtualDrone]], happened: Callable[[EventRecord], None]
+    ) -> None:
+        """`drones` gives all drones of the moment; `happened` as for EngineServer."""
+        self._reporter = PositionReporter(drones)
+        self._happened = happened
+        self._servers: dict[int, EngineServer] = {}
+
+    def offer(self, drone: VirtualDrone) -> None:
+        """Offer the engine of this drone, and report its position."""
+        self._servers[drone.node_id] = EngineServer(drone, self._reporter, self._happened)
+        self._reporter.report_drone(drone)
+
+    def withdraw(self, node_id: int) -> None:
+        """Offer the engine of this drone no longer."""
+        self._servers.pop(node_id).close()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from typing import Callable, Sequence
 
 import rospy
 
@@ -19,14 +19,17 @@ class ExternalEngines:
     /Drones/<id>/gps, and publish DroneInfo without `sub`. Callbacks come in threads of rospy.
     """
 
-    def __init__(self, drones: Sequence[VirtualDrone]) -> None:
-        self._engines = {drone.node_id: drone.engine for drone in drones}
+    def __init__(self, drones: Callable[[], Sequence[VirtualDrone]]) -> None:
+        """`drones` gives all drones of the moment."""
+        self._drones = drones
         rospy.Subscriber(
             names.SIGNAL_TOPIC, DroneInfo, self._reported, queue_size=names.SIGNAL_QUEUE
         )
 
     def _reported(self, info: DroneInfo) -> None:
-        engine = self._engines.get(info.nodeID)
         x, y, z = info.position
-        if engine is not None and not info.sub and info.on and math.isfinite(x + y + z):
-            engine.follow((x, y, z))
+        if info.sub or not info.on or not math.isfinite(x + y + z):
+            return
+        for drone in self._drones():
+            if drone.node_id == info.nodeID:
+                drone.engine.follow((x, y, z))

@@ -68,6 +68,7 @@ class MeshStatePublisher:
         self._obstacles, self._shape = obstacles, shape
         self._roster = MeshRoster()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
+        self._forgotten: deque[int] = deque()
         self._last_look: tuple[float, float] | None = None  # wall, simulated
         self._latest: MeshStatus | None = None
         self._diagnosed_s = float("-inf")
@@ -87,6 +88,10 @@ class MeshStatePublisher:
     def latest(self) -> MeshStatus | None:
         """The last published state; None before the first. The next one changes its nodes."""
         return self._latest
+
+    def forget(self, node_id: int) -> None:
+        """This node was removed: show it no longer, even if its host ended before. Any thread."""
+        self._forgotten.append(node_id)
 
     def start(self) -> None:
         """Start publishing."""
@@ -123,6 +128,8 @@ class MeshStatePublisher:
             self._roster.merge_report(report.host, report.nodes, heard_s)
             for event in report.events:
                 self._events.publish(event)
+        while self._forgotten:
+            self._roster.forget(self._forgotten.popleft())
         while self._happened:
             self._events.publish(event_msg(self._happened.popleft()))
 

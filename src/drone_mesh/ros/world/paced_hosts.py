@@ -104,6 +104,10 @@ class PacedHosts:
             )
         return True
 
+    def others(self) -> list[str]:
+        """The hosts in other processes that report. Any thread."""
+        return list(self._progress)
+
     def time_advanced(self) -> None:
         """The world has made a step."""
         if self._nodes is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
+from typing import Sequence
 
 from drone_mesh.nrf24.settings import data_rate
 from drone_mesh.ros.graph import names
@@ -13,16 +14,21 @@ from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.world.drone_views import drone_views
-from drone_mesh.ros.world.engine_server import EngineServer, PositionReporter
+from drone_mesh.ros.world.engine_server import EngineServers
 from drone_mesh.ros.world.external_engines import ExternalEngines
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
+from drone_mesh.ros.world.fleet_changes import FleetChanges
+from drone_mesh.ros.world.fleet_hands import FleetHands
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.ros.world.world_window import window_of
 from drone_mesh.state.model import EventRecord
 from drone_mesh.state.observation import describe_obstacles
 from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.factory import DroneFactory
+
+MQTT_SENDER = {0: "with internet mqtt it sends what programs publish to the broker"}
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +42,7 @@ class Simulation:
         self._world = world
         self._happened: deque[EventRecord] = deque()  # to the drones; any thread fills it
         configuration = parameters.configuration
-        self._drones = DroneFactory(
+        self._factory = DroneFactory(
             world,
             configuration.gateways,
             configuration.routers,
@@ -47,7 +53,7 @@ class Simulation:
             if configuration.flight == "dynamic"
             else None,
             parameters.obstacles,
-        ).drones
+        )
         _log.info(
             "fleet: gateways %d, routers %d, spacing %g m",
             configuration.gateways,
@@ -57,52 +63,65 @@ class Simulation:
 
     def run(self, stop: OrderlyStop) -> None:
         """Offer the engines, start the nodes, and step until `stop` is requested."""
+        engines = None
         if self._parameters.configuration.drones == "external":
-            ExternalEngines(self._drones)
+            ExternalEngines(self._present)
         else:
-            reporter = PositionReporter(self._drones)
-            for drone in self._drones:
+            engines = EngineServers(self._present, self._happened.append)
+            for drone in self._present():
                 if stop.requested():
                     return
-                EngineServer(drone, reporter, self._happened.append)
-        host = self._start_host(stop)
-        set_fleet_parameter(self._parameters.configuration)
-        MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM).start()
+                engines.offer(drone)
+        radios = self._make_radios()
+        host = self._start_host(radios, stop)
         try:
-            self._step(host, stop)
+            self._step(host, radios, engines, stop)
         finally:
             if host is not None:
                 host.stop()
 
-    def _start_host(self, stop: OrderlyStop) -> MeshHost | None:
-        """The nodes of this process, while they start; None: they run in others."""
-        if self._parameters.hosts != 1 or not self._drones:
-            return None
+    def _present(self) -> Sequence[VirtualDrone]:
+        return self._factory.drones
+
+    def _make_radios(self) -> EmulatedRadios | None:
+        """The emulated chips; None: the radio is virtual."""
         configuration, world = self._parameters.configuration, self._world
-        radios = None
         if configuration.radio == "nrf24":
-            radios = EmulatedRadios(
-                self._drones,
+            return EmulatedRadios(
+                self._present(),
                 configuration.max_distance,
                 data_rate(configuration.data_rate),
                 configuration.seed,
                 lambda: world.now_s,
             )
-        else:
-            _log.info("radio virtual: an ideal disc, range %g m", configuration.max_distance)
+        _log.info("radio virtual: an ideal disc, range %g m", configuration.max_distance)
+        return None
+
+    def _start_host(self, radios: EmulatedRadios | None, stop: OrderlyStop) -> MeshHost | None:
+        """The nodes of this process, while they start; None: they run in others."""
+        if self._parameters.hosts != 1:
+            return None
+        world = self._world
         host = MeshHost(self._parameters.settings, lambda: world.now_s, stop.fail, radios)
         host.start()
-        host.wait_for_radios(stop.requested)
-        host.serve(drone.node_id for drone in self._drones)
+        if self._present():
+            host.wait_for_radios(stop.requested)
+        host.serve({drone.node_id: drone.ROLE for drone in self._present()})
         return host
 
-    def _step(self, host: MeshHost | None, stop: OrderlyStop) -> None:
-        configuration, world, drones = self._parameters.configuration, self._world, self._drones
+    def _step(
+        self,
+        host: MeshHost | None,
+        radios: EmulatedRadios | None,
+        engines: EngineServers | None,
+        stop: OrderlyStop,
+    ) -> None:
+        configuration, world = self._parameters.configuration, self._world
         runner = WorldRunner(world, configuration.real_time_factor, host)
 
         def look() -> WorldView:
             now_s = world.now_s
-            views = drone_views(drones, now_s)
+            views = drone_views(self._present(), now_s)
             return WorldView(now_s, views, runner.wanted_factor, runner.paused)
 
         obstacles = self._parameters.obstacles
@@ -116,7 +135,16 @@ class Simulation:
             configuration.shape,
         )
         state.start()
-        window = window_of(world, drones, state) if configuration.gui else None
+        watch = MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM)
+        changes = FleetChanges(
+            self._factory,
+            FleetHands(self._factory, runner, state, engines, host, radios),
+            watch,
+            MQTT_SENDER if configuration.internet == "mqtt" else {},
+        )
+        set_fleet_parameter(configuration)  # last: hosts wait for it
+        watch.start()
+        window = window_of(world, self._present, state) if configuration.gui else None
         if window is not None:
             window.start()
         try:
@@ -124,4 +152,5 @@ class Simulation:
         finally:
             if window is not None:
                 window.stop()
+            changes.stop()
             state.stop()

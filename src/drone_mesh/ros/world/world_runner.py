@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
-from typing import Callable
+from collections import deque
+from concurrent.futures import Future, TimeoutError
+from typing import Any, Callable, TypeVar
 
 import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
 
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+from drone_mesh.errors import FleetRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.direct_publisher import DirectPublisher
@@ -25,9 +29,12 @@ _MEASURE_PERIOD_S = 1.0  # wall
 _LOG_PERIOD_S = 10.0  # wall
 _TOO_SLOW = 0.95  # of the requested factor
 _NAP_S = 0.001  # wall; while the mesh works off what is due
+_ERRAND_LOOK_S = 0.2  # wall; how soon the end of the world is noticed while waiting for it
 _LONGEST_NAP_S = 0.05  # wall; a new speed or Ctrl-C takes effect after this at the latest
 
 _log = logging.getLogger(__name__)
+
+Result = TypeVar("Result")
 
 
 class WorldRunner:
@@ -47,6 +54,8 @@ class WorldRunner:
         self._hosts = PacedHosts(nodes)
         self._paused = False
         self._wanted = factor
+        self._errands: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+        self._over = threading.Event()
         self._clock = DirectPublisher(names.CLOCK_TOPIC, Clock, STUCK_SUBSCRIBER_S)
         self._factor = rospy.Publisher(names.FACTOR_TOPIC, Float32, latch=True, queue_size=1)
         rospy.Service(names.SPEED_SERVICE, SetSpeed, self._set_speed)
@@ -61,18 +70,48 @@ class WorldRunner:
         """Whether simulated time is paused. Any thread."""
         return self._paused
 
+    def hosts(self) -> list[str]:
+        """The ROS nodes that run nodes of the mesh outside this process. Any thread."""
+        return self._hosts.others()
+
+    def between_steps(self, function: Callable[[], Result]) -> Result:
+        """What `function` returns or raises, called in the thread of `run`. Any other thread.
+
+        Raises FleetRefused if the simulation ends before.
+        """
+        future: Future[Result] = Future()
+        self._errands.append((function, future))
+        while True:
+            try:
+                return future.result(_ERRAND_LOOK_S)
+            except TimeoutError:
+                if self._over.is_set():
+                    raise FleetRefused("the simulation ends") from None
+
     def run(self, is_over: Callable[[], bool]) -> None:
         """Step until `is_over` returns True."""
         pace = Pace(self._wanted)
         measured_s = self._world.now_s, time.monotonic()
         logged_s = measured_s
-        while not is_over():
-            self._step_when_due(pace)
-            if time.monotonic() - measured_s[1] >= _MEASURE_PERIOD_S:
-                measured_s = self._measure(measured_s)
-                if measured_s[1] - logged_s[1] >= _LOG_PERIOD_S:
-                    self._log_factor(logged_s, measured_s)
-                    logged_s = measured_s
+        try:
+            while not is_over():
+                self._run_errands()
+                self._step_when_due(pace)
+                if time.monotonic() - measured_s[1] >= _MEASURE_PERIOD_S:
+                    measured_s = self._measure(measured_s)
+                    if measured_s[1] - logged_s[1] >= _LOG_PERIOD_S:
+                        self._log_factor(logged_s, measured_s)
+                        logged_s = measured_s
+        finally:
+            self._over.set()
+
+    def _run_errands(self) -> None:
+        while self._errands:
+            function, future = self._errands.popleft()
+            try:
+                future.set_result(function())
+            except Exception as error:  # for the thread that waits
+                future.set_exception(error)
 
     def _step_when_due(self, pace: Pace) -> None:
         """Make a step, or take a nap if none is due."""

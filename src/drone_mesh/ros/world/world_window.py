@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Sequence
+from typing import Callable, Sequence
 
 from drone_mesh.ros.world.drone_views import drone_views
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher
@@ -16,7 +16,7 @@ from drone_mesh.world.interfaces import World
 
 
 def window_of(
-    world: World, drones: Sequence[VirtualDrone], state: MeshStatePublisher
+    world: World, drones: Callable[[], Sequence[VirtualDrone]], state: MeshStatePublisher
 ) -> WindowProcess:
     """A window, not started yet: positions as they are now, all else from the latest state."""
     lost_links = LostLinks()
@@ -26,6 +26,6 @@ def window_of(
         if mesh is None:
             return Scene(title="starting")
         lost = lost_links.update(known_links(mesh.nodes), time.monotonic())
-        return scene_of(mesh, lost, drone_views(drones, world.now_s))
+        return scene_of(mesh, lost, drone_views(drones(), world.now_s))
 
     return WindowProcess(look)

@@ -1,0 +1,47 @@
+"""PresentDrones: the drones of a simulation, of which some were added or removed while it ran."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Collection, Mapping
+
+from drone_mesh.drone.roles import Role
+
+
+@dataclass(frozen=True)
+class PresentDrones:
+    """The drones that are in the world now, and which processes run the nodes of new ones."""
+
+    roles: Mapping[int, Role]  # by id, ascending
+    hosts: Mapping[int, str]  # of those added while it runs: the ROS node; empty: none was there
+
+    @property
+    def gateways(self) -> list[int]:
+        """Ids, ascending."""
+        return [node_id for node_id, role in self.roles.items() if role is Role.GATEWAY]
+
+    def of_host(self, host: str, share: Collection[int]) -> dict[int, Role]:
+        """What this host runs, if `share` is its part of the drones that have no other host."""
+        return {
+            node_id: role
+            for node_id, role in self.roles.items()
+            if (self.hosts.get(node_id) or (host if node_id in share else "")) == host
+        }
+
+    def to_parameter(self) -> dict[str, list[Any]]:
+        """As ROS parameters hold it: ids by role, and two lists that belong together."""
+        gateways = self.gateways
+        return {
+            "gateways": gateways,
+            "routers": [node_id for node_id in self.roles if node_id not in gateways],
+            "added": list(self.hosts),
+            "hosts": list(self.hosts.values()),
+        }
+
+    @classmethod
+    def from_parameter(cls, value: Mapping[str, Any]) -> PresentDrones:
+        """The reverse of `to_parameter`."""
+        roles = {node_id: Role.GATEWAY for node_id in value["gateways"]}
+        roles.update({node_id: Role.ROUTER for node_id in value["routers"]})
+        hosts = dict(zip(value["added"], value["hosts"]))
+        return cls({node_id: roles[node_id] for node_id in sorted(roles)}, hosts)

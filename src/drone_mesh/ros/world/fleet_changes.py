@@ -1,0 +1,148 @@
+"""FleetChanges: adds drones to the running simulation, and removes them."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from typing import Callable, Mapping
+
+import rospy
+
+from drone_mesh.drone.roles import Role
+from drone_mesh.errors import FleetRefused
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.node_presence import node_runs
+from drone_mesh.ros.graph.present_drones import PresentDrones
+from drone_mesh.ros.world.fleet_hands import FleetHands
+from drone_mesh.srv import (
+    AddDrone,
+    AddDroneRequest,
+    AddDroneResponse,
+    RemoveDrone,
+    RemoveDroneRequest,
+    RemoveDroneResponse,
+)
+from drone_mesh.world.factory import DroneFactory
+
+NODE_TIMEOUT_S = 5.0  # our choice, wall: how long a node may take to start or to end
+_LOOK_PERIOD_S = 0.02  # wall
+
+_log = logging.getLogger(__name__)
+
+
+class FleetChanges:
+    """Services: /DroneFactory/addDrone (AddDrone), /DroneFactory/removeDrone (RemoveDrone).
+
+    Sets: /drone_mesh/drones, by which other processes learn of each change.
+
+    One thread makes all changes, one after the other; the first request starts it. Threads of
+    rospy wait for it.
+    """
+
+    def __init__(
+        self,
+        factory: DroneFactory,
+        hands: FleetHands,
+        watch: MasterWatch,
+        needed: Mapping[int, str],
+    ) -> None:
+        """`watch` restores the parameter when the master was restarted.
+
+        `needed`: drones that must stay, and why.
+        """
+        self._needed = needed
+        self._factory = factory
+        self._hands = hands
+        self._watch = watch
+        self._hosts: dict[int, str] = {}  # of drones added here: which ROS node runs their nodes
+        self._worker = ThreadPoolExecutor(1, "fleet changes")
+        self._publish()
+        self._services = (
+            rospy.Service(names.ADD_DRONE_SERVICE, AddDrone, self._add_requested),
+            rospy.Service(names.REMOVE_DRONE_SERVICE, RemoveDrone, self._remove_requested),
+        )
+
+    def stop(self) -> None:
+        """Withdraw the services; returns when the thread has ended."""
+        for service in self._services:
+            service.shutdown()
+        self._worker.shutdown()
+
+    # Threads of rospy ------------------------------------------------------------------------
+
+    def _add_requested(self, request: AddDroneRequest) -> AddDroneResponse:
+        try:
+            return self._worker.submit(self._add, request).result()
+        except FleetRefused as error:
+            return AddDroneResponse(success=False, id=request.id, message=str(error))
+
+    def _remove_requested(self, request: RemoveDroneRequest) -> RemoveDroneResponse:
+        try:
+            return self._worker.submit(self._remove, request.id).result()
+        except FleetRefused as error:
+            return RemoveDroneResponse(success=False, message=str(error))
+
+    # The thread of the changes ---------------------------------------------------------------
+
+    def _add(self, request: AddDroneRequest) -> AddDroneResponse:
+        role = Role.GATEWAY if request.gateway else Role.ROUTER
+        wanted = None if request.id == AddDroneRequest.LOWEST_FREE else request.id
+        drone = self._hands.put(role, request.longitude, request.latitude, wanted)
+        node_id = drone.node_id
+        host = self._least_busy_host()
+        self._hosts[node_id] = host
+        self._publish()
+        self._hands.start_node(node_id, role)
+        message = (
+            f"added {role.word} {node_id} at x {request.longitude:g} m, y {request.latitude:g} m; "
+            f"{self._await_start(node_id, host)}"
+        )
+        _log.info("%s", message)
+        return AddDroneResponse(success=True, id=node_id, message=message)
+
+    def _remove(self, node_id: int) -> RemoveDroneResponse:
+        drone = self._factory.check_removal(node_id)
+        if node_id in self._needed:
+            raise FleetRefused(f"drone {node_id} has to stay: {self._needed[node_id]}")
+        self._hosts.pop(node_id, None)
+        self._publish(without=node_id)
+        self._hands.end_node(node_id)
+        if not _comes_true(lambda: not node_runs(node_id)):
+            _log.warning("the process of node %d does not end it", node_id)
+        self._hands.take(drone)
+        message = f"removed {drone.ROLE.word} {node_id}"
+        _log.info("%s", message)
+        return RemoveDroneResponse(success=True, message=message)
+
+    def _least_busy_host(self) -> str:
+        """The host with the fewest added drones; empty: there is none."""
+        busy = Counter(self._hosts.values())
+        return min(self._hands.hosts(), key=lambda host: (busy[host], host), default="")
+
+    def _await_start(self, node_id: int, host: str) -> str:
+        if not host:
+            return (
+                "no host process runs its node; start one: "
+                f"roslaunch drone_mesh host.launch first:={node_id} last:={node_id}"
+            )
+        if _comes_true(lambda: node_runs(node_id)):
+            return f"{host} runs its node"
+        return f"{host} has not started its node yet"
+
+    def _publish(self, without: int | None = None) -> None:
+        roles = {d.node_id: d.ROLE for d in self._factory.drones if d.node_id != without}
+        value = PresentDrones(roles, self._hosts).to_parameter()
+        rospy.set_param(names.DRONES_PARAM, value)
+        self._watch.keep(names.DRONES_PARAM, value)
+
+
+def _comes_true(condition: Callable[[], bool]) -> bool:
+    deadline_s = time.monotonic() + NODE_TIMEOUT_S
+    while not condition():
+        if time.monotonic() > deadline_s or rospy.is_shutdown():
+            return False
+        time.sleep(_LOOK_PERIOD_S)
+    return True

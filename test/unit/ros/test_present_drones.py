@@ -1,0 +1,38 @@
+"""Which drones there are, and which host runs which of their nodes."""
+
+from __future__ import annotations
+
+from drone_mesh.drone.roles import Role
+from drone_mesh.ros.graph.present_drones import PresentDrones
+
+G, R = Role.GATEWAY, Role.ROUTER
+
+
+def test_drones_are_the_same_after_their_way_through_a_parameter():
+    drones = PresentDrones({0: R, 3: G, 7: R, 9: G}, {7: "/mesh_host_1", 9: ""})
+    parameter = drones.to_parameter()
+    assert parameter == {
+        "gateways": [3, 9],
+        "routers": [0, 7],
+        "added": [7, 9],
+        "hosts": ["/mesh_host_1", ""],
+    }
+    assert PresentDrones.from_parameter(parameter) == drones
+
+
+def test_a_host_runs_its_share_of_the_drones_that_are_left():
+    drones = PresentDrones({0: G, 2: R, 3: R}, {})
+    assert drones.of_host("/a", range(2)) == {0: G}
+    assert drones.of_host("/b", range(2, 4)) == {2: R, 3: R}
+
+
+def test_a_drone_that_was_added_belongs_to_the_host_that_was_chosen():
+    drones = PresentDrones({0: G, 1: R, 8: R}, {1: "/b", 8: "/a"})  # 1 came back
+    assert drones.of_host("/a", range(2)) == {0: G, 8: R}
+    assert drones.of_host("/b", range(2, 4)) == {1: R}
+
+
+def test_a_drone_that_was_added_without_a_host_is_for_whoever_is_started_for_it():
+    drones = PresentDrones({0: G, 8: R}, {8: ""})
+    assert drones.of_host("/a", range(2)) == {0: G}
+    assert drones.of_host("/mesh_host_8_8", range(8, 9)) == {8: R}
