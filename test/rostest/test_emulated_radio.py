@@ -10,9 +10,10 @@ import urllib.request
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, wait_for
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
 
 from drone_mesh.msg import NRF24
+from drone_mesh.srv import AddDrone, RemoveDrone
 
 GATEWAY_URL = "http://127.0.0.1:9080"
 ANSWER_WITHIN_S = 5.0
@@ -56,6 +57,13 @@ class EmulatedRadioTest(unittest.TestCase):
         mesh.wait("4 and 5, which is behind it, lost", 30, lambda: mesh.lost(4, 5))
         mesh.switch(4, True)
         mesh.wait("all connected again", 60, mesh.connected)
+
+        added = call("/DroneFactory/addDrone", AddDrone, 9, False, 6.0, 0.0)
+        self.assertTrue(added.success, added.message)
+        newcomer = MeshWatch(10)
+        newcomer.wait("the added drone connected", 60, lambda: newcomer.connected([9]))
+        removed = call("/DroneFactory/removeDrone", RemoveDrone, 9)
+        self.assertTrue(removed.success, removed.message)
         self.assertEqual(log.failures(), [])
 
 

@@ -10,15 +10,21 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, pid_of, wait_for
+from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, pid_of, wait_for
+
+from drone_mesh.srv import AddDrone, RemoveDrone
 
 
 class HostsTest(unittest.TestCase):
     def test_only_the_drones_of_a_killed_host_are_lost_and_they_rejoin(self) -> None:
         rospy.init_node("test_hosts")
         log = LogWatch()
-        mesh = MeshWatch(15)  # ids 0..4, 5..9 and 10..14 in a host each
-        mesh.wait("all connected", 60, mesh.connected)
+        mesh = MeshWatch(18)  # ids 0..4, 5..9 and 10..14 in a host each, the others are added
+        mesh.wait("all connected", 60, lambda: mesh.connected(range(15)))
+        for host, latitude in ((1, 0.0), (2, 6.0), (3, 12.0)):
+            added = call("/DroneFactory/addDrone", AddDrone, 255, False, latitude, 24.0)
+            self.assertIn(f"/mesh_host_{host} runs its node", added.message)
+        mesh.wait("the new ones connected", 60, mesh.connected)
 
         refused = subprocess.run(
             ["rosrun", "drone_mesh", "mesh_host", "__name:=second", "_first:=3", "_last:=4"],
@@ -43,6 +49,10 @@ class HostsTest(unittest.TestCase):
             60,
             lambda: mesh.info(14).totalMessages < sent and mesh.connected(),
         )
+        removed = call("/DroneFactory/removeDrone", RemoveDrone, 17)  # in the restarted host
+        self.assertTrue(removed.success, removed.message)
+        with self.assertRaises(rospy.ROSException):
+            rospy.wait_for_service("/Nodes/17/powerSwitch", timeout=0.1)
         self.assertEqual(log.failures(), [])
 
 
