@@ -87,3 +87,11 @@ class GatewayControls:
     def speed(self, paused: bool, factor: float) -> str:
         """Refused."""
         raise OrderRefused("the speed of a real mesh cannot be changed")
+
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
+        """Refused."""
+        raise OrderRefused("a real drone joins when it is switched on")
+
+    def remove(self, node: int) -> str:
+        """Refused."""
+        raise OrderRefused("a real drone leaves when it is switched off")

@@ -42,6 +42,10 @@ class MeshControls(Protocol):
 
     def speed(self, paused: bool, factor: float) -> str: ...
 
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str: ...
+
+    def remove(self, node: int) -> str: ...
+
 
 class _Request(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)  # "3" is not a node, 1 not a switch
@@ -92,6 +96,27 @@ class _Speed(PageOrder):
 
     def carry_out(self, controls: MeshControls) -> str:
         return controls.speed(self.paused, self.factor)
+
+
+class _Add(PageOrder):
+    """Add a drone; without `node` it gets the lowest free id."""
+
+    do: Literal["add"]
+    node: NodeOrNone = None
+    gateway: bool = False
+    x: Coordinate
+    y: Coordinate
+
+    def carry_out(self, controls: MeshControls) -> str:
+        return controls.add(self.node, self.gateway, self.x, self.y)
+
+
+class _Remove(PageOrder):
+    do: Literal["remove"]
+    node: NodeId
+
+    def carry_out(self, controls: MeshControls) -> str:
+        return controls.remove(self.node)
 
 
 class _Places(PageOrder):
@@ -166,6 +191,12 @@ class Recorded:
     def speed(self, paused: bool, factor: float) -> str:  # noqa: D102
         raise OrderRefused(RECORDED)
 
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def remove(self, node: int) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
 
 class _Numbered(_Request):
     number: int
@@ -185,6 +216,8 @@ _REQUESTS: TypeAdapter[Request] = TypeAdapter(
             PacketWatch,
             Demonstrate,
             TimeLine,
+            _Add,
+            _Remove,
         ],
         Field(discriminator="do"),
     ]

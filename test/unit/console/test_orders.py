@@ -37,6 +37,14 @@ class Notebook:
         self.done.append(("speed", paused, factor))
         return "done"
 
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
+        self.done.append(("add", node, gateway, x, y))
+        return "done"
+
+    def remove(self, node: int) -> str:
+        self.done.append(("remove", node))
+        return "done"
+
 
 @pytest.mark.parametrize(
     ("request_", "done"),
@@ -45,6 +53,12 @@ class Notebook:
         ({"do": "fly", "node": 253, "x": -1.5, "y": 2, "z": 0}, ("fly", 253, -1.5, 2.0, 0.0)),
         ({"do": "layout", "case": 202}, ("layout", 202)),
         ({"do": "speed", "paused": True, "factor": 0}, ("speed", True, 0.0)),
+        ({"do": "add", "x": 1.5, "y": -2}, ("add", None, False, 1.5, -2.0)),
+        (
+            {"do": "add", "node": 9, "gateway": True, "x": 0, "y": 0},
+            ("add", 9, True, 0.0, 0.0),
+        ),
+        ({"do": "remove", "node": 9}, ("remove", 9)),
     ],
 )
 def test_an_order_is_carried_out_as_it_was_given(request_, done):

@@ -15,10 +15,14 @@ from drone_mesh.ros.graph.persistent_service import (
     ServiceRefused,
 )
 from drone_mesh.srv import (
+    AddDrone,
+    AddDroneRequest,
     OrderLayout,
     OrderLayoutRequest,
     PowerSwitch,
     PowerSwitchRequest,
+    RemoveDrone,
+    RemoveDroneRequest,
     RequestDroneFlight,
     RequestDroneFlightRequest,
     SetSpeed,
@@ -69,6 +73,22 @@ class RosControls:
             if factor
             else "simulated time resumes"
         )
+
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
+        """Add a drone to the simulation; None: it gets the lowest free id."""
+        wanted = AddDroneRequest.LOWEST_FREE if node is None else node
+        request = AddDroneRequest(id=wanted, gateway=gateway, latitude=y, longitude=x)
+        answer = _call(names.ADD_DRONE_SERVICE, AddDrone, request)
+        if not answer.success:
+            raise OrderRefused(answer.message)
+        return answer.message
+
+    def remove(self, node: int) -> str:
+        """Remove a drone from the simulation."""
+        answer = _call(names.REMOVE_DRONE_SERVICE, RemoveDrone, RemoveDroneRequest(id=node))
+        if not answer.success:
+            raise OrderRefused(answer.message)
+        return answer.message
 
 
 def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
