@@ -45,12 +45,13 @@ class DroneFactory:
         self.debug = debug
         self._world = world
         self._wind = wind
-        self._obstacles = obstacles
+        self._for_flights: Obstacles | None = None
         self._plan_flight: PlanFlight = FlightPath
         fleet = plan_fleet(gateways, routers, gridsize, spacing)
         if obstacles is not None:
             check_starts(fleet, obstacles)
-            self._plan_flight = obstacles.for_flights(HALF_WIDTH_M).plan_flight
+            self._for_flights = obstacles.for_flights(HALF_WIDTH_M)
+            self._plan_flight = self._for_flights.plan_flight
             for box in obstacles.boxes:
                 world.add_obstacle(box)
         self.drones: tuple[VirtualDrone, ...] = tuple(self._make(place) for place in fleet)
@@ -112,7 +113,7 @@ class DroneFactory:
             check_goal(place.latitude, place.longitude, 0.0)
         except GoalRefused as error:
             raise FleetRefused(f"invalid place: {error}") from None
-        if self._obstacles is not None and not _is_free(place, self._obstacles):
+        if self._for_flights is not None and not _is_free(place, self._for_flights):
             raise FleetRefused(
                 f"invalid place: x {place.longitude:g} m, y {place.latitude:g} m is in or against "
                 "an obstacle"
@@ -125,8 +126,9 @@ class DroneFactory:
 
 def check_starts(fleet: Iterable[StartPlace], obstacles: Obstacles) -> None:
     """Raise ConfigurationError if a drone would start in or against an obstacle."""
+    for_flights = obstacles.for_flights(HALF_WIDTH_M)
     for place in fleet:
-        if not _is_free(place, obstacles):
+        if not _is_free(place, for_flights):
             raise ConfigurationError(
                 f"obstacles: drone {place.node_id} would start in or against a box, at "
                 f"x {place.longitude:g} m, y {place.latitude:g} m; move the box, or change spacing "
@@ -134,6 +136,5 @@ def check_starts(fleet: Iterable[StartPlace], obstacles: Obstacles) -> None:
             )
 
 
-def _is_free(place: StartPlace, obstacles: Obstacles) -> bool:
-    free = obstacles.for_flights(HALF_WIDTH_M).is_free
-    return free((place.longitude, place.latitude, place.role.size_m[2] / 2))
+def _is_free(place: StartPlace, for_flights: Obstacles) -> bool:
+    return for_flights.is_free((place.longitude, place.latitude, place.role.size_m[2] / 2))

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from drone_mesh.air.obstacles import Box, Obstacles
+from drone_mesh.air.box import Box
+from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.world.bullet_world import BulletWorld
