@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import shutil
 import signal
 import statistics
 import threading
@@ -102,7 +103,15 @@ def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
         from dask_jobqueue import SLURMCluster
     except ImportError as error:
         raise EngineError("--cluster slurm needs: pip install dask-jobqueue") from error
-    cluster = SLURMCluster()  # configured in ~/.config/dask/jobqueue.yaml
+    if shutil.which("sbatch") is None:
+        raise EngineError("--cluster slurm: sbatch not found; use a machine that submits jobs")
+    try:
+        cluster = SLURMCluster()
+    except ValueError as error:
+        raise EngineError(
+            "--cluster slurm: describe a job (cores, memory, queue, walltime) in "
+            f"~/.config/dask/jobqueue.yaml: {str(error).splitlines()[0]}"
+        ) from error
     cluster.scale(jobs=max(1, workers))
     return cluster  # type: ignore[no-any-return]
 

@@ -462,6 +462,59 @@ def test_workers_in_two_network_namespaces_share_a_batch(
     assert len({row["namespace"] for row in rows}) == 2
 
 
+SBATCH = """\
+#!/bin/sh
+job=$SLURM_STAND_IN/job.$$
+cp "$1" "$job"
+setsid sh "$job" >"$job.log" 2>&1 </dev/null &
+echo "Submitted batch job $!" | tee "$job.submitted"
+"""
+SCANCEL = """\
+#!/bin/sh
+for job in "$@"; do kill -TERM "-$job"; echo "$job" >>"$SLURM_STAND_IN/cancelled"; done
+"""
+
+
+@pytest.fixture
+def slurm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of the jobs of a cluster that runs them all at once, on this machine."""
+    folder = tmp_path / "slurm"
+    folder.mkdir()
+    for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
+        (folder / name).write_text(text)
+        (folder / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+    monkeypatch.setenv("SLURM_STAND_IN", str(folder))
+    monkeypatch.setenv("DASK_JOBQUEUE__SLURM__CORES", "1")
+    monkeypatch.setenv("DASK_JOBQUEUE__SLURM__MEMORY", "1GB")
+    return folder
+
+
+@pytest.mark.slow
+def test_jobs_of_slurm_do_the_runs_and_are_cancelled_at_the_end(
+    slow: Path, slow_rows: bytes, slurm: Path, tmp_path: Path
+) -> None:
+    process = start(slow, tmp_path / "out", "--cluster", "slurm", "--workers", "2")
+    output = finish(process)
+    assert process.returncode == 0, output
+    assert measured(tmp_path / "out") == slow_rows
+    submitted = {path.read_text().split()[-1] for path in slurm.glob("job.*.submitted")}
+    assert len(submitted) == 2
+    assert set((slurm / "cancelled").read_text().split()) == submitted
+
+
+@pytest.mark.slow
+def test_what_slurm_lacks_is_one_line(
+    slow: Path, slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DASK_JOBQUEUE__SLURM__CORES")
+    output = finish(start(slow, tmp_path / "out", "--cluster", "slurm"))
+    assert "lab: --cluster slurm: describe a job (cores, memory, queue, walltime) in" in output
+    (slurm / "sbatch").unlink()
+    output = finish(start(slow, tmp_path / "out", "--cluster", "slurm"))
+    assert "lab: --cluster slurm: sbatch not found; use a machine that submits jobs" in output
+
+
 @pytest.mark.slow
 def test_ctrl_c_keeps_everything_and_prints_how_to_go_on(
     slow: Path, slow_rows: bytes, tmp_path: Path
