@@ -20,7 +20,7 @@ from drone_mesh.lab.template import write_template
 from drone_mesh.lab.worker import execute
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
-SUITES = ["air", "cost", "heal", "obstacles", "published", "routing", "timing"]
+SUITES = sorted(path.stem for path in EXPERIMENTS.glob("*.yaml"))
 
 
 @pytest.mark.parametrize("name", SUITES)
