@@ -98,6 +98,36 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
+# What a person does with an order that is held, and with the toast of the next one: done in the
+# page, because a slow machine may take longer than the five seconds for which these are shown.
+ANSWER_HELD = """(button) => {
+  const held = document.querySelector("#held");
+  window.heldText = null;
+  new MutationObserver((_changes, observer) => {
+    if (held.hidden) return;
+    observer.disconnect();
+    window.heldText = document.querySelector("#held-text").textContent;
+    if (button.length > 1) document.querySelector(button).click();
+    else document.dispatchEvent(new KeyboardEvent("keydown", { key: button, bubbles: true }));
+  }).observe(held, { attributes: true });
+}"""
+UNDO_TOAST = """() => {
+  window.toastTexts = [];
+  let undone = false;
+  window.toastWatch?.disconnect();
+  window.toastWatch = new MutationObserver((changes) => {
+    for (const toast of changes.flatMap((change) => [...change.addedNodes])) {
+      window.toastTexts.push(toast.querySelector("span").textContent);
+      if (!undone && toast.querySelector("button")) {
+        undone = true;
+        toast.querySelector("button").click();
+      }
+    }
+  });
+  window.toastWatch.observe(document.querySelector("#toasts"), { childList: true });
+}"""
+
+
 class Visit:
     """One page, and everything that went wrong on it."""
 
@@ -127,6 +157,25 @@ class Visit:
         while not condition():
             assert time.monotonic() < deadline_s, f"timed out: {what}, waited {within_s:g} s"
             self.page.wait_for_timeout(50)
+
+    def answer_held(self, button: str) -> None:
+        """Click this button, or press this key, as soon as an order is held."""
+        self.page.evaluate(ANSWER_HELD, button)
+
+    def wait_for_held(self) -> str:
+        """What the order was that was held, in the page's words."""
+        self.wait_for("a held order", lambda: self.page.evaluate("window.heldText") is not None)
+        return str(self.page.evaluate("window.heldText"))
+
+    def undo_next(self) -> None:
+        """Click "Undo" in the next toast that has it."""
+        self.page.evaluate(UNDO_TOAST)
+
+    def wait_for_toasts(self, *texts: str) -> None:
+        """Wait until exactly these have been shown since `undo_next`."""
+        self.wait_for(
+            f"the toasts {texts}", lambda: self.page.evaluate("window.toastTexts") == list(texts)
+        )
 
     def wait_for_drones(self, count: int) -> None:
         self.wait_for(f"{count} drones on the map", lambda: self.drawn("drones") == count)

@@ -12,11 +12,18 @@ from inprocess_mesh import InProcessMesh
 
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
+from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import FRAME_PERIOD_S, ConsoleServer
+from drone_mesh.layouts import Layouts
 from drone_mesh.web.access import access_for
 
-LAYOUTS = [(0, "0: field case, 17 drones"), (100, "100: grid 10 x 10"), (999, "999: none such")]
+LAYOUTS = [
+    LayoutOffer(0, "0: field case, 17 drones", places_of(Layouts({}).orders(0))),
+    LayoutOffer(100, "100: grid 10 x 10", places_of(Layouts({}).orders(100))),
+    LayoutOffer(998, "998: far", [(1, 0.0, 60.0, 0.0), (2, 0.0, 7.0, 0.0), (200, 0.0, 9.0, 0.0)]),
+    LayoutOffer(999, "999: none such", []),
+]
 
 
 def feed(mesh: InProcessMesh, store: FrameStore) -> None:

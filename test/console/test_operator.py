@@ -30,10 +30,9 @@ def drag(page: Visit, node: int, x: float, y: float) -> None:
 
 
 def test_a_drag_can_be_undone(page):
+    page.answer_held("#held-undo")
     drag(page, 17, 27.0, 9.0)
-    page.wait_for("the offer", lambda: page.page.is_visible("#held-undo"))
-    assert "Drone 17 will leave to 27" in page.page.inner_text("#held-text")
-    page.page.click("#held-undo")
+    assert "Drone 17 will leave to 27" in page.wait_for_held()
     page.wait_for("the offer is gone", lambda: not page.page.is_visible("#held"))
     page.page.wait_for_timeout(5500)  # as long as it would have been held
     assert page.row(17, STATE) == "connected"
@@ -41,9 +40,45 @@ def test_a_drag_can_be_undone(page):
 
 
 def test_a_drag_can_be_sent_at_once(page):
+    page.answer_held("#held-now")
     drag(page, 17, 27.0, 9.0)
-    page.page.click("#held-now")
     page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
+
+
+def test_a_layout_can_be_undone_before_it_leaves_or_be_sent_at_once(page):
+    page.answer_held("z")
+    page.page.click("#layout-form button")
+    assert page.wait_for_held() == "Layout 0: 17 drones will leave"
+    page.wait_for("the offer is gone", lambda: not page.page.is_visible("#held"))
+    page.answer_held("#held-now")
+    page.undo_next()
+    page.page.select_option("#layout", "100")
+    page.page.click("#layout-form button")
+    page.wait_for_toasts("ordered layout 100")
+
+
+def test_a_layout_that_is_far_away_is_confirmed(start_console, visit):
+    page = visit(start_console("--routers", "4", "--gridsize", "1", *FAST).url)
+    page.wait_for_drones(5)
+    page.page.select_option("#layout", "998")
+    page.page.click("#layout-form button")
+    page.wait_for("the question", lambda: page.page.is_visible("#confirm"))
+    assert page.page.inner_text("#confirm-text") == (
+        "Layout 998: 2 drones (1 not in this fleet) would fly 60 m at most."
+    )
+    page.page.click("#confirm >> text=Cancel")
+    page.wait_for("no question", lambda: not page.page.is_visible("#confirm"))
+    assert not page.page.is_visible("#held")
+
+
+def test_power_and_speed_are_set_back_from_the_toast(page):
+    page.page.click("#nodes tr[data-id='5']")
+    page.undo_next()
+    page.page.click("#power")
+    page.wait_for_toasts("node 5 is off", "node 5 is on")
+    page.undo_next()
+    page.page.select_option("#speed", "5")
+    page.wait_for_toasts("speed 5", "speed 1")
 
 
 def test_a_flight_of_more_than_fifty_metres_is_confirmed(page):
@@ -57,6 +92,7 @@ def test_a_flight_of_more_than_fifty_metres_is_confirmed(page):
     page.page.wait_for_timeout(500)
     assert page.row(13, STATE) == "connected"
     page.page.click("#fly-form button")
+    page.answer_held("#held-now")
     page.page.click("#confirm >> text=Send")
     page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
 
@@ -70,6 +106,9 @@ def test_several_drones_are_switched_together(page):
     page.wait_for("all are off", lambda: all(page.row(n, STATE) == "off" for n in (6, 12, 17)))
     page.page.click("#group-on")
     page.wait_for("none is off", lambda: all(page.row(n, STATE) != "off" for n in (6, 12, 17)))
+    page.undo_next()
+    page.page.click("#group-off")
+    page.wait_for_toasts("3 nodes are off", "3 nodes are on")
     page.page.click("#group-clear")
     assert not page.page.is_visible("#group")
 
@@ -79,8 +118,8 @@ def test_several_drones_are_moved_together(page):
     page.page.keyboard.down("Shift")
     page.page.mouse.click(*on_screen(page, *PLACES[17]))
     page.page.keyboard.up("Shift")
+    page.answer_held("#held-now")
     drag(page, 17, 27.0, 15.0)
-    page.page.click("#held-now")
     page.wait_for(
         "both fly", lambda: all(page.row(n, STATE) == "flying" for n in (16, 17)), within_s=15.0
     )
@@ -130,7 +169,9 @@ def test_places_are_saved_and_flown_to_again(page, tmp_path):
     text = path.read_text()
     assert re.search(r"^    17: \[24, 12, 0\]$", text, re.MULTILINE)
     path.write_text("cases:\n  1:\n    17: [26, 14, 0]\n")
+    page.answer_held("#held-now")
     page.page.set_input_files("#load-places", str(path))
+    assert page.wait_for_held() == "places.yaml: Drone 17 will leave to 26, 14"
     page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
 
 

@@ -116,6 +116,7 @@ def test_typed_numbers_send_a_drone(page):
     page.page.click("#nodes tr[data-id='13']")
     page.page.fill("#fly-x", "-3,5")
     page.page.fill("#fly-y", "14")
+    page.answer_held("#held-now")
     page.page.click("#fly-form button")
     page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
 
@@ -142,8 +143,9 @@ def test_a_goal_that_cannot_be_flown_to_is_refused_beside_the_field(page, axis, 
 
 def test_a_layout_starts(page):
     page.page.select_option("#layout", "0")
+    page.undo_next()
     page.page.click("#layout-form button")
-    page.page.wait_for_selector("#toasts :text('ordered layout 0')")  # it goes by itself
+    page.wait_for_toasts("ordered layout 0")  # after five seconds it goes by itself
     page.wait_for(
         "many fly", lambda: page.page.locator("#nodes tr[data-condition=flying]").count() >= 10
     )

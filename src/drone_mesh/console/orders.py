@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Literal, Optional, Protocol, Union
+from typing import Iterable, Literal, NamedTuple, Optional, Protocol, Sequence, Tuple, Union
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from typing_extensions import Annotated
@@ -12,7 +12,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.layouts import MAX_CASE, read_places
+from drone_mesh.layouts import MAX_CASE, Order, read_places
 
 MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
@@ -25,6 +25,23 @@ Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, a
 MomentOrNone = Optional[Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]]  # simulated s
 SwitchOrNone = Optional[bool]
 FactorOrNone = Optional[Annotated[float, Field(gt=0, le=MAX_REAL_TIME_FACTOR, allow_inf_nan=False)]]
+
+
+Place = Tuple[int, float, float, float]
+"""A drone, and x, y and z in metres."""
+
+
+class LayoutOffer(NamedTuple):
+    """A layout that the page can send drones to."""
+
+    case: int
+    name: str
+    places: Sequence[Place]
+
+
+def places_of(orders: Iterable[Order]) -> list[Place]:
+    """Where a layout sends its drones."""
+    return [(drone, goal.longitude, goal.latitude, goal.height) for drone, goal in orders]
 
 
 class OrderRefused(MeshError):
@@ -119,27 +136,19 @@ class _Remove(PageOrder):
         return controls.remove(self.node)
 
 
-class _Places(PageOrder):
-    """Send drones to the places of a layout file."""
+class ReadPlaces(_Request):
+    """The page has a layout file, and asks where its drones would fly."""
 
     do: Literal["places"]
+    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
     text: str = Field(max_length=MAX_FILE_CHARACTERS)
 
-    def carry_out(self, controls: MeshControls) -> str:
+    def places(self) -> list[Place]:
+        """Raises OrderRefused with the line that is wrong."""
         try:
-            layout = read_places(self.text)
+            return places_of(read_places(self.text))
         except ConfigurationError as error:
             raise OrderRefused(str(error)) from error
-        refused = []
-        for node, goal in layout:
-            try:
-                controls.fly(node, goal.longitude, goal.latitude, goal.height)
-            except OrderRefused as error:
-                refused.append(f"drone {node}: {error}")
-        if len(refused) == len(layout):
-            raise OrderRefused(refused[0])
-        missing = f"; {len(refused)} stay, {refused[0]}" if refused else ""
-        return f"ordered {len(layout) - len(refused)} of {len(layout)} drones{missing}"
 
 
 class NeighbourWatch(_Request):
@@ -202,7 +211,7 @@ class _Numbered(_Request):
     number: int
 
 
-Request = Union[PageOrder, NeighbourWatch, PacketWatch, Demonstrate, TimeLine]
+Request = Union[PageOrder, NeighbourWatch, PacketWatch, Demonstrate, ReadPlaces, TimeLine]
 
 _REQUESTS: TypeAdapter[Request] = TypeAdapter(
     Annotated[
@@ -210,11 +219,11 @@ _REQUESTS: TypeAdapter[Request] = TypeAdapter(
             _Power,
             _Fly,
             _Layout,
-            _Places,
             _Speed,
             NeighbourWatch,
             PacketWatch,
             Demonstrate,
+            ReadPlaces,
             TimeLine,
             _Add,
             _Remove,

@@ -31,11 +31,14 @@ from drone_mesh.console.history import History
 from drone_mesh.console.orders import (
     LIMITS,
     Demonstrate,
+    LayoutOffer,
     MeshControls,
     NeighbourWatch,
     OrderRefused,
     PacketWatch,
     PageOrder,
+    Place,
+    ReadPlaces,
     TimeLine,
     number_of,
     parse_request,
@@ -109,17 +112,14 @@ class Guard:
 
 
 class ConsoleServer:
-    """Serves the page and keeps it up to date.
-
-    `layouts` are the (case, name) pairs that the page offers.
-    """
+    """Serves the page and keeps it up to date."""
 
     def __init__(
         self,
         store: FrameStore,
         controls: MeshControls,
         access: Access,
-        layouts: Sequence[tuple[int, str]] = (),
+        layouts: Sequence[LayoutOffer] = (),
         demonstrate: bool = False,
         actions: Sequence[str] = ALL_ACTIONS,
         recording: str = "",
@@ -255,6 +255,8 @@ class ConsoleServer:
             page.move(request)
         elif isinstance(request, PacketWatch):
             page.packets.wanted = request.on
+        elif isinstance(request, ReadPlaces):
+            await self._read_places(page, request)
         elif isinstance(request, Demonstrate):
             try:
                 text = self._stage.begin() if request.on else self._stage.end()
@@ -278,8 +280,26 @@ class ConsoleServer:
         else:
             await self._answer(page, order.number, True, text)
 
-    async def _answer(self, page: Page, number: int | None, done: bool, text: str) -> None:
-        answer = {"type": "answer", "number": number, "done": done, "text": text}
+    async def _read_places(self, page: Page, request: ReadPlaces) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            places = await loop.run_in_executor(self._workers, request.places)
+        except OrderRefused as error:
+            await self._answer(page, request.number, False, str(error))
+        else:
+            await self._answer(page, request.number, True, "a layout", places)
+
+    async def _answer(
+        self,
+        page: Page,
+        number: int | None,
+        done: bool,
+        text: str,
+        places: Sequence[Place] = (),
+    ) -> None:
+        answer: dict[str, object] = {"type": "answer", "number": number, "done": done, "text": text}
+        if places:
+            answer["places"] = places
         # A page that is gone by now needs no answer.
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
             await self._send(page, json.dumps(answer))

@@ -10,6 +10,7 @@ from drone_mesh.console.orders import (
     NeighbourWatch,
     OrderRefused,
     PageOrder,
+    ReadPlaces,
     number_of,
     parse_request,
 )
@@ -121,32 +122,17 @@ def test_a_refusal_goes_back_under_the_number_of_the_request(text, number):
     assert number_of(text) == number
 
 
-class FewRoutes:
-    """A MeshControls that has a route to drone 1 only."""
-
-    def __init__(self) -> None:
-        self.flown: list[tuple[int, float, float, float]] = []
-
-    def fly(self, node: int, x: float, y: float, z: float) -> str:
-        if node != 1:
-            raise OrderRefused(f"no gateway has a route to drone {node}")
-        self.flown.append((node, x, y, z))
-        return "ordered"
+def places_in(text: str) -> list[tuple[int, float, float, float]]:
+    request = parse_request(json.dumps({"do": "places", "number": 1, "text": text}))
+    assert isinstance(request, ReadPlaces)
+    return request.places()
 
 
-def carry_out_places(text: str, controls: FewRoutes) -> str:
-    return parse_request(json.dumps({"do": "places", "number": 1, "text": text})).carry_out(
-        controls
-    )
+def test_a_layout_file_says_where_its_drones_would_fly_and_orders_nothing():
+    text = "cases: {5: {1: [1, 2, 3], 2: [4, 5, 6]}}"
+    assert places_in(text) == [(2, 4.0, 5.0, 6.0), (1, 1.0, 2.0, 3.0)]
 
 
-def test_a_layout_file_orders_each_drone_and_says_which_stay():
-    controls = FewRoutes()
-    said = carry_out_places("cases: {5: {1: [1, 2, 3], 2: [4, 5, 6]}}", controls)
-    assert controls.flown == [(1, 1.0, 2.0, 3.0)]
-    assert said == "ordered 1 of 2 drones; 1 stay, drone 2: no gateway has a route to drone 2"
-
-
-def test_a_layout_file_of_which_no_drone_has_a_route_is_refused():
-    with pytest.raises(OrderRefused, match="drone 2: no gateway"):
-        carry_out_places("cases: {5: {2: [4, 5, 6]}}", FewRoutes())
+def test_a_layout_file_that_cannot_be_read_is_refused_with_its_line():
+    with pytest.raises(OrderRefused, match="line 3"):
+        places_in("cases:\n  1:\n    17: [far, 14, 0]\n")

@@ -11,12 +11,13 @@ import pytest
 from drone_mesh.console import server as server_module
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
-from drone_mesh.console.orders import OrderRefused
+from drone_mesh.console.orders import LayoutOffer, OrderRefused
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
 from drone_mesh.state.model import MeshStatus, NodeStatus
 from drone_mesh.web.access import Access
 
 LIMIT_S = 5.0
+OFFER = LayoutOffer(0, "0: field case", [(1, 2.0, 3.0, 0.0)])
 
 
 class PromptControls:
@@ -99,7 +100,7 @@ def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> Non
     async def main() -> None:
         store = FrameStore()
         store.update_mesh(MeshStatus(1.0, [NodeStatus(1, connected=True)]), 0.0)
-        server = ConsoleServer(store, PromptControls(), Access(), [(0, "0: field case")])
+        server = ConsoleServer(store, PromptControls(), Access(), [OFFER])
         try:
             await scenario(server, store)
         finally:
@@ -114,7 +115,7 @@ def test_a_page_is_greeted_and_then_gets_everything():
         await until("a frame", lambda: page.of_type("frame"))
         assert page.received[0] == {
             "type": "hello",
-            "layouts": [[0, "0: field case"]],
+            "layouts": [[0, "0: field case", [[1, 2.0, 3.0, 0.0]]]],
             "limits": {"coordinate": 5000.0, "height": 500.0},
             "actions": ["fly", "power", "layout", "speed", "demonstrate", "packets"],
             "recording": "",
@@ -259,5 +260,20 @@ def test_packets_are_shown_only_to_pages_that_want_them_and_look_at_the_present(
         await until("the wish", lambda: server.packets_wanted)
         page.vanish()
         await until("no page wants any", lambda: not server.packets_wanted)
+
+    run(scenario)
+
+
+def test_a_layout_file_is_answered_with_its_places_or_with_what_is_wrong():
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server).open()
+        page.say(do="places", number=1, text="cases: {5: {1: [1, 2, 3]}}")
+        page.say(do="places", number=2, text="cases: {5: {1: [1, far, 3]}}")
+        await until("both answers", lambda: len(page.of_type("answer")) == 2)
+        good, bad = sorted(page.of_type("answer"), key=lambda answer: answer["number"])
+        assert good["done"]
+        assert good["places"] == [[1, 1.0, 2.0, 3.0]]
+        assert not bad["done"]
+        assert "line 1" in bad["text"]
 
     run(scenario)

@@ -3,7 +3,7 @@
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { chartsCsv, chartsPicture, nodesCsv, placesYaml, save } from "./files.js";
-import { Flights } from "./flights.js";
+import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
 import { MapView } from "./map.js";
 import { Mesh } from "./mesh.js";
@@ -21,19 +21,38 @@ const byId = (id) => document.getElementById(id);
 const mesh = new Mesh();
 const connection = new Connection(mesh);
 
-function toast(text, bad) {
+let undoLatest = null; // takes the latest order back, while its toast is shown
+
+/** Shows a text for a moment; `undo` is called if the person asks for it meanwhile. */
+function toast(text, bad, undo) {
   const box = document.createElement("div");
   box.className = bad ? "toast bad" : "toast";
-  box.textContent = text;
+  box.append(Object.assign(document.createElement("span"), { textContent: text }));
+  const close = () => {
+    box.remove();
+    if (undoLatest === takeBack) undoLatest = null;
+  };
+  const takeBack = () => {
+    close();
+    undo();
+  };
+  if (undo) {
+    const button = Object.assign(document.createElement("button"), { textContent: "Undo" });
+    button.type = "button";
+    button.title = "Undo (Z)";
+    button.addEventListener("click", takeBack);
+    box.append(button);
+    undoLatest = takeBack;
+  }
   byId("toasts").append(box);
-  setTimeout(() => box.remove(), bad ? FAILURE_MS : TOAST_MS);
+  setTimeout(close, bad ? FAILURE_MS : TOAST_MS);
 }
 
-/** Sends an order and shows its outcome. `button` is disabled meanwhile. */
-async function order(request, button) {
+/** Sends an order and shows its outcome. `button` is disabled meanwhile; `undo` is the order that takes it back. */
+async function order(request, button, undo) {
   if (button) button.disabled = true;
   try {
-    toast(await connection.order(request), false);
+    toast(await connection.order(request), false, undo && (() => order(undo, button)));
   } catch (error) {
     toast(error.message, true);
   } finally {
@@ -59,8 +78,11 @@ flights.addEventListener("change", () => {
 new NodeTable(mesh, byId("nodes"));
 const panel = new NodePanel(
   mesh,
-  (id, on) => order({ do: "power", node: id, on }, byId("power")),
-  (id, x, y, z) => flights.send([{ id, x, y, z }]),
+  (id, on) => {
+    const power = { do: "power", node: id };
+    order({ ...power, on }, byId("power"), { ...power, on: !on });
+  },
+  (id, x, y, z) => flights.hold([{ id, x, y, z }]),
 );
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
@@ -122,8 +144,23 @@ mesh.addEventListener("layouts", () => {
 // Orders
 
 function setSpeed(paused, factor) {
-  order({ do: "speed", paused, factor });
+  const before = { paused: Boolean(mesh.clock.paused), factor: mesh.clock.factor };
+  order({ do: "speed", paused, factor }, null, { do: "speed", ...before });
 }
+
+/** The moves of the drones of this fleet to these places [[id, x, y, z]]. */
+function movesTo(places) {
+  return places
+    .filter(([id]) => mesh.nodes.has(id))
+    .map(([id, x, y, z]) => ({ id, x, y, z: Math.round(z) }));
+}
+
+/** Names drones of a layout, and says how many of it are missing. */
+function namesIn(layout, moves, places) {
+  const missing = places.length - moves.length;
+  return `${layout}: ${names(moves)}${missing ? ` (${missing} not in this fleet)` : ""}`;
+}
+
 byId("pause").addEventListener("click", () => setSpeed(!mesh.clock.paused, 0));
 byId("speed").addEventListener("change", (event) => {
   setSpeed(Boolean(mesh.clock.paused), Number(event.target.value));
@@ -131,7 +168,12 @@ byId("speed").addEventListener("change", (event) => {
 });
 byId("layout-form").addEventListener("submit", (event) => {
   event.preventDefault();
-  order({ do: "layout", case: Number(byId("layout").value) }, event.submitter);
+  const number = Number(byId("layout").value);
+  const [, , places] = mesh.layouts.find(([known]) => known === number);
+  const moves = movesTo(places);
+  const send = () => order({ do: "layout", case: number }, event.submitter);
+  if (moves.length) flights.hold(moves, namesIn(`Layout ${number}`, moves, places), send);
+  else send();
 });
 
 byId("load-places").addEventListener("change", async (event) => {
@@ -139,7 +181,14 @@ byId("load-places").addEventListener("change", async (event) => {
   event.target.value = "";
   if (!file) return;
   byId("files").close();
-  order({ do: "places", text: await file.text() });
+  try {
+    const { places } = await connection.request({ do: "places", text: await file.text() });
+    const moves = movesTo(places);
+    if (moves.length) flights.hold(moves, namesIn(file.name, moves, places));
+    else toast(`none of the drones in ${file.name} is in this fleet`, true);
+  } catch (error) {
+    toast(error.message, true);
+  }
 });
 
 // Several drones
@@ -157,14 +206,23 @@ mesh.addEventListener("frame", showGroup);
 
 async function switchGroup(on, button) {
   button.disabled = true;
-  const failed = [];
-  for (const id of mesh.group)
+  await switchAll([...mesh.group], on);
+  button.disabled = false;
+}
+
+async function switchAll(ids, on, canUndo = true) {
+  const [changed, failed] = [[], []];
+  for (const id of ids) {
+    const was = mesh.nodes.get(id)?.on;
     await connection
       .order({ do: "power", node: id, on })
+      .then(() => was !== on && changed.push(id))
       .catch((error) => failed.push(error.message));
-  const done = mesh.group.size - failed.length;
-  toast(failed[0] ?? `${done} nodes are ${on ? "on" : "off"}`, failed.length > 0);
-  button.disabled = false;
+  }
+  const undo = canUndo && changed.length && (() => switchAll(changed, !on, false));
+  const done = ids.length - failed.length;
+  if (failed.length) toast(failed[0], true);
+  if (done) toast(`${done} nodes are ${on ? "on" : "off"}`, false, undo);
 }
 byId("group-off").addEventListener("click", (event) => switchGroup(false, event.target));
 byId("group-on").addEventListener("click", (event) => switchGroup(true, event.target));
@@ -259,6 +317,11 @@ byId("theme").addEventListener("click", () => {
 });
 showTheme();
 
+/** Takes back what is about to leave, or else the latest order whose toast is still shown. */
+function undo() {
+  return flights.undo() || undoLatest?.();
+}
+
 // Keys
 
 const KEYS = {
@@ -269,6 +332,7 @@ const KEYS = {
   p: () => mesh.canOrder && panel.switchPower(),
   g: () => panel.focusGoal(),
   f: () => map.fit(),
+  z: () => undo(),
   "?": () => byId("help").showModal(),
   Escape: () => map.cancelDrag() || flights.undo() || mesh.select(null),
 };
@@ -277,7 +341,9 @@ document.addEventListener("keydown", (event) => {
   const typing = event.target.closest("input, select, dialog");
   const pressing = event.key === " " && event.target.closest("button");
   if (typing && event.key === "Escape") event.target.blur();
-  if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey) return;
+  const undoing = event.key === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey;
+  const chord = event.ctrlKey || event.metaKey || event.altKey;
+  if (typing || pressing || (chord && !undoing)) return;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   if (!(key in KEYS)) return;
   event.preventDefault();

@@ -18,8 +18,13 @@ export class Connection extends EventTarget {
     mesh.addEventListener("select", () => this.#watch());
   }
 
-  /** Asks for something. Resolves with a few words, or throws an Error with the reason. */
-  order(request) {
+  /** Orders something. Resolves with a few words, or throws an Error with the reason. */
+  async order(request) {
+    return (await this.request(request)).text;
+  }
+
+  /** Asks for something. Resolves with the answer, or throws an Error with the reason. */
+  request(request) {
     if (!this.open) return Promise.reject(new Error("there is no connection to the console"));
     const number = ++this.#number;
     return new Promise((resolve, reject) => {
@@ -72,7 +77,7 @@ export class Connection extends EventTarget {
       if (!order) return;
       this.#orders.delete(message.number);
       clearTimeout(order.timer);
-      if (message.done) order.resolve(message.text);
+      if (message.done) order.resolve(message);
       else order.reject(new Error(message.text));
     }
   }

@@ -18,6 +18,7 @@ const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and 
 const MOST_LOST = 1500; // lost links drawn: the shortest ones, as in rviz
 const CLEAR_LOST = 150; // up to so many in full colour; more of them fade, so that drones stay visible
 const FAINTEST = 0.25;
+const MOST_GOAL_TEXTS = 8; // of drones that are about to leave; of more, the texts would overlap
 
 /** The palette's colours in the present theme, by name. */
 export function readColours() {
@@ -157,7 +158,15 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
       mesh.clock.shape,
     );
   for (const goal of goals)
-    drawGoal(context, camera, mesh.nodes.get(goal.id), goal, colours, radius);
+    drawGoal(
+      context,
+      camera,
+      mesh.nodes.get(goal.id),
+      goal,
+      colours,
+      radius,
+      goals.length <= MOST_GOAL_TEXTS,
+    );
   return drawn;
 }
 
@@ -359,7 +368,7 @@ export function idSize(id, r) {
   return Math.min(0.95 * r, (1.6 * r) / (DIGIT_WIDTH * String(id).length));
 }
 
-function drawGoal(context, camera, node, goal, colours, r) {
+function drawGoal(context, camera, node, goal, colours, r, withText) {
   if (!node?.position) return;
   const [px, py] = camera.toScreen(goal.x, goal.y);
   context.strokeStyle = colours.accent;
@@ -376,6 +385,7 @@ function drawGoal(context, camera, node, goal, colours, r) {
   context.fillStyle = colours.accent;
   context.fill();
   context.globalAlpha = 1;
+  if (!withText) return;
   context.fillStyle = colours.ink;
   context.font = "600 12px system-ui, sans-serif";
   context.textAlign = "center";

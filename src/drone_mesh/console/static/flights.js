@@ -1,4 +1,4 @@
-// Sends drones away: asks before a long flight, and holds a drag for a moment, so that it can be undone.
+// Sends drones away: asks before a long flight, and holds each order for a moment, so that it can be undone.
 // A drone in flight may be out of reach, so an order that has left cannot be taken back.
 
 const HOLD_MS = 5000;
@@ -8,6 +8,7 @@ const byId = (id) => document.getElementById(id);
 
 export class Flights extends EventTarget {
   #timer = null;
+  #send = null; // orders what is held
 
   /** `order(request)` resolves with a few words, or throws; `toast(text, bad)` shows them. */
   constructor(mesh, order, toast) {
@@ -20,43 +21,42 @@ export class Flights extends EventTarget {
     byId("held-now").addEventListener("click", () => this.#release());
   }
 
-  /** Sends these drones [{id, x, y, z}] after a moment, or not, if the person changes their mind. */
-  async hold(moves) {
+  /**
+   * Sends these drones [{id, x, y, z}] after a moment, or not, if the person changes their mind.
+   * `what` names them; `send` orders all of them at once.
+   */
+  async hold(moves, what = names(moves), send = () => this.#order(moves)) {
     this.#release();
-    if (!(await this.#agreed(moves))) return;
-    this.#set(moves);
+    if (!(await this.#agreed(moves, what))) return;
+    this.#hold(moves, send);
     const goal = moves.length > 1 ? "" : ` to ${metres(moves[0].x)}, ${metres(moves[0].y)}`;
-    byId("held-text").textContent = `${names(moves)} will leave${goal}`;
+    byId("held-text").textContent = `${what} will leave${goal}`;
     this.#timer = setTimeout(() => this.#release(), HOLD_MS);
-  }
-
-  /** Sends these drones at once. */
-  async send(moves) {
-    if (await this.#agreed(moves)) await this.#send(moves);
   }
 
   /** True if there was something to undo. */
   undo() {
     const held = this.held.length > 0;
-    this.#set([]);
+    this.#hold([], null);
     return held;
   }
 
-  #set(moves) {
+  #hold(moves, send) {
     clearTimeout(this.#timer);
     this.held = moves;
+    this.#send = send;
     byId("held").hidden = !moves.length;
     this.dispatchEvent(new Event("change"));
   }
 
   #release() {
-    const moves = this.held;
-    this.#set([]);
-    if (moves.length) this.#send(moves);
+    const send = this.#send;
+    this.#hold([], null);
+    send?.();
   }
 
   /** The drones farthest from the gateway first, so that relays leave last. */
-  async #send(moves) {
+  async #order(moves) {
     const hops = ({ id }) => this.mesh.nodes.get(id)?.hops ?? 0;
     const failed = [];
     let text = "";
@@ -74,11 +74,11 @@ export class Flights extends EventTarget {
   }
 
   /** Whether none flies far, or the person agrees. */
-  async #agreed(moves) {
+  async #agreed(moves, what) {
     const far = Math.max(...moves.map((move) => this.#distance(move)));
     if (far <= FAR_M) return true;
     byId("confirm-text").textContent =
-      `${names(moves)} would fly ${far.toFixed(0)} m` + (moves.length > 1 ? " at most." : ".");
+      `${what} would fly ${far.toFixed(0)} m` + (moves.length > 1 ? " at most." : ".");
     const dialog = byId("confirm");
     dialog.returnValue = "";
     dialog.showModal();
@@ -96,6 +96,7 @@ function metres(value) {
   return Number(value.toFixed(2));
 }
 
-function names(moves) {
+/** These drones [{id}] in words. */
+export function names(moves) {
   return moves.length > 1 ? `${moves.length} drones` : `Drone ${moves[0].id}`;
 }

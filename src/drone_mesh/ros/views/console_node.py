@@ -16,7 +16,7 @@ import rospy
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
-from drone_mesh.console.orders import MeshControls, Recorded
+from drone_mesh.console.orders import LayoutOffer, MeshControls, Recorded, places_of
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import ConfigurationError
@@ -121,15 +121,16 @@ class MeshFeed:
         self._runner.in_loop(partial(self._server.show_packets, message.carried, dots))
 
 
-def layout_names(layouts: Layouts) -> list[tuple[int, str]]:
-    """(case, name) of each layout: those of several drones first, then those of one."""
+def layout_offers(layouts: Layouts) -> list[LayoutOffer]:
+    """All layouts: those of several drones first, then those of one."""
     known = {FIELD_CASE: "field case", GRID_CASE: "10 x 10 grid"}
     named = []
     for case in layouts.cases:
-        drones = len(layouts.orders(case))
+        places = places_of(layouts.orders(case))
+        drones = len(places)
         what = known.get(case, f"{drones} drones") if drones > 1 else f"drone {case} of case 0"
-        named.append((drones == 1, case, f"{case}: {what}"))
-    return [(case, name) for _single, case, name in sorted(named)]
+        named.append((drones == 1, LayoutOffer(case, f"{case}: {what}", places)))
+    return [offer for _single, offer in sorted(named)]
 
 
 def main() -> None:
@@ -159,7 +160,7 @@ def _run() -> int:
     recording = str(rospy.get_param("~recording", ""))
     whole = History(math.inf, math.inf) if recording else None
     store = FrameStore(History() if whole is None else None)
-    layouts = layout_names(manager_layouts())
+    layouts = layout_offers(manager_layouts())
     access = access_for(address, token)
     controls: MeshControls = Recorded() if recording else RosControls()
     server = ConsoleServer(
