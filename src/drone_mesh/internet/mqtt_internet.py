@@ -11,6 +11,7 @@ import json
 import logging
 import math
 import ssl
+import sys
 import threading
 from pathlib import Path
 from typing import Any, Callable
@@ -23,11 +24,13 @@ from paho.mqtt.reasoncodes import ReasonCode
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.communication.interfaces import (
+    MAX_NODE_ID,
     NO_ROUTE,
     IGatewayCommands,
     IInternetConnection,
     KnownNode,
 )
+from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.errors import ConfigurationError, QueueFull
 from drone_mesh.internet.asking import Submit
 from drone_mesh.internet.mqtt_topics import Broker, Topics
@@ -43,12 +46,23 @@ _DELAYS_S = (1, 30)  # our choice: shortest and longest pause between attempts t
 _log = logging.getLogger(__name__)
 
 
+class _Unacknowledged:
+    """A message that came from the broker."""
+
+    def __init__(self, message: mqtt.MQTTMessage) -> None:
+        self._content = message.topic, message.payload
+        self.is_over = False  # it arrived in the mesh, or was refused or given up
+
+    def is_of(self, message: mqtt.MQTTMessage) -> bool:
+        return self._content == (message.topic, message.payload)
+
+
 class MqttInternet(IInternetConnection):
     """The MQTT connection of a gateway.
 
     Threads: paho's, which calls `_on_...`; one for the states, which also hands in again what the
-    mesh refused for want of room; the node's, which calls `_received` and what follows a message.
-    paho's client may be used by all.
+    mesh refused for want of room; the node's, which calls `observe`, `_received` and what follows a
+    message. paho's client may be used by all.
     """
 
     def __init__(
@@ -75,9 +89,8 @@ class MqttInternet(IInternetConnection):
         self._states: dict[int, str] = {}  # as published; for the thread of the states
         self._lock = threading.Lock()
         self._to_retry: list[mqtt.MQTTMessage] = []  # under the lock
-        # Messages of the broker that it does not know to be acknowledged, by packet id: whether
-        # they are over. Under the lock.
-        self._unacknowledged: dict[int, bool] = {}
+        # What the broker does not know to be acknowledged, by packet id. Under the lock.
+        self._unacknowledged: dict[int, _Unacknowledged] = {}
         self._dropped = 0
         self._client = mqtt.Client(
             CallbackAPIVersion.VERSION2,
@@ -130,6 +143,13 @@ class MqttInternet(IInternetConnection):
 
     # From the mesh to the broker ---------------------------------------------------------------
 
+    def observe(self, event: MeshEvent) -> None:
+        """A MeshObserver: publishes what happened to a node."""
+        peer = event.peer if event.peer <= MAX_NODE_ID else None
+        self._say(
+            str(event.node), {"event": event.kind.value, "peer": peer, "detail": event.detail}
+        )
+
     def _received(self, message: ReceivedMessage) -> None:
         """On the node's thread; paho keeps the message until the broker has it."""
         topic = self._topics.rx(message.sender, message.port)
@@ -168,12 +188,14 @@ class MqttInternet(IInternetConnection):
 
     def _on_message(self, _client: mqtt.Client, _userdata: Any, message: mqtt.MQTTMessage) -> None:
         with self._lock:
-            is_over = self._unacknowledged.get(message.mid) if message.dup else None
-            if is_over is None:
-                self._unacknowledged[message.mid] = False
-        if is_over is None:
+            known = self._unacknowledged.get(message.mid)
+            # A broker that was restored may give the packet id to another message.
+            is_again = message.dup and known is not None and known.is_of(message)
+            if not is_again:
+                self._unacknowledged[message.mid] = _Unacknowledged(message)
+        if not is_again:
             self._hand_in(message)
-        elif is_over:  # it came again because the connection broke before it was acknowledged
+        elif known is not None and known.is_over:  # the connection broke before it was acknowledged
             self._acknowledge(message)
 
     def _hand_in(self, message: mqtt.MQTTMessage) -> None:
@@ -205,7 +227,9 @@ class MqttInternet(IInternetConnection):
 
     def _acknowledge(self, message: mqtt.MQTTMessage) -> None:
         with self._lock:
-            self._unacknowledged[message.mid] = True
+            known = self._unacknowledged.get(message.mid)
+            if known is not None and known.is_of(message):
+                known.is_over = True
         if self._client.ack(message.mid, message.qos) == mqtt.MQTT_ERR_SUCCESS:
             with self._lock:
                 self._unacknowledged.pop(message.mid, None)
@@ -233,7 +257,11 @@ class MqttInternet(IInternetConnection):
         self._submit(lambda _now_s: self._states.clear())  # the will may have replaced them
 
     def _on_connect_fail(self, _client: mqtt.Client, _userdata: Any) -> None:
-        self._complain("does not answer")
+        error = sys.exc_info()[1]  # paho calls this while it handles the error
+        if isinstance(error, ssl.SSLCertVerificationError):
+            self._complain(f"is not trusted: {error.verify_message}")
+        else:
+            self._complain("does not answer")
 
     def _on_disconnect(
         self,

@@ -3,7 +3,8 @@
     drone_mesh/<mesh>/<node>/rx[/<port>]   a message that the gateway received from that node
     drone_mesh/<mesh>/<node>/tx[/<port>]   publish here to send a message to that node
     drone_mesh/<mesh>/<node>/state         retained: JSON, what the gateway knows of the node
-    drone_mesh/<mesh>/<node>/event         JSON: what became of a message for that node
+    drone_mesh/<mesh>/<node>/event         JSON: what became of a message for that node ("state"),
+                                           or what happened to that node ("event")
 
 `rx` and `tx` hold the bytes of the message and nothing else; port 0 has no level of its own. <node>
 is an id, for `tx` also "all".
@@ -95,7 +96,7 @@ class Topics:
         return f"{self._prefix}/{node}/state"
 
     def event(self, node: str) -> str:
-        """Where the outcome of a message for `node` is published."""
+        """Where the outcome of a message for `node`, and what happens to it, is published."""
         return f"{self._prefix}/{node}/event"
 
     @property

@@ -10,6 +10,7 @@ from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 
 if TYPE_CHECKING:
     from drone_mesh.internet.asking import Submit
+    from drone_mesh.internet.mqtt_internet import MqttInternet
     from drone_mesh.internet.mqtt_topics import Broker
     from drone_mesh.internet.status import ReadStatus, StatusServer
     from drone_mesh.users.desk import UsersDesk
@@ -34,7 +35,7 @@ def http_internet(
 
 def mqtt_internet(
     submit: Submit, users: UsersDesk, broker: Broker, **settings: Any
-) -> IInternetConnection:
+) -> MqttInternet:
     """An MqttInternet, see there. Raises ConfigurationError also if its library is missing."""
     try:
         from drone_mesh.internet.mqtt_internet import MqttInternet

@@ -8,7 +8,7 @@ from collections import deque
 from typing import Any
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind, MeshObserver
 
 EVENTS_KEPT = 500  # our choice: an hour of a restless mesh
 
@@ -27,6 +27,11 @@ class EventHistory:
         self._lock = threading.Lock()
         self._number = 0
         self._kept: deque[tuple[int, MeshEvent]] = deque(maxlen=EVENTS_KEPT)
+        self._others: list[MeshObserver] = []  # complete before the nodes start
+
+    def pass_on(self, observer: MeshObserver) -> None:
+        """Have `observer` called with each event, too. Before the nodes start."""
+        self._others.append(observer)
 
     def observe(self, event: MeshEvent) -> None:
         """A MeshObserver."""
@@ -34,6 +39,8 @@ class EventHistory:
             self._number += 1
             self._kept.append((self._number, event))
         _log_event(event)
+        for observer in self._others:
+            observer(event)
 
     def since(self, number: int, started_s: float) -> list[dict[str, Any]]:
         """The events after this number, oldest first, as JSON values; times count from a start."""

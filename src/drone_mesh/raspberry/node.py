@@ -55,7 +55,7 @@ class RadioNode:
         self._seat = self._executor.seat()
         self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
         self._origin = options.flight.origin
-        self._events = EventHistory() if events is None else events
+        self.events = EventHistory() if events is None else events
         self.users = UsersDesk(radio.node_id, self._seat.submit)
         self._socket = local_socket(self.users)
         self._internet = None if make_internet is None else make_internet(self)
@@ -79,7 +79,7 @@ class RadioNode:
             repair=options.repair,
             repair_options=options.repair_options,
             timing=options.timing,
-            observer=self._events.observe,
+            observer=self.events.observe,
         )
         self.users.open(self.component.data)
         self._started = False
@@ -97,7 +97,7 @@ class RadioNode:
         return {
             **report,
             "uptime_s": round(now_s - self._started_s, 2),
-            "events": self._events.since(after, self._started_s),
+            "events": self.events.since(after, self._started_s),
         }
 
     def status(self) -> dict[str, Any]:

@@ -200,9 +200,9 @@ def _internet(options: Options) -> MakeInternet:
     def make(node: RadioNode) -> IInternetConnection:
         connections: list[IInternetConnection] = []
         if mqtt is not None:
-            connections.append(
-                mqtt_internet(node.submit, node.users, mqtt.broker, ca_file=mqtt.ca_file)
-            )
+            to_broker = mqtt_internet(node.submit, node.users, mqtt.broker, ca_file=mqtt.ca_file)
+            node.events.pass_on(to_broker.observe)
+            connections.append(to_broker)
         if http is not None:
             connections.append(_http(node, http, options.flight.origin))
         return SeveralInternets(*connections)

@@ -1,12 +1,15 @@
-"""A gateway and a real broker, which is stopped and started again."""
+"""A gateway and a real broker, which is stopped, killed and started again."""
 
 from __future__ import annotations
 
 import json
 import queue
 import shutil
+import signal
 import socket
+import ssl
 import subprocess
+import threading
 import time
 
 import paho.mqtt.client as mqtt
@@ -14,6 +17,7 @@ import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
 from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
 from drone_mesh.internet.mqtt_internet import MqttInternet
@@ -26,19 +30,21 @@ pytestmark = [
     pytest.mark.skipif(MOSQUITTO is None, reason="needs a broker: apt install mosquitto"),
 ]
 PATIENCE_S = 40.0
+PASSWORD = "correct horse"
 
 
 class Mosquitto:
-    """A broker that keeps its messages on disk."""
+    """A broker that writes each change of its messages to disk."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, access="allow_anonymous true\n"):
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
         self._file = folder / "mosquitto.conf"
         self._file.write_text(
-            f"listener {self.port} 127.0.0.1\nallow_anonymous true\npersistence true\n"
-            f"persistence_location {folder}/\nuser root\nmax_queued_messages 0\n"
+            f"listener {self.port} 127.0.0.1\n{access}persistence true\n"
+            f"persistence_location {folder}/\nautosave_on_changes true\nautosave_interval 1\n"
+            "user root\nmax_queued_messages 0\n"
         )
         self._process = None
 
@@ -55,8 +61,20 @@ class Mosquitto:
                 time.sleep(0.05)
 
     def stop(self):
+        self._end(signal.SIGTERM)
+
+    def kill(self):
+        """As when its machine loses power."""
+        self._end(signal.SIGKILL)
+
+    def freeze(self):
+        """It takes bytes, and acknowledges nothing."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def _end(self, how):
         if self._process is not None:
-            self._process.terminate()
+            self._process.send_signal(how)
+            self._process.send_signal(signal.SIGCONT)  # if it is frozen
             self._process.wait(PATIENCE_S)
             self._process = None
 
@@ -64,11 +82,12 @@ class Mosquitto:
 class Client:
     """Another program that uses the broker; its session outlives the connection."""
 
-    def __init__(self, port, topic):
+    def __init__(self, port, topic, secure=lambda client: None):
         self.messages = queue.Queue()
         self._client = mqtt.Client(
             CallbackAPIVersion.VERSION2, client_id="test", clean_session=False
         )
+        secure(self._client)
         self._client.reconnect_delay_set(1, 1)
         self._client.on_connect = lambda client, *_: client.subscribe(topic, 1)
         self._client.on_subscribe = lambda *_: self.messages.put(None)
@@ -95,7 +114,7 @@ class Client:
 class Gateway:
     """Gateway 0 and router 1; what is handed in is followed by a second of the mesh."""
 
-    def __init__(self, port):
+    def __init__(self, broker, ca_file=None):
         self.network = Network(seed=1)
         self.network.add_gateway(0, 0.0, 0.0)
         self.network.add_router(1, 6.0, 0.0)
@@ -105,9 +124,9 @@ class Gateway:
         self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_is_poked=True)
         self.users = UsersDesk(0, self.submit)
         self.users.open(gateway.data)
-        self.internet = MqttInternet(
-            self.submit, self.users, Broker("127.0.0.1", port, False, "field")
-        )
+        self.internet = MqttInternet(self.submit, self.users, broker, ca_file)
+        self.subscribed = threading.Event()  # what is published before that is not for it
+        self.internet._client.on_subscribe = lambda *_: self.subscribed.set()
         self.executor.start()
         self.internet.connect(gateway)
 
@@ -121,6 +140,21 @@ class Gateway:
 
     def from_node_1(self, payload, port=0):
         self.submit(lambda _now_s: self.network.send(1, 0, payload, port))
+
+    def wait_for(self, what, is_so):
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not is_so():
+            assert time.monotonic() < deadline_s, what
+            time.sleep(0.05)
+
+    def wait_for_all_at_node_1(self, wanted):
+        def missing():
+            return wanted - {message.payload for message in self.network.received.get(1, [])}
+
+        deadline_s = time.monotonic() + PATIENCE_S
+        while missing():
+            assert time.monotonic() < deadline_s, f"lost: {missing()}"
+            time.sleep(0.05)
 
     def close(self):
         self.internet.disconnect()
@@ -137,16 +171,37 @@ def broker(tmp_path):
 
 @pytest.fixture
 def gateway(broker):
-    gateway = Gateway(broker.port)
+    gateway = Gateway(Broker("127.0.0.1", broker.port, False, "field"))
     yield gateway
     gateway.close()
 
 
 @pytest.fixture
 def client(broker, gateway):
+    assert gateway.subscribed.wait(PATIENCE_S)
     client = Client(broker.port, "drone_mesh/field/#")
     yield client
     client.close()
+
+
+@pytest.fixture
+def secure_broker(tmp_path):
+    """Takes only TLS, and only node `field` with its password. Certificate: server.pem."""
+    if shutil.which("openssl") is None or shutil.which("mosquitto_passwd") is None:
+        pytest.skip("needs openssl and mosquitto_passwd")
+    certificate, key, passwords = (tmp_path / name for name in ("server.pem", "key.pem", "users"))
+    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"]
+    command += ["-nodes", "-days", "2", "-subj", "/CN=broker", "-keyout", key, "-out", certificate]
+    command += ["-addext", "subjectAltName=IP:127.0.0.1"]
+    subprocess.run(command, check=True, capture_output=True)
+    passwords.touch(mode=0o600)
+    command = ["mosquitto_passwd", "-b", passwords, "field", PASSWORD]
+    subprocess.run(command, check=True, capture_output=True)
+    access = f"allow_anonymous false\npassword_file {passwords}\n"
+    broker = Mosquitto(tmp_path, f"{access}certfile {certificate}\nkeyfile {key}\n")
+    broker.start()
+    yield broker
+    broker.stop()
 
 
 def is_topic(topic):
@@ -185,6 +240,78 @@ def test_the_state_of_a_node_is_retained_and_the_end_of_the_gateway_shows(broker
     assert json.loads(gone.payload) == {"online": False, "node": 0, "gateway": True}
 
 
+def test_what_happens_to_a_node_is_published(gateway, client):
+    lost = MeshEvent(MeshEventKind.NEIGHBOUR_LOST, 0, 1.0, peer=1)
+    gateway.submit(lambda _now_s: gateway.internet.observe(lost))
+    event = json.loads(client.next(is_topic("0/event")).payload)
+    assert event == {"event": "neighbour lost", "peer": 1, "detail": ""}
+
+
+def test_data_goes_over_tls_with_a_password(secure_broker, tmp_path):
+    certificate = tmp_path / "server.pem"
+    where = Broker("127.0.0.1", secure_broker.port, True, "field", "field", PASSWORD)
+
+    def secure(client):
+        client.username_pw_set("field", PASSWORD)
+        client.tls_set_context(ssl.create_default_context(cafile=certificate))
+
+    gateway = Gateway(where, certificate)
+    client = Client(secure_broker.port, "drone_mesh/field/#", secure)
+    try:
+        assert gateway.subscribed.wait(PATIENCE_S)
+        gateway.from_node_1(b"21.5")
+        assert client.next(is_topic("1/rx")).payload == b"21.5"
+        client.publish("drone_mesh/field/1/tx", b"blink")
+        assert json.loads(client.next(is_topic("1/event")).payload)["state"] == "delivered"
+    finally:
+        client.close()
+        gateway.close()
+
+
+@pytest.mark.parametrize(
+    ("password", "trusted", "reason"),
+    [
+        ("wrong", True, "refuses the connection: Not authorized"),
+        (PASSWORD, False, "is not trusted: self-signed certificate"),
+    ],
+)
+def test_a_broker_that_refuses_or_is_not_trusted_shows_in_one_line(
+    secure_broker, tmp_path, caplog, password, trusted, reason
+):
+    where = Broker("127.0.0.1", secure_broker.port, True, "field", "field", password)
+    gateway = Gateway(where, tmp_path / "server.pem" if trusted else None)
+    try:
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not any(reason in record.getMessage() for record in caplog.records):
+            assert time.monotonic() < deadline_s, caplog.text
+            time.sleep(0.05)
+    finally:
+        gateway.close()
+    assert len([record for record in caplog.records if "the broker" in record.message]) == 1
+
+
+def test_nothing_acknowledged_is_lost_when_the_broker_is_killed_in_mid_transfer(
+    broker, gateway, client
+):
+    for number in range(10):
+        gateway.from_node_1(b"up %d" % number)
+    received = {client.next(is_topic("1/rx")).payload for _ in range(10)}
+    for number in range(10):
+        client.publish("drone_mesh/field/1/tx", b"down %d" % number)
+    client.next(is_topic("1/event"))  # the first has arrived, others are on their way
+    broker.freeze()
+    for number in range(10, 20):  # the mesh acknowledges them, the broker does not
+        gateway.from_node_1(b"up %d" % number)
+    data = gateway.network.nodes[0].component.data
+    gateway.wait_for("20 messages in the gateway", lambda: data.figures().messages_received == 20)
+    broker.kill()
+    broker.start()
+    while len(received) < 20:
+        received.add(client.next(is_topic("1/rx")).payload)
+    assert received == {b"up %d" % number for number in range(20)}
+    gateway.wait_for_all_at_node_1({b"down %d" % number for number in range(10)})
+
+
 def test_nothing_is_lost_while_the_broker_is_away(broker, gateway, client, caplog):
     for number in range(20):
         gateway.from_node_1(b"up %d" % number)
@@ -197,10 +324,6 @@ def test_nothing_is_lost_while_the_broker_is_away(broker, gateway, client, caplo
     while len(received) < 20:
         received.add(client.next(is_topic("1/rx")).payload)
     assert received == {b"up %d" % number for number in range(20)}
-    deadline_s = time.monotonic() + PATIENCE_S
-    wanted = {b"down %d" % number for number in range(20)}
-    while {message.payload for message in gateway.network.received.get(1, [])} != wanted:
-        assert time.monotonic() < deadline_s, gateway.network.received[1]
-        time.sleep(0.05)
+    gateway.wait_for_all_at_node_1({b"down %d" % number for number in range(20)})
     lines = [record.message for record in caplog.records if "the broker" in record.message]
     assert len(lines) == 1, lines

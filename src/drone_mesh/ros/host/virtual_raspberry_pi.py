@@ -8,6 +8,7 @@ from typing import Callable
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.execution import Seat
 from drone_mesh.internet import DEFAULT_PORT
@@ -44,6 +45,7 @@ class VirtualRaspberryPi(abc.ABC):
         self.seat = seat
         self.users = UsersDesk(node_id, seat.submit)
         self._users_of_node = UsersOfNode(self.users)
+        self._observers = [settings.observer]
         if settings.key is not None:
             antenna = SealedAntenna(
                 antenna,
@@ -63,7 +65,7 @@ class VirtualRaspberryPi(abc.ABC):
             repair=settings.repair,
             repair_options=settings.repair_options,
             timing=settings.timing,
-            observer=settings.observer,
+            observer=self._observe,
             debug=settings.debug,
         )
 
@@ -80,6 +82,10 @@ class VirtualRaspberryPi(abc.ABC):
         self._users_of_node.stop()
         self.component.stop()
         self.engine.disconnect()
+
+    def _observe(self, event: MeshEvent) -> None:
+        for observer in self._observers:
+            observer(event)
 
     @abc.abstractmethod
     def _make_internet(self) -> IInternetConnection | None:
@@ -104,6 +110,7 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
             # One gateway sends what is published: several would send it several times.
             sends, broker = self.node_id == 0, self.settings.broker
             mqtt = mqtt_internet(self.seat.submit, self.users, broker, sends=sends)
+            self._observers.append(mqtt.observe)
             return SeveralInternets(mock, mqtt)
         http = http_internet(self.seat.submit, port=DEFAULT_PORT + self.node_id, users=self.users)
         return SeveralInternets(mock, http)
