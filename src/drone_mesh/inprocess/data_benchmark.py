@@ -136,7 +136,12 @@ def cases() -> list[Case]:
         for reliable in (False, True)
         for loss in (0.0, 0.1)
     ]
-    chains = [Case("250k", hops, 1, loss, True) for hops in (2, 4, 8) for loss in (0.0, 0.1)]
+    chains = [
+        Case("250k", hops, 1, loss, reliable)
+        for hops in (2, 4, 8)
+        for reliable in (False, True)
+        for loss in (0.0, 0.1)
+    ]
     several = [Case("250k", hops, 10, 0.0, True) for hops in (1, 2)]
     return one_hop + chains + several
 

@@ -1,6 +1,7 @@
 """Seeded cases: reliable messages while packets get lost and a relay disappears.
 
-Run many of them with `python test/unit/inprocess/data_cases.py 1000`.
+Run many of them with `python test/unit/inprocess/data_cases.py 1000`, on one channel that all
+nodes share with `... data_cases.py 1000 shared`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import random
 import sys
 
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.data_benchmark import LossyDisc
 
 SENDER = 9
 _LADDER = {  # two ways from the gateway to node 9, with rungs between them
@@ -17,15 +19,15 @@ _LADDER = {  # two ways from the gateway to node 9, with rungs between them
 }  # fmt: skip
 
 
-def play(seed):
+def play(seed, radio="disc"):
     """Play the case of this seed: the network, and by source and port what was sent."""
     rng = random.Random(f"data {seed}")
-    network = Network(
-        seed=seed,
-        loss=rng.choice((0.0, 0.02, 0.05, 0.1)),
-        jitter_s=rng.choice((0.0, 0.003)),
-        max_distance_m=8.0,
-    )
+    loss, jitter_s = rng.choice((0.0, 0.02, 0.05, 0.1)), rng.choice((0.0, 0.003))
+    if radio == "shared":
+        links = LossyDisc(8.0, loss, random.Random(f"loss {seed}"))
+        network = Network(seed=seed, radio="shared", links=links, max_distance_m=8.0)
+    else:
+        network = Network(seed=seed, loss=loss, jitter_s=jitter_s, max_distance_m=8.0)
     network.add_gateway(0, 0.0, 0.0)
     for node, (x, y) in _LADDER.items():
         network.add_router(node, x, y)
@@ -57,9 +59,9 @@ def play(seed):
     return network, sent, tickets
 
 
-def run_case(seed):
+def run_case(seed, radio="disc"):
     """What went wrong in the case of this seed; an empty string: nothing."""
-    network, sent, tickets = play(seed)
+    network, sent, tickets = play(seed, radio)
     lost = [str(ticket) for ticket in tickets if ticket.state.value != "delivered"]
     if lost:
         return "; ".join(lost)
@@ -77,10 +79,10 @@ def fingerprint(seed):
     return network.now_s(), network.received, [str(ticket) for ticket in tickets]
 
 
-def main(count):
+def main(count=1000, radio="disc"):
     failures = {}
-    for seed in range(count):
-        problem = run_case(seed)
+    for seed in range(int(count)):
+        problem = run_case(seed, radio)
         if problem:
             failures[seed] = problem
             print(f"case {seed}: {problem}", flush=True)
@@ -90,4 +92,4 @@ def main(count):
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000))
+    sys.exit(main(*sys.argv[1:]))

@@ -11,7 +11,8 @@ from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
 from drone_mesh.communication.data.reassembly import Prove, Reassembly, Whole, no_proof
 
-ACK_DELAY_S = 0.02  # our choice: messages that are complete within this time share an ACK
+ACK_DELAY_S = 0.02  # our choice: after a pause of this time, what is complete is acknowledged
+ACK_LATEST_S = 0.2  # our choice: and after this time without a pause
 ACK_AT = 96  # our choice: fragments of complete messages that make an ACK leave at once
 REPEAT_S = 0.3  # our choice: an ACK that nothing asked for is not repeated sooner
 MOST_PORTS = 64  # whose order is kept per sender, the ones used last
@@ -35,12 +36,14 @@ class Inbox:
         self._unacknowledged = 0  # fragments of complete messages
         self._complete = 0  # number of the latest complete reliable message
         self._repeated_s = -math.inf
-        self.ack_due_s = math.inf
+        self.ack_due_s = self._ack_latest_s = math.inf
 
     def fragment(self, index: int, body: bytes, now_s: float) -> list[Whole]:
         """A fragment arrived: what can be delivered now. Raises PacketError for a damaged one."""
         if index == 0 and not self._is_current(packets.head_of(body).session, now_s):
             return []
+        if self.ack_due_s < math.inf:
+            self.ack_due_s = min(now_s + ACK_DELAY_S, self._ack_latest_s)
         number, reassembly = body[0], self._reassembly
         if reassembly.is_done(number):
             self._say_again(number, now_s)
@@ -62,6 +65,8 @@ class Inbox:
 
     def poll(self, poll: Poll, now_s: float) -> None:
         """The sender asks what is here."""
+        if poll.session == self._session:
+            self._unacknowledged, self.ack_due_s = 0, math.inf
         self._acknowledge(self._ack(poll.number, poll.nonce, poll.session))
 
     def on_time(self, now_s: float) -> list[Whole]:
@@ -105,7 +110,9 @@ class Inbox:
         if self._unacknowledged >= ACK_AT or index != count - 1:
             self._acknowledge_now()
         else:
-            self.ack_due_s = min(self.ack_due_s, now_s + ACK_DELAY_S)
+            if self.ack_due_s == math.inf:
+                self._ack_latest_s = now_s + ACK_LATEST_S
+            self.ack_due_s = min(now_s + ACK_DELAY_S, self._ack_latest_s)
 
     def _say_again(self, number: int, now_s: float) -> None:
         if now_s - self._repeated_s >= REPEAT_S:

@@ -3,7 +3,8 @@
 A message is cut into fragments. For a reliable one the receiver says which fragments it has, in an
 ACK: when the message is complete, when its last fragment came and others are missing, and when it
 is asked with a POLL. What is missing then is sent again. A POLL follows when no ACK comes in time,
-and when as many fragments are on their way as the window allows.
+and when as many fragments are on their way as the window allows; behind relays on a shared channel
+the train takes the place of the window (see Train), also for messages that are not reliable.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll
 from drone_mesh.communication.data.reassembly import Prove, no_proof
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
+from drone_mesh.communication.data.train import Train
 
 LIFETIME_S = 240.0  # our choice: a loss is repaired within two minutes and a flight
 FIRST_WINDOW = 32  # our choice, in fragments: less than a message of 1,024 bytes
@@ -32,6 +34,7 @@ class DataPacket(NamedTuple):
     kind: int
     body: bytes
     message: Outgoing
+    ends_train: bool = False
 
 
 class Outgoing:
@@ -98,6 +101,8 @@ class Lane:
         self._window = float(FIRST_WINDOW)
         self._slow_start = True
         self._nonce = 0
+        self._train: Train | None = None  # while relays share the channel with this node
+        self._latest: Outgoing | None = None  # message whose fragment left last
         self.not_before_s = -math.inf  # there was no route; look again then
 
     def __len__(self) -> int:
@@ -112,28 +117,73 @@ class Lane:
         """A message for this destination."""
         self._waiting.append(message)
 
+    def relayed(self, relayed: bool) -> None:
+        """Whether relays on the same channel are between this node and the destination."""
+        if not relayed:
+            self._train = None
+        elif self._train is None:
+            self._train = Train()
+
     def next_packet(self, now_s: float) -> DataPacket | None:
         """What to send now; `left` or `failed` says what became of it."""
-        in_flight = sum(message.in_flight for message in self._open.values())
+        train = self._train
+        if train is None:
+            return self._timely_poll(now_s) or self._fragment(now_s)
+        if train.waits:
+            if now_s < self._train_due_s(train):
+                return None
+            if any(message.in_flight for message in self._open.values()):
+                return self._end_of_train()
+            train.over(arrived=False)
+        poll = self._timely_poll(now_s)
+        if poll is not None:
+            return poll
+        if train.is_full and self._has_more():
+            return self._end_of_train()
+        return self._fragment(now_s)
+
+    def _timely_poll(self, now_s: float) -> DataPacket | None:
+        """A POLL for a message of which no ACK came in time."""
         for message in self._open.values():
             if message.asks and now_s >= message.asked_s + self._timeout_s(message):
-                return self._poll(message)  # no answer came
+                return self._poll(message)
+        return None
+
+    def _fragment(self, now_s: float) -> DataPacket | None:
+        """The next fragment; a POLL if the window is full."""
+        in_flight, window = 0, math.inf
+        if self._train is None:
+            in_flight, window = self._in_flight(), self._window
+        for message in self._open.values():
             if message.to_send and message.asked_s == math.inf:
-                if not message.ticket.reliable or in_flight < self._window:
+                if not message.ticket.reliable or in_flight < window:
                     index = message.to_send[0]
                     return DataPacket(packets.FRAGMENTS[index], self._body(message, index), message)
                 if message.in_flight:
-                    return self._poll(message)  # the window is full: what of it arrived?
-        if in_flight < self._window and self._may_open():
+                    return self._poll(message)  # what of it arrived?
+        if in_flight < window and self._may_open():
             return self._opened(now_s)
         return None
+
+    def _has_more(self) -> bool:
+        return self._may_open() or any(message.to_send for message in self._open.values())
+
+    def _in_flight(self) -> int:
+        return sum(message.in_flight for message in self._open.values())
 
     def left(self, packet: DataPacket, now_s: float) -> None:
         """The packet is on its way."""
         message = packet.message
+        if packet.ends_train:
+            assert self._train is not None
+            self._train.asked(self._nonce, now_s)
+            return
         if packet.kind == packets.POLL:
             message.asked_s, message.asks = now_s, message.asks + 1
             return
+        self._latest = message
+        if self._train is not None:
+            self._train.left += 1
         index = message.to_send.popleft()
         message.sent |= 1 << index
         if message.to_send:
@@ -170,14 +220,31 @@ class Lane:
                 self._round_trip.measured(now_s - message.asked_s)
             self._grow(message.in_flight)
             self._close(message, TicketState.DELIVERED)
+        self._train_answered(ack, now_s)
+
+    def _train_answered(self, ack: Ack, now_s: float) -> None:
+        train = self._train
+        if train is None:
+            return
+        arrived = not self._in_flight()
+        if train.waits and ack.nonce == train.nonce:
+            if train.asks == 1:
+                self._round_trip.measured(now_s - train.asked_s)
+            train.over(arrived)
+        elif arrived and not train.waits:
+            train.over(arrived)
 
     def due_s(self, now_s: float) -> float:
         """When to look after this lane next; infinity while nothing waits in it."""
         due_s = math.inf
         if not len(self):
             return due_s
+        train = self._train
+        waits = train is not None and train.waits
+        if train is not None and train.waits:
+            due_s = self._train_due_s(train)
         for message in self._open.values():
-            if message.asked_s < math.inf:
+            if message.asked_s < math.inf and not waits:
                 due_s = min(due_s, message.asked_s + self._timeout_s(message))
             due_s = min(due_s, message.expires_s)
         if self._waiting:
@@ -207,6 +274,8 @@ class Lane:
         for message in messages:
             self._remove(message)
             message.begin_again()
+        if messages:
+            self._train = None  # it ended with them
         return messages
 
     # One message ------------------------------------------------------------------------------
@@ -265,9 +334,16 @@ class Lane:
         return packets.further_body(head.number, index, message.sealed, self._room)
 
     def _poll(self, message: Outgoing) -> DataPacket:
-        assert message.head is not None
         if message.asks >= 2:
             self._window, self._slow_start = float(LEAST_WINDOW), True
+        return self._asking(message)
+
+    def _end_of_train(self) -> DataPacket:
+        assert self._latest is not None
+        return self._asking(self._latest)._replace(ends_train=True)
+
+    def _asking(self, message: Outgoing) -> DataPacket:
+        assert message.head is not None
         self._nonce = self._nonce % 0xFF + 1
         message.nonce = self._nonce
         poll = Poll(self._session, self._nonce, message.head.number)
@@ -305,6 +381,9 @@ class Lane:
     def _grow(self, arrived: int) -> None:
         self._window += arrived if self._slow_start else arrived / self._window * 4
         self._window = min(self._window, float(MOST_WINDOW))
+
+    def _train_due_s(self, train: Train) -> float:
+        return train.asked_s + self._round_trip.timeout_s(max(0, train.asks - 1))
 
     def _timeout_s(self, message: Outgoing) -> float:
         return self._round_trip.timeout_s(max(0, message.asks - 1))

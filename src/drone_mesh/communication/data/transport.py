@@ -217,6 +217,8 @@ class Transport:
             return False
         if lane.to != TO_ALL and not self._may_reach(lane, now_s):
             return False
+        if self._parts.antenna.medium.shared and lane.to != TO_ALL:
+            lane.relayed(self._direction(lane.to) != lane.to)
         packet = lane.next_packet(now_s)
         if packet is None:
             return False

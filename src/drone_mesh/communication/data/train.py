@@ -1,0 +1,50 @@
+"""Train: what leaves for a node behind relays before that node has said what arrived."""
+
+from __future__ import annotations
+
+import math
+
+FIRST_LENGTH = 32  # our choice, in fragments
+LEAST_LENGTH = 8  # our choice
+MOST_LENGTH = 48  # our choice: a relay forwards it in one piece
+
+
+class Train:
+    """The packets of one lane since its receiver answered last, on a shared channel.
+
+    A relay cannot receive while it sends, and a sender hears no relay but the first: what follows
+    while earlier packets are still on their way collides with them. So packets leave in trains that
+    end with a POLL, and the next train follows the answer. Where a train loses packets or remains
+    without an answer, the next ones are shorter.
+    """
+
+    def __init__(self) -> None:
+        self.length = FIRST_LENGTH
+        self.left = 0  # fragments that left
+        self.nonce = 0  # of its latest POLL; 0: none
+        self.asks = 0  # POLLs without an answer
+        self.asked_s = math.inf
+
+    @property
+    def is_full(self) -> bool:
+        """Whether a POLL comes next."""
+        return self.left >= self.length
+
+    @property
+    def waits(self) -> bool:
+        """Whether the next train waits for an answer."""
+        return self.asks > 0
+
+    def asked(self, nonce: int, now_s: float) -> None:
+        """Its POLL left."""
+        self.nonce, self.asked_s = nonce, now_s
+        self.asks += 1
+
+    def over(self, arrived: bool) -> None:
+        """The next one may begin; `arrived`: nothing of this one is known to be missing."""
+        if not arrived:
+            self.length = max(LEAST_LENGTH, self.length // 2)
+        elif self.is_full:
+            self.length = min(MOST_LENGTH, 2 * self.length)
+        self.left = self.nonce = self.asks = 0
+        self.asked_s = math.inf

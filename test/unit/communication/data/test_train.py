@@ -1,0 +1,74 @@
+"""Trains: what leaves for a node behind relays, on a channel that all share."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.train import FIRST_LENGTH, LEAST_LENGTH, MOST_LENGTH, Train
+from drone_mesh.inprocess import Network
+
+
+@pytest.fixture
+def chain():
+    """Gateway 0 and routers 1..3 in a line on one channel; node 3 is three hops away."""
+    network = Network(seed=3, radio="shared")
+    network.add_gateway(0, 0.0, 0.0)
+    for node in (1, 2, 3):
+        network.add_router(node, 6.0 * node, 0.0)
+    assert network.run_until(network.all_connected, 30.0)
+    return network
+
+
+def left_node(network, node):
+    """The types of users' packets that this node hands to its antenna from now on."""
+    kinds = []
+    antenna = network.nodes[node].antenna
+    send = antenna.send_message_to
+
+    def record(payload):
+        if payload[0] == node and payload[2] in (*packets.FRAGMENTS, packets.POLL):
+            kinds.append(payload[2])
+        return send(payload)
+
+    antenna.send_message_to = record
+    return kinds
+
+
+@pytest.mark.parametrize("reliable", [True, False])
+def test_behind_relays_no_more_than_a_train_leaves_without_an_answer(chain, reliable):
+    kinds = left_node(chain, 3)
+    for _ in range(4):
+        chain.send(3, 0, bytes(1024), reliable=reliable)
+    assert chain.run_until(lambda: len(chain.received.get(0, [])) == 4, 30.0)
+    trains = "".join("P" if kind == packets.POLL else "f" for kind in kinds).split("P")
+    assert len(trains[0]) == FIRST_LENGTH
+    assert max(map(len, trains)) <= MOST_LENGTH
+    assert sum(map(len, trains)) == 4 * 40
+
+
+def test_to_a_neighbour_everything_leaves_without_waiting(chain):
+    kinds = left_node(chain, 1)
+    tickets = [chain.send(1, 0, bytes(1024), reliable=False) for _ in range(4)]
+    assert chain.run_until(lambda: all(ticket.final for ticket in tickets), 30.0)
+    assert packets.POLL not in kinds
+
+
+def test_a_silent_receiver_does_not_stop_best_effort(chain):
+    chain.power(0, False)
+    tickets = [chain.send(3, 0, bytes(1024), reliable=False) for _ in range(4)]
+    assert chain.run_until(lambda: all(ticket.final for ticket in tickets), 60.0)
+
+
+def test_a_train_grows_with_answers_and_is_halved_without():
+    train = Train()
+    train.left = train.length
+    train.over(arrived=True)
+    assert train.length == min(MOST_LENGTH, 2 * FIRST_LENGTH)
+    train.over(arrived=True)  # it was not full: nothing is known of longer ones
+    assert train.length == min(MOST_LENGTH, 2 * FIRST_LENGTH)
+    train.over(arrived=False)
+    assert train.length == MOST_LENGTH // 2
+    for _ in range(5):
+        train.over(arrived=False)
+    assert train.length == LEAST_LENGTH
