@@ -51,7 +51,8 @@ def _random_message(rng: random.Random) -> Message:
     """Any message with any bytes; mostly of the types that are listened to, and as the vehicle."""
     names = LISTENED_TO if rng.random() < 0.8 else sorted(TYPES)
     kind = TYPES[rng.choice(names)]
-    body = bytearray(rng.randbytes(struct.calcsize(kind.unpacker.format)))
+    size = struct.calcsize(kind.unpacker.format)
+    body = bytearray(rng.getrandbits(8 * size).to_bytes(size, "little"))
     if kind.msgname == "HEARTBEAT" and rng.random() < 0.8:  # of something that looks flyable
         body[0:4] = struct.pack("<I", rng.choice([0, 3, 4, 5, 6, 9, 6 << 16, 4 << 16 | 3 << 24]))
         body[4:9] = bytes((2, rng.choice([3, 12]), rng.choice([1, 129]), 4, 3))
