@@ -80,10 +80,14 @@ pip_install() {
   done
 }
 
+# can_check_javascript: eslint needs Node.js 18; Debian 11 has 12.
+can_check_javascript() { node -e 'process.exit(parseInt(process.versions.node) < 18)'; }
+
 # npm_install: the checks of the page's JavaScript, unless these very versions are installed.
 npm_install() {
   cmp -s "$root/scripts/javascript/package-lock.json" "$javascript/.installed" && return
   command -v npm >/dev/null || apt_install nodejs npm
+  can_check_javascript || return 0
   say "installing npm packages into .venv: scripts/javascript"
   rm -rf "$javascript"
   cp -r "$root/scripts/javascript" "$javascript"

@@ -8,6 +8,7 @@ idle machine about 4 s, most of them roslaunch's own.
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import tempfile
@@ -18,6 +19,11 @@ from pathlib import Path
 import rostest
 from rostest_support import free_port, wait_for
 
+# roslaunch 1.15.9 (Debian 11) prints this about itself, at its very end, on Python 3.9.
+ROSLAUNCHS_OWN = re.compile(
+    r"exception in shutdown_process_monitor: 'ProcessMonitor' object has no attribute 'isAlive'\n"
+    r"Traceback [^\n]*\n( [^\n]*\n)+AttributeError: [^\n]*'isAlive'\n"
+)
 NODES = ("wireless_signal_simulator", "drone_manager", "drone_factory")
 
 
@@ -61,7 +67,7 @@ class CtrlCTest(unittest.TestCase):
             finally:
                 if launch.poll() is None:
                     os.killpg(launch.pid, signal.SIGKILL)
-            self.assertNotIn("Traceback", said())
+            self.assertNotIn("Traceback", ROSLAUNCHS_OWN.sub("", said()))
             self.assertNotIn("escalating", said())
             print(f"ended after {took_s:.1f} s")
             self.assertEqual(processes_of(port), [])
