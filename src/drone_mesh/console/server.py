@@ -184,23 +184,21 @@ class ConsoleServer:
             return
         page = Page(socket, self._store, self._history, self._is_played)
         self._pages.add(page)
-        sender = None
+        tasks: list[asyncio.Task[None]] = []
         try:
             await socket.accept()
             if self._demonstrate:
                 self._demonstrate = False
                 self._stage.begin()
-            sender = asyncio.ensure_future(self._send_frames(page))
-            receiver = asyncio.ensure_future(self._receive(page))
-            await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
-            self._pages.discard(page)
-            receiver.cancel()
-            await asyncio.gather(receiver, return_exceptions=True)
+            tasks.append(asyncio.ensure_future(self._send_frames(page)))
+            tasks.append(asyncio.ensure_future(self._receive(page)))
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._pages.discard(page)
-            if sender is not None:
-                sender.cancel()
-                await asyncio.gather(sender, return_exceptions=True)
+            # Both, and now that the page is gone: wait_for may have swallowed an earlier cancellation.
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _receive(self, page: Page) -> None:
         while page in self._pages:

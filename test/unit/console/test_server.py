@@ -194,6 +194,27 @@ def test_a_binary_message_is_answered_and_the_page_stays_connected():
     run(scenario)
 
 
+@pytest.mark.parametrize("steps", range(8))
+def test_a_server_that_is_cancelled_as_an_answer_goes_out_ends(steps: int):
+    """Before Python 3.12, asyncio.wait_for swallows a cancellation that comes just then."""
+
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server).open()
+        await until("a frame", lambda: page.of_type("frame"))
+        page.say(do="watch", node=1)
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        for task in asyncio.all_tasks() - {asyncio.current_task()}:
+            task.cancel()
+        await until("the end", lambda: page.task is not None and page.task.done())
+        left = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in left:
+            task.cancel()
+        assert not left
+
+    run(scenario)
+
+
 def test_a_watched_node_comes_with_its_neighbours():
     async def scenario(server: ConsoleServer, store: FrameStore) -> None:
         page = FakePage(server).open()
