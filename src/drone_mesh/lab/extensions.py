@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import importlib
 import inspect
 import sys
 from pathlib import Path
-from typing import Callable, cast
+from typing import Callable, Iterator, cast
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
@@ -37,9 +38,10 @@ def check_technique(kind: str, name: str, model: str) -> None:
             known = ", ".join(sorted(IDEAL_RULES))
             raise ConfigurationError(f"unknown rule {name!r} for model ideal: use one of {known}")
         return
-    network = Network(**{kind: name})  # type: ignore[arg-type]
-    network.add_gateway(0, 0.0, 0.0)
-    network.add_router(1, 1.0, 0.0)
+    with _one_line(f"{kind} {name!r} cannot be created"):
+        network = Network(**{kind: name})  # type: ignore[arg-type]
+        network.add_gateway(0, 0.0, 0.0)
+        network.add_router(1, 1.0, 0.0)
 
 
 def check_metric(name: str) -> None:
@@ -55,10 +57,8 @@ def check_metric(name: str) -> None:
 def own_metric(name: str) -> OwnMetric:
     """The function behind `package.module:function`. Raises ConfigurationError if there is none."""
     module_name, _, function_name = name.partition(":")
-    try:
+    with _one_line(f"metric {name} cannot be loaded"):
         function = getattr(importlib.import_module(module_name), function_name)
-    except (ImportError, AttributeError, ValueError, TypeError) as error:
-        raise ConfigurationError(f"metric {name} cannot be loaded: {error}") from error
     if not callable(function):
         raise ConfigurationError(f"metric {name} is not a function")
     try:
@@ -66,6 +66,23 @@ def own_metric(name: str) -> OwnMetric:
     except TypeError as error:
         raise ConfigurationError(f"metric {name} must take one argument: the record") from error
     return cast(OwnMetric, function)
+
+
+@contextlib.contextmanager
+def _one_line(what: str) -> Iterator[None]:
+    """A user's module may raise anything, also SyntaxError and SystemExit: it is the user's error.
+
+    Raises ConfigurationError, in one line.
+    """
+    try:
+        yield
+    except (ConfigurationError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        words = " ".join(str(error).split())
+        if not isinstance(error, (ImportError, AttributeError)):
+            words = f"{type(error).__name__}: {words}"
+        raise ConfigurationError(f"{what}: {words}") from error
 
 
 def own_column(name: str) -> str:

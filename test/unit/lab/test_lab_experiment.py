@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import Any, Iterator
 
 import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.plan import Plan
+from drone_mesh.lab.scenario import Part, Scenario
 
 GOOD = """\
 name: trial
@@ -197,6 +200,83 @@ def test_a_file_that_is_no_experiment_is_refused(tmp_path: Path, data: bytes, wo
     with pytest.raises(ConfigurationError, match="trial.yaml") as caught:
         load_experiment(path)
     assert words in str(caught.value)
+
+
+MODULES = {
+    "syntax": "def f(:",
+    "ends": "raise SystemExit(3)",
+    "fails": "raise RuntimeError('two\\nlines')",
+    "parts": """
+from drone_mesh.communication.repair_interfaces import IRepairStrategy
+
+class Abstract(IRepairStrategy):
+    pass
+
+class Fails(IRepairStrategy):
+    def __init__(self):
+        raise RuntimeError("no good")
+
+    def on_emergency(self):
+        pass
+""",
+}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("repair", "syntax:X", "cannot be created: SyntaxError: invalid syntax"),
+        ("routing", "ends:X", "routing 'ends:X' cannot be created: SystemExit: 3"),
+        ("routing", "fails:X", "routing 'fails:X' cannot be created: RuntimeError: two lines"),
+        ("repair", "parts:Abstract", "abstract"),
+        ("repair", "parts:Fails", "repair 'parts:Fails' cannot be created: RuntimeError: no good"),
+        ("repair", "parts:Missing", "has no attribute 'Missing'"),
+        ("metrics", "syntax:f", "metric syntax:f cannot be loaded: SyntaxError: invalid syntax"),
+        ("metrics", "ends:f", "metric ends:f cannot be loaded: SystemExit: 3"),
+        ("metrics", "parts:f", "has no attribute 'f'"),
+    ],
+)
+def test_a_module_of_the_users_that_fails_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, value: str, words: str
+) -> None:
+    folder = tmp_path / "modules"
+    folder.mkdir()
+    for name, content in MODULES.items():
+        (folder / f"{name}.py").write_text(content)
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.syspath_prepend(str(folder))
+    added = f"metrics: ['{value}']" if key == "metrics" else f"base:\n  {key}: '{value}'"
+    path = write(tmp_path, f"name: trial\n{added}\n")
+    with pytest.raises(ConfigurationError) as caught:
+        load_experiment(path)
+    line = 2 if key == "metrics" else 3
+    assert str(caught.value).startswith(f"{path}, line {line}: ")
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def keys_of(part: Any, before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Every key below `base`, by its path; the keys inside lists are left out."""
+    for name, field in part.model_fields.items():
+        yield (*before, name)
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Part):
+            yield from keys_of(field.annotation, (*before, name))
+
+
+@pytest.mark.parametrize("value", ["[[]]", ".nan", "{no: 1}", "'x y'", "-1e300"])
+@pytest.mark.parametrize("keys", list(keys_of(Scenario)), ids=".".join)
+def test_every_key_refuses_what_is_of_another_type_or_out_of_range(
+    tmp_path: Path, keys: tuple[str, ...], value: str
+) -> None:
+    lines = ["name: trial", "base:"]
+    lines += [f"{'  ' * depth}{key}:" for depth, key in enumerate(keys, start=1)]
+    lines[-1] += f" {value}"
+    path = write(tmp_path, "\n".join(lines) + "\n")
+    with pytest.raises(ConfigurationError) as caught:
+        load_experiment(path)
+    assert str(caught.value).startswith(f"{path}, line ")
+    assert keys[-1] in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
