@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import NamedTuple, Sequence
+import os
+import shutil
+import sys
+from typing import NamedTuple, NoReturn, Sequence
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.lab.plan import PlannedRun
@@ -60,7 +63,9 @@ def explain_hash(results: Results, shown: Replay) -> str:
 
 
 def show_run(options: argparse.Namespace) -> int:
-    """`lab show`: 0, or 1 when it was not the same run."""
+    """`lab show`: 0, or 1 when it was not the same run; with --rviz the exit code of lab_run."""
+    if options.rviz:
+        _show_in_rviz(options)
     results = load_results(options.results)
     shown = replay(results, options.run_id)
     title = f"{results.loaded.experiment.name} {shown.planned.spec.run}"
@@ -77,6 +82,15 @@ def show_run(options: argparse.Namespace) -> int:
     if not options.console:
         print(verdict)
     return 0 if "another run" not in verdict else 1
+
+
+def _show_in_rviz(options: argparse.Namespace) -> NoReturn:
+    """In a program of the ROS side: nothing here imports ROS."""
+    if shutil.which("rosrun") is None:
+        raise MeshError("--rviz needs ROS: rosrun not found; source its setup.bash first")
+    command = ["rosrun", "drone_mesh", "lab_run", str(options.results), options.run_id]
+    sys.stdout.flush()
+    os.execvp(command[0], command)
 
 
 def _print_story(shown: Replay) -> None:

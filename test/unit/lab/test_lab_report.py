@@ -135,3 +135,11 @@ def test_a_page_about_one_run_can_be_written(results_folder: Path, tmp_path: Pat
 def test_metrics_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["metrics"]) == 0
     assert capsys.readouterr().out.count("\n") == len(METRICS)
+
+
+def test_rviz_without_ros_is_one_line(
+    results_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(results_folder))
+    assert main(["show", str(results_folder), "0", "--rviz"]) == 1
+    assert "lab: --rviz needs ROS: rosrun not found" in capsys.readouterr().err

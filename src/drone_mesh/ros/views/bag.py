@@ -1,16 +1,24 @@
-"""Reads states and events of a mesh from a rosbag."""
+"""Reads states and events of a mesh from a rosbag, and writes them into one."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Iterator
+from typing import Iterable, Iterator
 
 import rosbag
 
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import event_record, mesh_status
+from drone_mesh.ros.graph.conversions import (
+    event_msg,
+    event_record,
+    mesh_status,
+    ros_time,
+    state_msg,
+)
 from drone_mesh.state.model import EventRecord, MeshStatus
+
+EARLIEST_S = 1e-3  # a bag refuses a message of the time 0
 
 
 class BagUnusable(MeshError):
@@ -29,6 +37,20 @@ def read_events(path: Path) -> Iterator[EventRecord]:
     with _open(path) as bag:
         for _topic, message, _time in bag.read_messages([names.EVENTS_TOPIC]):
             yield event_record(message)
+
+
+def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> None:
+    """A bag as record.launch makes it, of states and events in any order. Raises BagUnusable."""
+    try:
+        with rosbag.Bag(str(path), "w") as bag:
+            for status in states:
+                at_s = max(EARLIEST_S, status.stamp_s)
+                bag.write(names.STATE_TOPIC, state_msg(status), ros_time(at_s))
+            for event in events:
+                at_s = max(EARLIEST_S, event.stamp_s)
+                bag.write(names.EVENTS_TOPIC, event_msg(event), ros_time(at_s))
+    except OSError as error:
+        raise BagUnusable(f"cannot write {path}: {error.strerror}") from error
 
 
 def topics_in_bag(path: Path) -> set[str]:
