@@ -195,7 +195,7 @@ class ConsoleServer:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._pages.discard(page)
-            # Both, and now that the page is gone: wait_for may have swallowed an earlier cancellation.
+            # Both, now that the page is gone: wait_for may have swallowed an earlier cancellation.
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
