@@ -181,6 +181,14 @@ class NodeState(Message, NodeStatus):
     tries: float
     queue: int
     given_up: int
+    data_sent: int
+    data_bytes_sent: int
+    data_sent_at: float
+    data_received: int
+    data_bytes_received: int
+    data_received_at: float
+    data_queued: int
+    data_given_up: int
     repair_state: int
     bid: float
     place_of: int
@@ -211,6 +219,14 @@ class NodeState(Message, NodeStatus):
         tries: float = ...,
         queue: int = ...,
         given_up: int = ...,
+        data_sent: int = ...,
+        data_bytes_sent: int = ...,
+        data_sent_at: float = ...,
+        data_received: int = ...,
+        data_bytes_received: int = ...,
+        data_received_at: float = ...,
+        data_queued: int = ...,
+        data_given_up: int = ...,
         repair_state: int = ...,
         bid: float = ...,
         place_of: int = ...,

@@ -9,7 +9,7 @@ import rospy
 import rostest
 from rostest_support import MeshWatch, call
 
-from drone_mesh.msg import ReceivedData
+from drone_mesh.msg import MeshState, ReceivedData
 from drone_mesh.srv import SendData
 
 GATEWAY = 255
@@ -21,6 +21,8 @@ class UsersDataTest(unittest.TestCase):
         mesh = MeshWatch(4)
         mesh.wait("all connected", 30, mesh.connected)
         received: list[ReceivedData] = []
+        states: list[MeshState] = []
+        rospy.Subscriber("/mesh/state", MeshState, states.append)
         subscriber = rospy.Subscriber("/Nodes/0/received", ReceivedData, received.append)
         mesh.wait("node 0's topic", 10, lambda: subscriber.get_num_connections() == 1)
         payload = bytes(n % 256 for n in range(1024))
@@ -31,6 +33,17 @@ class UsersDataTest(unittest.TestCase):
         message = received[0]
         self.assertEqual((message.sender, message.port, message.payload), (3, 7, payload))
         self.assertGreater(message.header.stamp.to_sec(), 0.0)
+
+        def figures_show() -> bool:
+            nodes = {node.id: node for node in states[-1].nodes} if states else {}
+            if not {0, 3} <= set(nodes):
+                return False
+            return (nodes[3].data_sent, nodes[0].data_received) == (1, 1)
+
+        mesh.wait("the message in /mesh/state", 10, figures_show)
+        nodes = {node.id: node for node in states[-1].nodes}
+        self.assertEqual((nodes[3].data_bytes_sent, nodes[0].data_bytes_received), (1024, 1024))
+        self.assertLessEqual(nodes[3].data_sent_at, nodes[0].data_received_at)
         refused = call("/Nodes/3/send", SendData, GATEWAY, 7, True, payload + b"!", 0.0)
         self.assertFalse(refused.success)
         self.assertIn("too large: 1025 bytes", refused.message)

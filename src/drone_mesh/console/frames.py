@@ -27,6 +27,7 @@ from drone_mesh.state.model import (
     NodeStatus,
     ObstacleStatus,
     channel_in_words,
+    data_in_words,
     footprint,
     position_is_known,
 )
@@ -260,6 +261,7 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "battery": round(node.battery) if math.isfinite(node.battery) else None,
         "why_not_fly": node.why_not_fly,
         "channel": channel_in_words(node),
+        "data": data_in_words(node),
         "trouble": trouble.text if trouble else "",
         "severity": int(trouble.severity) if trouble else 0,
     }

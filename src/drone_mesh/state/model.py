@@ -44,6 +44,14 @@ class NodeStatus:
     tries: float = 0.0  # per packet on a shared channel; 0 on another medium
     queue: int = 0  # packets that wait to be sent
     given_up: int = 0  # packets that no try could deliver
+    data_sent: int = 0  # messages of users that were handed in here
+    data_bytes_sent: int = 0
+    data_sent_at: float = 0.0  # simulated s; 0: none
+    data_received: int = 0  # messages of users that were delivered here
+    data_bytes_received: int = 0
+    data_received_at: float = 0.0  # simulated s; 0: none
+    data_queued: int = 0  # now
+    data_given_up: int = 0
     repair_state: int = 0  # index of REPAIR_STATES
     bid: float = NO_BID
     place_of: int = NO_ROUTE
@@ -107,6 +115,17 @@ def channel_in_words(node: NodeStatus) -> str:
     return (
         f"{100 * node.airtime:.1f} % airtime, {node.tries:.2f} tries per packet, "
         f"{node.queue} waiting, {node.given_up} given up"
+    )
+
+
+def data_in_words(node: NodeStatus) -> str:
+    """Which messages of users a node has sent and received; empty: none."""
+    if not (node.data_sent or node.data_received):
+        return ""
+    return (
+        f"{node.data_sent} sent ({node.data_bytes_sent} bytes), "
+        f"{node.data_received} received ({node.data_bytes_received} bytes), "
+        f"{node.data_queued} waiting, {node.data_given_up} given up"
     )
 
 

@@ -37,6 +37,11 @@ def describe_component(
     use = component.get_channel_use()
     status.airtime, status.tries = use.airtime, use.tries
     status.queue, status.given_up = use.waiting, use.given_up
+    data = component.data.figures()
+    status.data_sent, status.data_bytes_sent = data.messages_sent, data.bytes_sent
+    status.data_received, status.data_bytes_received = data.messages_received, data.bytes_received
+    status.data_sent_at, status.data_received_at = data.sent_s, data.received_s
+    status.data_queued, status.data_given_up = data.messages_queued, data.messages_given_up
     repair = component.get_repair_status() if on else NOTHING_TO_REPAIR
     status.repair = repair.in_words(now_s)
     status.repair_state = REPAIR_STATES.index(repair.state)

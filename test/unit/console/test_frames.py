@@ -218,6 +218,15 @@ def test_the_latest_order_of_a_drone_is_shown_with_it():
     assert frame(store, 0)["nodes"]["0"]["order"] == ""
 
 
+def test_a_node_says_which_messages_of_users_it_sent_and_received():
+    store = FrameStore()
+    busy = {"data_sent": 3, "data_bytes_sent": 72, "data_queued": 1, "data_given_up": 1}
+    store.update_mesh(MeshStatus(1.0, [NodeStatus(1, **busy), NodeStatus(2)]), wall_s=0.0)
+    shown = {node: fields["data"] for node, fields in frame(store, 0)["nodes"].items()}
+    words = "3 sent (72 bytes), 0 received (0 bytes), 1 waiting, 1 given up"
+    assert shown == {"1": words, "2": ""}
+
+
 def test_a_node_on_a_shared_channel_says_what_it_does_there():
     store = FrameStore()
     busy = {"airtime": 0.0123, "tries": 1.254, "queue": 2, "given_up": 1}

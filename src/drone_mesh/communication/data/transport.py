@@ -57,7 +57,7 @@ Receiver = Callable[[ReceivedMessage], None]
 
 
 class DataFigures(NamedTuple):
-    """Counts since the start."""
+    """Counts since the start, and the times of the latest messages."""
 
     messages_sent: int = 0  # handed in
     messages_delivered: int = 0  # acknowledged by their receivers
@@ -65,6 +65,9 @@ class DataFigures(NamedTuple):
     messages_received: int = 0
     bytes_sent: int = 0  # of the payloads handed in
     bytes_received: int = 0
+    messages_queued: int = 0  # now: they wait or are on their way
+    sent_s: float = 0.0  # the core's clock; 0: none
+    received_s: float = 0.0
 
 
 class Transport:
@@ -96,7 +99,7 @@ class Transport:
         self._echoes = Echoes(self._send_packet, room)
         self._receivers: list[Receiver] = []
         self._numbered = 0
-        self._counts = dict.fromkeys(DataFigures._fields, 0)
+        self._figures = DataFigures()
         self._tidy_s = math.inf
 
     # For users ---------------------------------------------------------------------------------
@@ -114,8 +117,11 @@ class Transport:
         reliable = reliable and to != TO_ALL
         self._numbered += 1
         ticket = Ticket(self._numbered, to, port, len(payload), reliable)
-        self._counts["messages_sent"] += 1
-        self._counts["bytes_sent"] += len(payload)
+        self._figures = self._figures._replace(
+            messages_sent=self._figures.messages_sent + 1,
+            bytes_sent=self._figures.bytes_sent + len(payload),
+            sent_s=now_s,
+        )
         me = self._parts.node_id
         if to == me or (to == TO_GATEWAY and self._my_gateway() == me):
             self._deliver(ReceivedMessage(me, port, payload, False, reliable, now_s))
@@ -141,8 +147,8 @@ class Transport:
         return self._echoes.send(to, on_answer, now_s)
 
     def figures(self) -> DataFigures:
-        """Counts since the start. Any thread."""
-        return DataFigures(**self._counts)
+        """What was sent and received so far. Any thread."""
+        return self._figures
 
     # For the component -------------------------------------------------------------------------
 
@@ -187,6 +193,12 @@ class Transport:
 
     def _work(self) -> None:
         """Send what may leave now, and plan the next time."""
+        self._send_now()
+        queued = self._queued()
+        if queued != self._figures.messages_queued:
+            self._figures = self._figures._replace(messages_queued=queued)
+
+    def _send_now(self) -> None:
         now_s, antenna = self._parts.now_s, self._parts.antenna
         if not self._lanes and not self._for_gateway:
             self._plan(math.inf)
@@ -282,10 +294,11 @@ class Transport:
         return lane
 
     def _ended(self, state: TicketState) -> None:
+        figures = self._figures
         if state is TicketState.DELIVERED:
-            self._counts["messages_delivered"] += 1
+            self._figures = figures._replace(messages_delivered=figures.messages_delivered + 1)
         elif state is TicketState.GIVEN_UP:
-            self._counts["messages_given_up"] += 1
+            self._figures = figures._replace(messages_given_up=figures.messages_given_up + 1)
 
     def _check(self, to: int, payload: bytes, port: int) -> None:
         if not 0 <= to <= MAX_NODE_ID and to not in (TO_ALL, TO_GATEWAY):
@@ -296,9 +309,12 @@ class Transport:
         if not 0 <= port <= 255:
             raise MessageRefused(f"invalid port {port}: must be 0..255")
         packets.check_size(payload)
-        queued = len(self._for_gateway) + sum(map(len, self._lanes.values()))
+        queued = self._queued()
         if queued >= MOST_QUEUED:
             raise QueueFull(f"the queue is full: {queued} messages wait or are on their way")
+
+    def _queued(self) -> int:
+        return len(self._for_gateway) + sum(map(len, self._lanes.values()))
 
     # Receiving ---------------------------------------------------------------------------------
 
@@ -341,8 +357,11 @@ class Transport:
         )
 
     def _deliver(self, message: ReceivedMessage) -> None:
-        self._counts["messages_received"] += 1
-        self._counts["bytes_received"] += len(message.payload)
+        self._figures = self._figures._replace(
+            messages_received=self._figures.messages_received + 1,
+            bytes_received=self._figures.bytes_received + len(message.payload),
+            received_s=message.received_s,
+        )
         for receiver in self._receivers:
             receiver(message)
 

@@ -56,6 +56,7 @@ export class NodePanel {
       ["Messages sent", String(node.total_messages ?? "–")],
       ["Position", node.position ? node.position.map((m) => m.toFixed(2)).join(", ") : "–"],
       ...(node.channel ? [["Radio channel", node.channel, { wide: true }]] : []),
+      ...(node.data ? [["Users’ data", node.data, { wide: true }]] : []),
       ...(node.earth ? [["Latitude, longitude, altitude", this.#earth(node), { wide: true }]] : []),
       ...(node.drone ? [["Drone", node.drone, { wide: true }]] : []),
       ["Route", node.route.length ? node.route : "–", { glue: " › ", wide: true }],

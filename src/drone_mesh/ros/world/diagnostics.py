@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.graph.figures import HARDWARE_ID
-from drone_mesh.state.model import MeshStatus, NodeStatus, channel_in_words
+from drone_mesh.state.model import MeshStatus, NodeStatus, channel_in_words, data_in_words
 from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 
 
@@ -47,6 +47,7 @@ def _trouble_status(trouble: Trouble, node: NodeStatus) -> DiagnosticStatus:
                 "route": _in_words(node.route),
                 "repair": node.repair,
                 "radio channel": channel_in_words(node),
+                "users' data": data_in_words(node),
             }
         ),
     )

@@ -113,6 +113,23 @@ def test_a_full_queue_is_an_error_and_has_room_again_later(network):
     assert len(payloads(network, 0)) == MOST_QUEUED + 1
 
 
+def test_the_figures_say_what_was_sent_received_and_given_up_and_what_waits(network):
+    sent_s = network.now_s()
+    network.send(3, 0, bytes(200))
+    network.power(2, False)
+    network.send(3, 0, bytes(24), reliable=False)  # without a route it is given up
+    sender = network.nodes[3].component.data
+    figures = sender.figures()
+    assert (figures.messages_queued, figures.messages_given_up) == (1, 1)
+    assert (figures.messages_sent, figures.bytes_sent, figures.sent_s) == (2, 224, sent_s)
+    network.power(2, True)
+    assert network.run_until(lambda: sender.figures().messages_delivered == 1, 60.0)
+    assert sender.figures().messages_queued == 0
+    received = network.nodes[0].component.data.figures()
+    assert (received.messages_received, received.bytes_received) == (1, 200)
+    assert received.received_s > sent_s
+
+
 def test_after_a_restart_of_the_sender_its_messages_are_not_taken_for_old_ones(network):
     network.send(3, 0, b"before")
     network.run_for(1.0)
