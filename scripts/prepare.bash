@@ -11,7 +11,8 @@ simulation_requirements=(requirements/{console,http,mqtt,report,simulation}.txt)
 if [ -e "$noetic" ]; then
   ros_packages=(
     cmake g++ make python3-setuptools
-    ros-noetic-{catkin,diagnostic-msgs,diagnostic-updater,geometry-msgs,message-generation,message-runtime,rosbag}
+    ros-noetic-{actionlib,actionlib-msgs,catkin,diagnostic-msgs,diagnostic-updater,geometry-msgs}
+    ros-noetic-{message-generation,message-runtime,rosbag}
     ros-noetic-{rosbash,rosgraph-msgs,roslaunch,rosmsg,rosnode,rosparam,rospy,rosservice,rostest}
     ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
   )
@@ -21,10 +22,11 @@ else
   ros_packages=(
     catkin cmake g++ make python3-setuptools
     ros-core ros-message-generation ros-message-runtime rosbash
-    libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev librostest-dev
+    libactionlib-msgs-dev libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev librostest-dev
     libstd-msgs-dev libtf2-msgs-dev libvisualization-msgs-dev
-    ros-{diagnostic,geometry,rosgraph,std,tf2,visualization}-msgs
-    python3-{diagnostic,geometry,tf2,visualization}-msgs python3-diagnostic-updater
+    ros-{actionlib,diagnostic,geometry,rosgraph,std,tf2,visualization}-msgs
+    python3-{actionlib,diagnostic,geometry,tf2,visualization}-msgs
+    python3-actionlib python3-diagnostic-updater
     python3-rospy python3-rostest
   )
   screen_packages=(chromium libgl1 mosquitto libxtst6 tshark xvfb)

@@ -19,6 +19,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 # ROS and hardware are not needed to read the reference.
 autodoc_mock_imports = [
+    "actionlib",
     "diagnostic_msgs",
     "drone_mesh.msg",
     "drone_mesh.srv",

@@ -1,4 +1,4 @@
-"""Written by scripts/message_stubs from the files in msg/."""
+"""Written by scripts/message_stubs from the files in msg/ and action/."""
 
 from typing import Final, Sequence
 
@@ -29,6 +29,44 @@ class FlightOrderAnswer(Message):
     drone: int
     outcome: int
     def __init__(self, gateway: int = ..., drone: int = ..., outcome: int = ...) -> None: ...
+
+class FlyAction(Message): ...
+
+class FlyFeedback(Message):
+    state: str
+    latitude: float
+    longitude: float
+    height: float
+    distance: float
+    def __init__(
+        self,
+        state: str = ...,
+        latitude: float = ...,
+        longitude: float = ...,
+        height: float = ...,
+        distance: float = ...,
+    ) -> None: ...
+
+class FlyGoal(Message):
+    latitude: float
+    longitude: float
+    height: int
+    def __init__(
+        self,
+        latitude: float = ...,
+        longitude: float = ...,
+        height: int = ...,
+    ) -> None: ...
+
+class FlyResult(Message):
+    ARRIVED: Final = 1
+    REFUSED: Final = 2
+    NO_ROUTE: Final = 3
+    GIVEN_UP: Final = 4
+    CANCELLED: Final = 5
+    outcome: int
+    message: str
+    def __init__(self, outcome: int = ..., message: str = ...) -> None: ...
 
 class GroundedDrones(Message):
     ids: bytes

@@ -29,6 +29,7 @@ NODES = (
     "drone_manager",
     "wireless_signal_simulator",
     "mesh_host",
+    "fly_actions",
     "mesh_markers",
     "console",
 )

@@ -65,6 +65,7 @@ def loaded_by(program: Path) -> set[str]:
         ("drone_manager", WEB | REPORT),
         ("wireless_signal_simulator", WEB | REPORT),
         ("status", WEB | REPORT),
+        ("fly_actions", WEB | REPORT),
         ("mesh_markers", WEB | REPORT),
         ("console", REPORT | {"fastapi", "pybullet"}),
         ("report", WEB | {"pybullet"}),

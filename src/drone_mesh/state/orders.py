@@ -6,6 +6,7 @@ from typing import Iterable
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderState
+from drone_mesh.drone.interfaces import Location
 from drone_mesh.state.model import EventRecord
 
 _STATE_OF = {
@@ -16,6 +17,51 @@ _STATE_OF = {
     MeshEventKind.ORDER_GIVEN_UP.value: OrderState.GIVEN_UP,
     MeshEventKind.NO_ROUTE.value: OrderState.NO_ROUTE,
 }
+
+
+_OPEN = (OrderState.ASKED, OrderState.UNDER_WAY)
+
+
+class OrderProgress:
+    """Follows one order to its end, through all gateways that sent it."""
+
+    def __init__(self, drone: int, goal: Location, since_s: float) -> None:
+        """Events before `since_s` (simulated seconds) belong to other orders."""
+        self._drone = drone
+        self._sent = f"to {goal.in_words()}"
+        self._since_s = since_s
+        self._orders: dict[tuple[int, str], OrderState] = {}  # by gateway and its order
+        self.state = OrderState.ASKED
+        self.reason = ""  # of the state
+
+    @property
+    def was_sent(self) -> bool:
+        """Whether a gateway has reported that it sent the order."""
+        return bool(self._orders)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the drone has arrived, or no gateway's order is open any more."""
+        return self.state not in _OPEN
+
+    def take(self, event: EventRecord) -> None:
+        """Take over a new event; most have nothing to do with this order."""
+        state = _STATE_OF.get(event.kind)
+        if state is None or tuple(event.peers) != (self._drone,) or self.is_over:
+            return
+        order, _, words = event.detail.partition(": ")
+        key = event.node, order
+        if state is OrderState.ASKED and words == self._sent and event.stamp_s >= self._since_s:
+            self._orders.setdefault(key, state)
+        elif key in self._orders:
+            self._orders[key] = state
+            self._conclude(state, words)
+
+    def _conclude(self, state: OrderState, reason: str) -> None:
+        """`state` is that of the order that changed last."""
+        ended = all(other not in _OPEN for other in self._orders.values())
+        if state in _OPEN or state is OrderState.ARRIVED or ended:
+            self.state, self.reason = state, reason
 
 
 class OrderWatch:

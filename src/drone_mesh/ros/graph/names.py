@@ -82,6 +82,11 @@ def goal_topic(node_id: int) -> str:
     return f"/Drones/{node_id}/goal"
 
 
+def fly_action(node_id: int) -> str:
+    """Fly, an action: people -> fly_actions."""
+    return f"/Drones/{node_id}/fly"
+
+
 def gps_service(node_id: int) -> str:
     """RequestGPS, offered by the engine."""
     return f"/Drones/{node_id}/gps"

@@ -1,0 +1,254 @@
+"""The node /fly_actions: flights of drones as actions (docs/protocol.md, "Actions")."""
+
+from __future__ import annotations
+
+import functools
+import logging
+import math
+import queue
+import time
+from typing import Callable
+
+import actionlib
+import rospy
+
+from drone_mesh.communication.order_record import OrderState
+from drone_mesh.drone.interfaces import Location
+from drone_mesh.msg import (
+    FlyAction,
+    FlyFeedback,
+    FlyResult,
+    MeshEvent,
+    MeshState,
+    NodeState,
+)
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.conversions import event_record, location_of, whole_metres
+from drone_mesh.ros.graph.fleet_parameter import drones_if_known
+from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
+from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
+from drone_mesh.ros.graph.persistent_service import (
+    PersistentService,
+    ServiceGone,
+    ServiceRefused,
+)
+from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
+from drone_mesh.state.orders import OrderProgress
+
+LOOK_PERIOD_S = 1.0  # wall; our choice: how often the drones are compared with the actions
+ORDER_TIMEOUT_S = 10  # wall; longer than the DroneManager waits for a gateway
+SENT_WITHIN_S = 30.0  # wall; our choice: a gateway reports an order within a second
+CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the processes of this node and of a gateway
+
+_log = logging.getLogger(__name__)
+
+_OUTCOMES = {
+    OrderState.ARRIVED: FlyResult.ARRIVED,
+    OrderState.REFUSED: FlyResult.REFUSED,
+    OrderState.NO_ROUTE: FlyResult.NO_ROUTE,
+    OrderState.GIVEN_UP: FlyResult.GIVEN_UP,
+}
+
+
+class _Refused(Exception):
+    """An order did not leave: outcome and reason."""
+
+
+class _Flight:
+    """One accepted goal."""
+
+    def __init__(self, handle: actionlib.ServerGoalHandle, drone: int, since_s: float) -> None:
+        """`since_s`: simulated; no event of the order is older."""
+        self.handle = handle
+        self.drone = drone
+        self.goal = location_of(handle.get_goal())
+        self.progress = OrderProgress(drone, self.goal, since_s)
+        self.begun_s = time.monotonic()
+
+
+class FlyActions:
+    """Offers the flight of each drone as an action: /Drones/<id>/fly (Fly).
+
+    Subscribes: /mesh/events (MeshEvent); while a drone flies also /mesh/state (MeshState)
+    Calls:      /DroneManager/requestDroneMovement (RequestDroneFlight)
+    """
+
+    # One node for all drones, and no thread per drone: an action server of actionlib repeats its
+    # status five times a second in a thread of its own. Here `run` repeats the status of those
+    # that have goals. Threads of rospy only fill the queue; all else belongs to the thread of
+    # `run`, which orders one drone after the other.
+
+    def __init__(self) -> None:
+        rospy.set_param("~actionlib_status_frequency", 0)  # for actionlib: no thread
+        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._servers: dict[int, actionlib.ActionServer] = {}
+        self._flights: list[_Flight] = []
+        self._states: rospy.Subscriber | None = None
+        self._nodes: dict[int, NodeState] = {}
+        rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event_came)
+
+    def run(self) -> None:
+        """Serve until the node shuts down."""
+        looked_s = -math.inf
+        while not rospy.is_shutdown():
+            if time.monotonic() - looked_s >= LOOK_PERIOD_S:
+                looked_s = time.monotonic()
+                self._look()
+            try:
+                work = self._work.get(timeout=LOOK_PERIOD_S / 4)
+            except queue.Empty:
+                continue
+            work()
+
+    # Threads of rospy ------------------------------------------------------------------------
+
+    def _event_came(self, event: MeshEvent) -> None:
+        self._work.put(lambda: self._take_event(event))
+
+    def _state_came(self, state: MeshState) -> None:
+        self._work.put(lambda: self._take_state(state))
+
+    def _goal_came(self, drone: int, handle: actionlib.ServerGoalHandle) -> None:
+        self._work.put(lambda: self._begin(drone, handle))
+
+    def _cancel_came(self, handle: actionlib.ServerGoalHandle) -> None:
+        self._work.put(lambda: self._cancel(handle))
+
+    # The thread of `run` ---------------------------------------------------------------------
+
+    def _look(self) -> None:
+        """Offer the actions of the present drones and no others; end flights without news."""
+        try:
+            present = drones_if_known()
+        except NO_ANSWER as error:
+            _log.debug("the drones are not known: %s", error)
+            present = None
+        if present is not None:
+            for drone in self._servers.keys() - present.roles.keys():
+                self._withdraw(drone)
+            for drone in present.roles.keys() - self._servers.keys():
+                self._offer(drone)
+        for server in self._servers.values():
+            if server.status_list:
+                server.publish_status()
+        for flight in list(self._flights):
+            silent = time.monotonic() - flight.begun_s > SENT_WITHIN_S
+            if silent and not flight.progress.was_sent:
+                self._end(flight, FlyResult.GIVEN_UP, "no gateway reported that it sent the order")
+
+    def _offer(self, drone: int) -> None:
+        self._servers[drone] = server = actionlib.ActionServer(
+            names.fly_action(drone),
+            FlyAction,
+            functools.partial(self._goal_came, drone),
+            self._cancel_came,
+            auto_start=False,
+        )
+        server.start()
+
+    def _withdraw(self, drone: int) -> None:
+        for flight in [flight for flight in self._flights if flight.drone == drone]:
+            self._end(flight, FlyResult.GIVEN_UP, f"drone {drone} was removed")
+        server = self._servers.pop(drone)
+        server.started = False
+        # Not its stop(), which expects the thread that this node does without.
+        for topic in (server.goal_sub, server.cancel_sub, server.status_pub):
+            topic.unregister()
+        for publisher in (server.feedback_pub, server.result_pub):
+            publisher.unregister()
+
+    def _begin(self, drone: int, handle: actionlib.ServerGoalHandle) -> None:
+        flight = _Flight(handle, drone, rospy.get_time() - CLOCKS_DIFFER_S)
+        try:
+            _order(drone, flight.goal)
+        except _Refused as refusal:
+            outcome, why = refusal.args
+            handle.set_rejected(FlyResult(outcome, why), why)
+            return
+        handle.set_accepted()
+        self._flights.append(flight)
+        if self._states is None:
+            self._states = rospy.Subscriber(
+                names.STATE_TOPIC, MeshState, self._state_came, queue_size=1
+            )
+
+    def _cancel(self, handle: actionlib.ServerGoalHandle) -> None:
+        flight = next((f for f in self._flights if f.handle == handle), None)
+        if flight is None:  # rejected, or it has ended meanwhile
+            return
+        node = self._nodes.get(flight.drone)
+        try:
+            if node is None or not math.isfinite(node.position[0]):
+                raise _Refused(FlyResult.GIVEN_UP, "its place is not known")
+            x, y, z = node.position
+            _order(flight.drone, Location(latitude=y, longitude=x, height=max(0.0, z)))
+            why = f"ordered to stop at x {x:.1f} m, y {y:.1f} m, z {max(0.0, z):.0f} m"
+        except _Refused as refusal:
+            why = f"the drone flies on: {refusal.args[1]}"
+        self._forget(flight)
+        handle.set_canceled(FlyResult(FlyResult.CANCELLED, why), why)
+
+    def _take_event(self, event: MeshEvent) -> None:
+        record = event_record(event)
+        for flight in list(self._flights):
+            flight.progress.take(record)
+            if flight.progress.is_over:
+                state, reason = flight.progress.state, flight.progress.reason
+                self._end(flight, _OUTCOMES[state], reason)
+
+    def _take_state(self, state: MeshState) -> None:
+        self._nodes = {node.id: node for node in state.nodes}
+        for flight in self._flights:
+            node = self._nodes.get(flight.drone)
+            if node is not None:
+                x, y, z = node.position
+                left_m = Location(y, x, z).distance_m(flight.goal)
+                word = flight.progress.state.value
+                flight.handle.publish_feedback(FlyFeedback(word, y, x, z, left_m))
+
+    def _end(self, flight: _Flight, outcome: int, why: str) -> None:
+        self._forget(flight)
+        result = FlyResult(outcome, why)
+        if outcome == FlyResult.ARRIVED:
+            flight.handle.set_succeeded(result)
+        else:
+            flight.handle.set_aborted(result, why)
+
+    def _forget(self, flight: _Flight) -> None:
+        self._flights.remove(flight)
+        if not self._flights and self._states is not None:
+            self._states.unregister()
+            self._states, self._nodes = None, {}
+
+
+def _order(drone: int, goal: Location) -> None:
+    """Order a drone as anyone does. Raises _Refused."""
+    service = PersistentService(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, ORDER_TIMEOUT_S)
+    request = RequestDroneFlightRequest(
+        drone, goal.latitude, goal.longitude, whole_metres(goal.height)
+    )
+    try:
+        service.connect()
+        status = service.call(request).status
+    except ServiceGone:
+        raise _Refused(FlyResult.NO_ROUTE, "the DroneManager does not answer") from None
+    except ServiceRefused as error:
+        said = str(error).partition(" responded with an error: ")[2] or str(error)
+        raise _Refused(FlyResult.REFUSED, said) from None
+    finally:
+        service.close()
+    if status == 0:
+        raise _Refused(FlyResult.NO_ROUTE, "no gateway is running")
+    if status == 2:
+        raise _Refused(FlyResult.NO_ROUTE, f"no gateway has a route to drone {drone}")
+
+
+def main() -> None:
+    """Run the node."""
+    prepare_node(FlyActions.__doc__)
+    rospy.init_node("fly_actions")
+    show_library_logs_on_rosout()
+    actions = FlyActions()
+    MasterWatch().start()
+    actions.run()
