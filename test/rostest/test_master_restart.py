@@ -7,6 +7,7 @@ import contextlib
 import os
 import signal
 import subprocess
+import tempfile
 import unittest
 from typing import Iterator
 
@@ -25,14 +26,15 @@ class MasterRestartTest(unittest.TestCase):
         self.environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}"}
 
     @contextlib.contextmanager
-    def started(self, *command: str) -> Iterator[subprocess.Popen[bytes]]:
-        process = subprocess.Popen(
-            command,
-            env=self.environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+    def started(self, *command: str, output: str = os.devnull) -> Iterator[subprocess.Popen[bytes]]:
+        with open(output, "wb") as stdout:
+            process = subprocess.Popen(
+                command,
+                env=self.environment,
+                stdout=stdout,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
         try:
             yield process
         finally:
@@ -65,6 +67,10 @@ class MasterRestartTest(unittest.TestCase):
         read = self.run_tool("rostopic", "info", "/mesh/state").stdout
         return "* /mesh_markers" in shown and "* /mesh_markers" in read
 
+    def status_is_found(self) -> bool:
+        """Whether `status --watch` has registered."""
+        return "* /mesh_status" in self.run_tool("rostopic", "info", "/mesh/state").stdout
+
     def master_answers(self) -> bool:
         return rosgraph.is_master_online(self.environment["ROS_MASTER_URI"])
 
@@ -78,6 +84,10 @@ class MasterRestartTest(unittest.TestCase):
             wait_for("all connected", STARTED_WITHIN_S, self.all_connected)
             stack.enter_context(self.started("rosrun", "drone_mesh", "mesh_markers"))
             wait_for("the markers", STARTED_WITHIN_S, self.markers_are_found)
+            tables = stack.enter_context(tempfile.NamedTemporaryFile("r"))
+            watch = ("rosrun", "drone_mesh", "status", "--watch")
+            watcher = stack.enter_context(self.started(*watch, output=tables.name))
+            wait_for("a table", STARTED_WITHIN_S, lambda: "connected" in tables.read())
             for process in psutil.Process(first.pid).children(recursive=True):
                 process.kill()
             first.kill()
@@ -86,6 +96,10 @@ class MasterRestartTest(unittest.TestCase):
             wait_for("a new master", STARTED_WITHIN_S, self.master_answers)
             wait_for("the state found again", FOUND_WITHIN_S, self.all_connected)
             wait_for("the markers found again", FOUND_WITHIN_S, self.markers_are_found)
+            wait_for("the status found again", FOUND_WITHIN_S, self.status_is_found)
+            self.assertIsNone(watcher.poll(), "status --watch has ended")
+            tables.read()
+            wait_for("another table", FOUND_WITHIN_S, lambda: "connected" in tables.read())
             simulated = self.run_tool("rosparam", "get", "/use_sim_time")
             self.assertEqual(simulated.stdout.strip(), "true")
             order = ("/DroneManager/requestDroneMovement", "2", "3", "3", "0")

@@ -8,12 +8,14 @@ import sys
 import threading
 import time
 
+import rosgraph
 import rospy
 
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import join_graph, require_master, run_tool
+from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import mesh_status
+from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.views.look import WAIT_S, NoState, live_state, parse_with_bag, state_in_bag
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.trouble import all_connected, find_trouble
@@ -74,6 +76,7 @@ def _watch(colours: bool) -> int:
         came.set()
 
     rospy.Subscriber(names.STATE_TOPIC, MeshState, take, queue_size=1)
+    MasterWatch().start()  # after a restart of the master the states come again
     if not came.wait(WAIT_S):
         raise NoState
     try:
@@ -82,8 +85,9 @@ def _watch(colours: bool) -> int:
             text = mesh_table(mesh, colours)
             age_s = time.monotonic() - came_s
             if age_s > OLD_STATE_S:
-                require_master()
                 text += f"\nno state for {age_s:.0f} s"
+                if not rosgraph.is_master_online():
+                    text += ", and the ROS master does not answer"
             print(f"{CLEAR_SCREEN if colours else ''}{text}", flush=True)
             time.sleep(WATCH_PERIOD_S)
     except KeyboardInterrupt:
