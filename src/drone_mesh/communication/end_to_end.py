@@ -135,14 +135,6 @@ class EndToEnd:
         self._sequences[forward] = sequence = (before + 1) % _SEQUENCES
         return sequence
 
-    def proof_of(self, creator: int, to: int, message: bytes) -> bytes:
-        """The tag of a user's message between this node and another one; none for all nodes."""
-        key = self._keys.pair(creator, to) if to <= MAX_NODE_ID else None
-        if key is None:
-            return b""
-        made = bytes((creator, to)) + message
-        return hashlib.blake2s(made, key=key, digest_size=TAG_BYTES, person=b"message").digest()
-
     def is_gateway(self, node: int) -> bool:
         """Whether this node has proved to be a gateway."""
         return node in self._gateways

@@ -130,9 +130,13 @@ class IWirelessCommunication(abc.ABC):
         """How many of the 27 bytes behind the header of a packet the antenna itself needs."""
         return 0
 
-    def proof_of(self, creator: int, to: int, message: bytes) -> bytes:
-        """What shows that `creator` made a message of a user for `to`; empty without a key."""
-        return b""
+    def seal_message(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
+        """A user's message as only `to` can read it; unchanged without a key."""
+        return payload
+
+    def open_message(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
+        """The message; None unless `creator` sealed it for `to` and this place."""
+        return sealed
 
     def may_be_gateway(self, node: int) -> bool:
         """Whether to believe a packet on its way to another node that `node` is a gateway."""

@@ -22,6 +22,7 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.keys import Keys
 from drone_mesh.communication.medium import ChannelUse, Medium
+from drone_mesh.communication.message_seal import MessageSeal
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.seal import SEAL_AT, SEAL_BYTES, HopSeal
 from drone_mesh.communication.timing import MeshTiming
@@ -71,6 +72,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         fresh_s = FRESH_PERIODS * (timing or MeshTiming()).check_period_s
         self._seal = HopSeal(node_id, keys, rng, fresh_s)
         self._end_to_end = EndToEnd(node_id, keys, rng)
+        self._message_seal = MessageSeal(keys)
         self._mesh: IMeshNetwork | None = None
         self._present = b""  # the last one, for neighbours that could not open it
         self._unopened: dict[int, _Unopened] = {}
@@ -86,8 +88,11 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def reserved_bytes(self, kind: int) -> int:
         return reserved_bytes(kind)
 
-    def proof_of(self, creator: int, to: int, message: bytes) -> bytes:
-        return self._end_to_end.proof_of(creator, to, message)
+    def seal_message(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
+        return self._message_seal.seal(creator, to, place, payload)
+
+    def open_message(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
+        return self._message_seal.open(creator, to, place, sealed)
 
     def may_be_gateway(self, node: int) -> bool:
         return self._end_to_end.is_gateway(node)

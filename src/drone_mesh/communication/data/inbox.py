@@ -9,7 +9,7 @@ from typing import Callable
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
-from drone_mesh.communication.data.reassembly import Prove, Reassembly, Whole, no_proof
+from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole, open_plain
 
 ACK_DELAY_S = 0.02  # our choice: after a pause of this time, what is complete is acknowledged
 ACK_LATEST_S = 0.2  # our choice: and after this time without a pause
@@ -23,15 +23,15 @@ class Inbox:
     """Puts together what one sender sends, and says when to acknowledge what."""
 
     def __init__(
-        self, room: int, acknowledge: Callable[[Ack], None], prove: Prove = no_proof
+        self, room: int, acknowledge: Callable[[Ack], None], open_message: Open = open_plain
     ) -> None:
-        """`acknowledge` sends an ACK to the sender; `room`: bytes of a body; `prove`: see Prove."""
+        """`acknowledge` sends an ACK to the sender; `room`: bytes of a body."""
         self._room = room
-        self._prove = prove
+        self._open = open_message
         self._acknowledge = acknowledge
         self._session = -1
         self._former = (-1, -math.inf)  # the session before, and when it ended
-        self._reassembly = Reassembly(room, prove)
+        self._reassembly = Reassembly(room, open_message)
         self._ports: OrderedDict[tuple[int, bool], PortOrder] = OrderedDict()
         self._unacknowledged = 0  # fragments of complete messages
         self._complete = 0  # number of the latest complete reliable message
@@ -90,7 +90,7 @@ class Inbox:
         if self._session != -1:
             self._former = self._session, now_s
         self._session = session
-        self._reassembly = Reassembly(self._room, self._prove)
+        self._reassembly = Reassembly(self._room, self._open)
         self._ports.clear()
         self._unacknowledged, self.ack_due_s = 0, math.inf
         return True

@@ -15,7 +15,6 @@ from typing import Callable, Iterator, NamedTuple
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll
-from drone_mesh.communication.data.reassembly import Prove, no_proof
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
@@ -26,6 +25,15 @@ LEAST_WINDOW = 4
 MOST_WINDOW = 256  # our choice: six messages of 1,024 bytes
 MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
 NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
+
+
+Seal = Callable[[bytes, bytes], bytes]
+"""From the place and the payload of a message to what travels."""
+
+
+def leave_plain(_place: bytes, payload: bytes) -> bytes:
+    """For a mesh without a key."""
+    return payload
 
 
 class DataPacket(NamedTuple):
@@ -48,7 +56,7 @@ class Outgoing:
     def __init__(self, ticket: Ticket, payload: bytes, now_s: float) -> None:
         self.ticket = ticket
         self.payload = payload
-        self.sealed = b""  # the payload and its proof, once it is on its way
+        self.sealed = b""  # what travels, once it is on its way
         self.expires_s = now_s + LIFETIME_S
         self.head: Head | None = None  # once it is on its way
         self.to_send: deque[int] = deque()  # indices of fragments
@@ -82,13 +90,10 @@ class Lane:
         session: int,
         room: int,
         ended: Callable[[TicketState], None],
-        prove: Prove = no_proof,
+        seal: Seal = leave_plain,
     ) -> None:
-        """`room`: bytes of a body; `ended` is called with the last state of each message.
-
-        `prove`: see Prove.
-        """
-        self._prove = prove
+        """`room`: bytes of a body; `ended` is called with the last state of each message."""
+        self._seal = seal
         self.to = to
         self._ended = ended
         self._session = session
@@ -295,8 +300,7 @@ class Lane:
         ticket, payload = message.ticket, message.payload
         key = (ticket.port, ticket.reliable)
         order = self._orders.get(key, 0)
-        proof = self._prove(packets.identified(self._session, ticket.port, order, payload))
-        message.sealed = payload + proof
+        message.sealed = self._seal(packets.place_of(self._session, ticket.port, order), payload)
         check = packets.checksum(self._session, ticket.port, order, message.sealed)
         message.head = Head(
             self._number,

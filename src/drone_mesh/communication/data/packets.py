@@ -16,7 +16,7 @@ from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RE
 from drone_mesh.errors import MessageRefused, PacketError
 
 MAX_MESSAGE_BYTES = 1024
-PROOF_BYTES = 4  # behind the payload of a message in a mesh with a key
+SEAL_BYTES = 6  # behind the payload of a message in a mesh with a key
 FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
 ACK = 192  # what its creator has of a message
 POLL = 193  # asks for an ACK
@@ -25,6 +25,8 @@ ECHO_ANSWER = 195
 LEAST_ROOM = 20  # bytes of a body; with fewer, a long message would need more than 64 fragments
 
 _HEAD = struct.Struct("<BHBHHH")
+_PLACE = struct.Struct("<HBH")
+_LENGTH = struct.Struct("<H")
 _LENGTH_BITS = 11
 _RELIABLE = 1 << _LENGTH_BITS
 _BEHIND_SHIFT = _LENGTH_BITS + 1
@@ -84,14 +86,15 @@ COMPLETE = (1 << len(FRAGMENTS)) - 1  # as Ack.has
 DONE_BITS = 32  # of Ack.done
 
 
-def identified(session: int, port: int, order: int, payload: bytes) -> bytes:
-    """A message behind the fields that distinguish it from others with the same number."""
-    return struct.pack("<HBHH", session, port, order, len(payload)) + payload
+def place_of(session: int, port: int, order: int) -> bytes:
+    """What distinguishes a message from the others of its sender."""
+    return _PLACE.pack(session, port, order)
 
 
 def checksum(session: int, port: int, order: int, payload: bytes) -> int:
-    """CRC-16/CCITT over an identified message."""
-    return binascii.crc_hqx(identified(session, port, order, payload), 0xFFFF)
+    """CRC-16/CCITT over a message behind its place and length."""
+    made = place_of(session, port, order) + _LENGTH.pack(len(payload)) + payload
+    return binascii.crc_hqx(made, 0xFFFF)
 
 
 def count_of(length: int, room: int) -> int:
@@ -116,7 +119,7 @@ def head_of(body: bytes) -> Head:
     """What the body of fragment 0 says. Raises PacketError for an impossible length."""
     number, session, port, meta, order, check = _HEAD.unpack_from(body)
     length = meta & (1 << _LENGTH_BITS) - 1
-    if length > MAX_MESSAGE_BYTES + PROOF_BYTES:
+    if length > MAX_MESSAGE_BYTES + SEAL_BYTES:
         raise PacketError(f"a message of {length} bytes: at most {MAX_MESSAGE_BYTES} are allowed")
     return Head(
         number, session, port, length, bool(meta & _RELIABLE), meta >> _BEHIND_SHIFT, order, check

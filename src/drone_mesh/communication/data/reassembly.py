@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hmac
 from collections import OrderedDict
-from typing import Callable, NamedTuple
+from typing import Callable, NamedTuple, Optional
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.packets import COMPLETE, Head
@@ -14,13 +13,13 @@ MOST_PARTIAL = 24  # messages of one sender in the making; it has at most 16 on 
 _LIVE = 64  # numbers: an older message than this is not on its way any more
 
 
-Prove = Callable[[bytes], bytes]
-"""From a message to the proof that its sender made it for its receiver; empty without a key."""
+Open = Callable[[bytes, bytes], Optional[bytes]]
+"""From the place and the bytes of a message to what its sender wrote; None: not authentic."""
 
 
-def no_proof(_message: bytes) -> bytes:
+def open_plain(_place: bytes, sealed: bytes) -> bytes:
     """For a mesh without a key."""
-    return b""
+    return sealed
 
 
 class Whole(NamedTuple):
@@ -43,10 +42,10 @@ class _Partial:
 class Reassembly:
     """Puts the messages of one sender together. Memory: MOST_PARTIAL messages at most."""
 
-    def __init__(self, room: int, prove: Prove = no_proof) -> None:
-        """`room`: bytes of a body; `prove`: what must stand behind each message."""
+    def __init__(self, room: int, open_message: Open = open_plain) -> None:
+        """`room`: bytes of a body."""
         self._room = room
-        self._prove = prove
+        self._open = open_message
         self._partial: OrderedDict[int, _Partial] = OrderedDict()  # by number, oldest first
         self._done: OrderedDict[int, None] = OrderedDict()  # numbers of the latest complete ones
 
@@ -78,14 +77,13 @@ class Reassembly:
         return self._checked(head_now, payload)
 
     def _checked(self, head: Head, sealed: bytes) -> Whole | None:
-        """The message without its proof; None if it is damaged, or its sender did not make it."""
+        """The message as it was written; None if it is damaged, or its sender did not make it."""
         if packets.checksum(head.session, head.port, head.order, sealed) != head.checksum:
             return None
-        payload = sealed[: len(sealed) - len(self._prove(b""))]
-        proof = self._prove(packets.identified(head.session, head.port, head.order, payload))
-        if not hmac.compare_digest(proof, sealed[len(payload) :]):
+        payload = self._open(packets.place_of(head.session, head.port, head.order), sealed)
+        if payload is None or len(payload) > packets.MAX_MESSAGE_BYTES:
             return None
-        return Whole(head, payload) if len(payload) <= packets.MAX_MESSAGE_BYTES else None
+        return Whole(head, payload)
 
     def __len__(self) -> int:
         """Messages that are incomplete."""

@@ -289,8 +289,8 @@ class Transport:
             self._session = self._rng.randrange(1 << 16)
         lane = self._lanes.get(to)
         if lane is None:
-            prove = functools.partial(self._parts.antenna.proof_of, self._parts.node_id, to)
-            lane = self._lanes[to] = Lane(to, self._session, self._room, self._ended, prove)
+            seal = functools.partial(self._parts.antenna.seal_message, self._parts.node_id, to)
+            lane = self._lanes[to] = Lane(to, self._session, self._room, self._ended, seal)
         return lane
 
     def _ended(self, state: TicketState) -> None:
@@ -343,8 +343,8 @@ class Transport:
                 self._send_packet(packets.ACK, sender, packets.ack_body(ack))
 
             receiver = TO_ALL if to_all else self._parts.node_id
-            prove = functools.partial(self._parts.antenna.proof_of, sender, receiver)
-            inbox = self._inboxes[key] = Inbox(self._room, acknowledge, prove)
+            open_message = functools.partial(self._parts.antenna.open_message, sender, receiver)
+            inbox = self._inboxes[key] = Inbox(self._room, acknowledge, open_message)
         self._inboxes.move_to_end(key)
         return inbox
 

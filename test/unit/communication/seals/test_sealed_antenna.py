@@ -73,7 +73,7 @@ def test_orders_get_replies_and_messages_arrive():
     assert network.run_until(lambda: ticket.state.name == "DELIVERED", within_s=10.0)
 
 
-def test_the_longest_message_still_has_room_for_its_proof():
+def test_the_longest_message_still_has_room_for_its_seal():
     network = line(3, node_keys)
     network.run_for(30.0)
     ticket = network.send(0, 2, bytes(1024))
@@ -91,17 +91,17 @@ def test_a_relay_cannot_change_a_message(changes):
     def on_msg(payload, now_s):
         if changes and payload[2] == 128 and payload[4] == 2:
             head = packets.head_of(payload[5:])
-            sealed = b"o" + payload[16 : 15 + head.length]  # the right checksum, no right proof
+            sealed = b"o" + payload[16 : 15 + head.length]  # the right checksum, not the seal
             check = packets.checksum(head.session, head.port, head.order, sealed)
             head = head._replace(checksum=check)
             payload = payload[:5] + packets.first_body(head, sealed, 20) + payload[25:]
         return receive(payload, now_s)
 
     receive, relay.on_msg = relay.on_msg, on_msg
-    network.send(0, 2, b"close")
+    network.send(0, 2, b"shut")
     network.run_for(5.0)
     arrived = [message.payload for message in network.received.get(2, [])]
-    assert arrived == ([] if changes else [b"close"])
+    assert arrived == ([] if changes else [b"shut"])
 
 
 def test_two_keys_are_two_meshes(caplog):
