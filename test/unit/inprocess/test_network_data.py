@@ -8,5 +8,10 @@ def test_no_message_is_lost_or_comes_twice_or_out_of_order_when_packets_and_a_re
     assert {seed: problem for seed, problem in problems.items() if problem} == {}
 
 
+def test_nor_on_one_channel_that_all_nodes_share():
+    problems = {seed: data_cases.run_case(seed, "shared") for seed in range(10)}
+    assert {seed: problem for seed, problem in problems.items() if problem} == {}
+
+
 def test_the_same_seed_gives_the_same_run():
     assert data_cases.fingerprint(7) == data_cases.fingerprint(7)
