@@ -75,6 +75,9 @@ class CtrlCTest(unittest.TestCase):
     def test_while_the_mesh_runs(self) -> None:
         self.run_and_interrupt("started 31 nodes", "routers:=30")
 
+    def test_while_the_world_waits_for_its_next_step(self) -> None:
+        self.run_and_interrupt("started 2 nodes", "routers:=1", "real_time_factor:=0.001")
+
     def test_while_the_nodes_are_being_started(self) -> None:
         self.run_and_interrupt("fleet: gateways 1, routers 30", "routers:=30")
 

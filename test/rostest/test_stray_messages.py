@@ -15,24 +15,30 @@ import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, pid_of, wait_for
+from std_msgs.msg import String
 
 from drone_mesh.msg import DroneInfo
+from drone_mesh.ros.graph.direct_publisher import DirectPublisher
+from drone_mesh.ros.world.world_runner import STUCK_SUBSCRIBER_S
 
 STUCK = 30
+LARGE_BYTES = 100_000
 TAKEN_AWAY = "/taken/away"
 AGAIN_AND_AGAIN = "/taken/again"
 
 
-def subscribe_and_never_read(number: int) -> socket.socket:
-    """A subscriber of /clock that shakes hands and then leaves everything in its buffer."""
-    publisher = ServerProxy(rosgraph.Master("/test").lookupNode("/DroneFactory"))
-    _code, _text, protocol = publisher.requestTopic(f"/stuck_{number}", "/clock", [["TCPROS"]])
+def subscribe_and_never_read(
+    name: str, node: str = "/DroneFactory", topic: str = "/clock", kind: type = Clock
+) -> socket.socket:
+    """A subscriber that shakes hands and then leaves everything in its buffer."""
+    publisher = ServerProxy(rosgraph.Master("/test").lookupNode(node))
+    _code, _text, protocol = publisher.requestTopic(name, topic, [["TCPROS"]])
     _tcpros, host, port = protocol
     connection = socket.socket()
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
     connection.connect((host, port))
-    fields = {"callerid": f"/stuck_{number}", "topic": "/clock", "type": Clock._type}
-    lines = [f"{k}={v}".encode() for k, v in {**fields, "md5sum": Clock._md5sum}.items()]
+    fields = {"callerid": name, "topic": topic, "type": kind._type}
+    lines = [f"{k}={v}".encode() for k, v in {**fields, "md5sum": kind._md5sum}.items()]
     header = b"".join(struct.pack("<I", len(line)) + line for line in lines)
     connection.sendall(struct.pack("<I", len(header)) + header)
     return connection
@@ -86,13 +92,30 @@ class StrayMessagesTest(unittest.TestCase):
     def test_subscribers_of_the_clock_that_never_read_cost_the_world_no_thread(self) -> None:
         factory = psutil.Process(pid_of("/DroneFactory"))
         before = factory.num_threads()
-        stuck = [subscribe_and_never_read(number) for number in range(STUCK)]
+        stuck = [subscribe_and_never_read(f"/stuck_{number}") for number in range(STUCK)]
         self.addCleanup(lambda: [connection.close() for connection in stuck])
         for connection in stuck:  # the publisher's header comes first, then the ticks
             self.assertGreater(len(connection.recv(1)), 0)
         self.assertLess(factory.num_threads(), before + STUCK // 2)
         now_s = rospy.get_time()
         wait_for("the clock to go on", WALL_LIMIT_S, lambda: rospy.get_time() > now_s + 1.0)
+
+    def test_a_subscriber_that_never_reads_is_dropped_and_the_others_get_everything(self) -> None:
+        """With the publisher of /clock, and messages that fill the buffers of the kernel soon."""
+        publisher = DirectPublisher("/large", String, STUCK_SUBSCRIBER_S)
+        self.addCleanup(publisher.close)
+        heard: list[String] = []
+        reader = rospy.Subscriber("/large", String, heard.append)
+        self.addCleanup(reader.unregister)
+        stuck = subscribe_and_never_read("/stuck", rospy.get_name(), "/large", String)
+        self.addCleanup(stuck.close)
+        wait_for("both", WALL_LIMIT_S, lambda: len(publisher.connections()) == 2)
+        for sent in range(1, 1001):
+            publisher.publish(String("." * LARGE_BYTES))
+            wait_for("the reader has it", WALL_LIMIT_S, lambda: len(heard) == sent)  # noqa: B023
+            if len(publisher.connections()) == 1:
+                break
+        self.assertEqual(len(publisher.connections()), 1, "the stuck subscriber was not dropped")
 
 
 if __name__ == "__main__":
