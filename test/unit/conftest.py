@@ -1,6 +1,13 @@
-"""The order of the unit tests."""
+"""The order of the unit tests, and what hypothesis may make of a busy machine."""
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# How long one draw or one example takes says something about the machine's load, not about a test.
+settings.register_profile(
+    "busy machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("busy machine")
 
 
 def pytest_collection_modifyitems(items: "list[pytest.Item]") -> None:
