@@ -11,21 +11,20 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Callable, Iterator, NamedTuple
+from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, Outgoing
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
 
-LIFETIME_S = 240.0  # our choice: a loss is repaired within two minutes and a flight
 FIRST_WINDOW = 32  # our choice, in fragments: less than a message of 1,024 bytes
 LEAST_WINDOW = 4
 MOST_WINDOW = 256  # our choice: six messages of 1,024 bytes
 MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
 NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
-
 
 Seal = Callable[[bytes, bytes], bytes]
 """From the place and the payload of a message to what travels."""
@@ -34,51 +33,6 @@ Seal = Callable[[bytes, bytes], bytes]
 def leave_plain(_place: bytes, payload: bytes) -> bytes:
     """For a mesh without a key."""
     return payload
-
-
-class DataPacket(NamedTuple):
-    """A packet to be sent, but for its header."""
-
-    kind: int
-    body: bytes
-    message: Outgoing
-    ends_train: bool = False
-
-
-class Outgoing:
-    """One message on its way."""
-
-    __slots__ = (
-        "asked_s", "asks", "expires_s", "head", "known", "nonce", "payload", "sealed", "sent",
-        "ticket", "to_send", "whole",
-    )  # fmt: skip
-
-    def __init__(self, ticket: Ticket, payload: bytes, now_s: float) -> None:
-        self.ticket = ticket
-        self.payload = payload
-        self.sealed = b""  # what travels, once it is on its way
-        self.expires_s = now_s + LIFETIME_S
-        self.head: Head | None = None  # once it is on its way
-        self.to_send: deque[int] = deque()  # indices of fragments
-        self.whole = False  # whether each fragment has left at least once
-        self.sent = 0  # fragments that left, as bits
-        self.known = 0  # fragments that the receiver has, as bits
-        self.asked_s = math.inf  # since when an answer is awaited
-        self.asks = 0  # questions without an answer
-        self.nonce = 0  # of the latest POLL; 0: none
-
-    def begin_again(self) -> None:
-        """Nothing of it was sent."""
-        self.head = None
-        self.whole = False
-        self.to_send.clear()
-        self.sent = self.known = self.asks = self.nonce = 0
-        self.asked_s = math.inf
-
-    @property
-    def in_flight(self) -> int:
-        """Fragments that left and of which nothing is known."""
-        return bin(self.sent & ~self.known).count("1")
 
 
 class Lane:
@@ -130,7 +84,7 @@ class Lane:
             self._train = Train()
 
     def next_packet(self, now_s: float) -> DataPacket | None:
-        """What to send now; `left` or `failed` says what became of it."""
+        """What to send now; `left` follows if it could be sent."""
         train = self._train
         if train is None:
             return self._timely_poll(now_s) or self._fragment(now_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drone_mesh.communication.data.reassembly import Whole
 
-HOLD_S = 300.0  # our choice: longer than a sender tries (LIFETIME_S of lane.py)
+HOLD_S = 300.0  # our choice: longer than a sender tries (LIFETIME_S of outgoing.py)
 _HALF = 1 << 15
 
 

@@ -19,7 +19,8 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
 from drone_mesh.communication.data.flood import SeenFloods
 from drone_mesh.communication.data.inbox import Inbox
-from drone_mesh.communication.data.lane import Lane, Outgoing
+from drone_mesh.communication.data.lane import Lane
+from drone_mesh.communication.data.outgoing import Outgoing
 from drone_mesh.communication.data.packets import Ack
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import (

@@ -1,6 +1,6 @@
 import pytest
 
-from drone_mesh.communication.data.lane import LIFETIME_S
+from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, TicketState
 from drone_mesh.communication.data.transport import MOST_QUEUED
 from drone_mesh.communication.messages import is_data

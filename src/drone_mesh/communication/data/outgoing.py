@@ -1,0 +1,57 @@
+"""Outgoing: one message of a lane, and what is known of its fragments."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+from drone_mesh.communication.data.packets import Head
+from drone_mesh.communication.data.ticket import Ticket
+
+LIFETIME_S = 240.0  # our choice: a loss is repaired within two minutes and a flight
+
+
+class DataPacket(NamedTuple):
+    """A packet to be sent, but for its header."""
+
+    kind: int
+    body: bytes
+    message: Outgoing
+    ends_train: bool = False
+
+
+class Outgoing:
+    """One message on its way."""
+
+    __slots__ = (
+        "asked_s", "asks", "expires_s", "head", "known", "nonce", "payload", "sealed", "sent",
+        "ticket", "to_send", "whole",
+    )  # fmt: skip
+
+    def __init__(self, ticket: Ticket, payload: bytes, now_s: float) -> None:
+        self.ticket = ticket
+        self.payload = payload
+        self.sealed = b""  # what travels, once it is on its way
+        self.expires_s = now_s + LIFETIME_S
+        self.head: Head | None = None  # once it is on its way
+        self.to_send: deque[int] = deque()  # indices of fragments
+        self.whole = False  # whether each fragment has left at least once
+        self.sent = 0  # fragments that left, as bits
+        self.known = 0  # fragments that the receiver has, as bits
+        self.asked_s = math.inf  # since when an answer is awaited
+        self.asks = 0  # questions without an answer
+        self.nonce = 0  # of the latest POLL; 0: none
+
+    def begin_again(self) -> None:
+        """Nothing of it was sent."""
+        self.head = None
+        self.whole = False
+        self.to_send.clear()
+        self.sent = self.known = self.asks = self.nonce = 0
+        self.asked_s = math.inf
+
+    @property
+    def in_flight(self) -> int:
+        """Fragments that left and of which nothing is known."""
+        return bin(self.sent & ~self.known).count("1")
