@@ -6,7 +6,6 @@ import math
 import re
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from conftest import Visit
 
 # The fleet: gateway 0 at (-1, 0); 17 routers in rows of 6, 6 m apart, in range below 9 m.
@@ -373,25 +372,6 @@ def test_lost_links_of_a_crowd_fade_and_only_the_shortest_are_drawn(page):
     drawn, alpha = page.page.evaluate(DRAW_LOST, 20_000)
     assert drawn == 1500
     assert alpha == pytest.approx(0.25)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1400, 880), (390, 780)], ids=["desk", "phone"])
-def test_axe_finds_no_violation(start_console, visit, scheme, size):
-    width, height = size
-    page = visit(
-        start_console(*FAST).url,
-        viewport={"width": width, "height": height},
-        color_scheme=scheme,
-    )
-    page.wait_for_drones(len(PLACES))
-    page.page.keyboard.press("n")
-    page.page.keyboard.press("p")
-    page.page.wait_for_selector(".toast")
-    for tab in ("map", "nodes", "events", "charts") if width < 500 else ("map",):
-        page.page.evaluate(f"document.querySelector('nav button[data-tab={tab}]').click()")
-        results = Axe().run(page.page)
-        assert results.violations_count == 0, results.generate_report()
 
 
 def test_the_whole_table_fits_beside_the_map_at_1400_pixels(start_console, visit):

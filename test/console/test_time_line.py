@@ -105,6 +105,20 @@ def test_all_of_a_recording_that_is_played_can_be_looked_at_at_once(start_consol
     assert before_s - 0.5 <= clock_s(page) < 60.0  # the recording has two states a second
 
 
+@pytest.mark.parametrize("size", [(1400, 880), (390, 844)], ids=["desk", "phone"])
+def test_the_track_keeps_its_ends_when_the_past_begins_under_the_hand(start_console, visit, size):
+    page = visit(start_console(*HASTE).url, viewport={"width": size[0], "height": size[1]})
+    page.wait_for_drones(18)
+    page.wait_for("some time to look back at", lambda: clock_s(page) > 12.0)
+    before = page.page.locator("#time").bounding_box()
+    drag_to(page, 0.3)
+    page.wait_for("the past", lambda: page.page.is_visible("#time-play"))
+    after = page.page.locator("#time").bounding_box()
+    assert before is not None
+    assert after is not None
+    assert (before["x"], before["width"]) == (after["x"], after["width"])
+
+
 def test_the_map_stays_where_it_is_when_the_time_line_appears(start_console, visit):
     page = visit(start_console().url)
     before = page.page.locator("#map").bounding_box()

@@ -72,7 +72,8 @@ export class PacketDots {
     for (const [from, to, kind, age] of dots)
       this.#dots.push({ from, to, kind, start: now + START_MS - Math.min(START_MS, 1000 * age) });
     this.#dots = this.#dots.slice(-MOST_DOTS);
-    const text = carried > dots.length ? `1 of ${Math.round(carried / dots.length)} shown` : "";
+    const each = Math.round(carried / dots.length);
+    const text = each > 1 ? `1 of ${each} shown` : "";
     if (this.share.textContent !== text) this.share.textContent = text;
     this.canvas.dataset.carried = Number(this.canvas.dataset.carried ?? 0) + carried;
     if (this.#frame === null) this.#frame = requestAnimationFrame((time) => this.#draw(time));

@@ -49,7 +49,8 @@ export class TimeLine {
     const play = byId("time-play");
     play.textContent = paused ? "Play" : "Pause";
     play.setAttribute("aria-label", paused ? "play" : "pause");
-    byId("time-live").hidden = live || !this.mesh.hasPresent;
+    byId("time-live").hidden = !this.mesh.hasPresent;
+    byId("time-live").disabled = live;
     const speed = byId("time-factor");
     if (document.activeElement !== speed) speed.value = String(factor);
     this.#place();

@@ -1,0 +1,83 @@
+"""axe-core finds no violation in any state of the page."""
+
+from __future__ import annotations
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from conftest import Visit
+
+HASTE = ("--skip", "25", "--haste", "5")
+
+# An order stays held: axe may take longer than five seconds on a slow machine.
+KEEP_HELD = """() => {
+  const after = window.setTimeout;
+  window.setTimeout = (act, ms, ...rest) => (ms === 5000 ? 0 : after(act, ms, ...rest));
+}"""
+
+
+def check(page: Visit, state: str) -> None:
+    results = Axe().run(page.page)
+    assert results.violations_count == 0, f"{state}: {results.generate_report()}"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1400, 880), (390, 780)], ids=["desk", "phone"])
+def test_axe_finds_no_violation(start_console, visit, scheme, size):
+    width, height = size
+    page = visit(
+        start_console(*HASTE).url,
+        viewport={"width": width, "height": height},
+        color_scheme=scheme,
+    )
+    page.wait_for_drones(18)
+    keyboard = page.page.keyboard
+    check(page, "nothing selected")
+    keyboard.press("n")
+    keyboard.press("p")
+    page.page.wait_for_selector(".toast")
+    check(page, "a node, and a toast with a button")
+    for tab in ("nodes", "events", "charts", "map") if width < 500 else ():
+        page.page.click(f"nav button[data-tab={tab}]")
+        check(page, f"the tab {tab}")
+    page.page.fill("#fly-z", "1.5")
+    page.page.press("#fly-z", "Enter")
+    page.wait_for("a refusal", lambda: page.page.inner_text("#fly-error") != "")
+    check(page, "a refused position")
+    page.page.fill("#fly-z", "0")
+    page.page.fill("#fly-y", "90")
+    page.page.press("#fly-y", "Enter")
+    page.wait_for("the question", lambda: page.page.is_visible("#confirm"))
+    check(page, "the question before a long flight")
+    page.page.evaluate(KEEP_HELD)
+    page.page.click("#confirm >> text=Send")
+    page.wait_for("a held order", lambda: page.page.is_visible("#held"))
+    check(page, "a held order")
+    page.page.click("#held-undo")
+    page.page.click("#help-button")
+    check(page, "the keys")
+    keyboard.press("Escape")
+    page.page.locator("#time").press("Home")
+    page.wait_for("the past", lambda: page.page.is_visible("#past"))
+    check(page, "the past")
+    page.page.click("#time-live")
+    page.wait_for("the present", lambda: not page.page.is_visible("#past"))
+    if width > 500:
+        page.page.click("#nodes tr[data-id='3']")
+        page.page.click("#nodes tr[data-id='4']", modifiers=["Shift"])
+        page.wait_for("the group", lambda: page.page.is_visible("#group"))
+        check(page, "several drones")
+        page.page.click("#files-button")
+        check(page, "save and load")
+        keyboard.press("Escape")
+    page.page.click("#demonstrate")
+    page.wait_for("the story", lambda: page.page.is_visible("#story-card"))
+    check(page, "a demonstration")
+
+
+def test_axe_finds_no_violation_on_a_recording(start_console, visit):
+    page = visit(start_console(*HASTE, "--recording", "run.bag", "--recorded", "40").url)
+    page.wait_for_drones(18)
+    page.wait_for("the badge", lambda: page.page.is_visible("#badge"))
+    check(page, "a recording that is played")
+    page.page.locator("#time").press("End")
+    check(page, "another moment of it")
