@@ -1,20 +1,26 @@
 """MessageSeal: users' messages, secret and authentic from end to end (docs/security.md).
 
 A synthetic IV (Rogaway and Shrimpton, 2006; RFC 5297): the tag over a message and its place is also
-the nonce of its encryption, so nothing has to be drawn or stored. The encryption is counter mode
-over a pseudo-random function (Bellare et al., 1997). Both functions are keyed BLAKE2s (RFC 7693).
+the nonce of its encryption, so nothing has to be drawn or stored. The tag is keyed BLAKE2s (RFC
+7693), the encryption AES-128 in counter mode (NIST SP 800-38A).
 """
 
 from __future__ import annotations
 
 import hashlib
 import hmac
+from typing import Callable
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.keys import Keys
+from drone_mesh.errors import ConfigurationError
 
 TAG_BYTES = 6
-_BLOCK_BYTES = hashlib.blake2s.MAX_DIGEST_SIZE
+_KEY_BYTES = 16
+_BLOCK_BYTES = 16
+
+Encrypt = Callable[[bytes, bytes, bytes], bytes]
+"""Text encrypted with this key and nonce; the same again decrypts it."""
 
 
 class MessageSeal:
@@ -22,6 +28,7 @@ class MessageSeal:
 
     def __init__(self, keys: Keys) -> None:
         self._keys = keys
+        self._encrypted = _aes_in_counter_mode()
 
     def seal(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
         """The encrypted payload and its tag. `place` distinguishes the messages of a sender."""
@@ -30,7 +37,7 @@ class MessageSeal:
             return payload
         context = bytes((creator, to)) + place
         tag = _tag(key, context, payload)
-        return _encrypted(key, context + tag, payload) + tag
+        return self._encrypted(key, context + tag, payload) + tag
 
     def open(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
         """The payload; None unless `creator` sealed this for `to` and this place."""
@@ -41,7 +48,7 @@ class MessageSeal:
             return None
         context = bytes((creator, to)) + place
         tag = sealed[-TAG_BYTES:]
-        payload = _encrypted(key, context + tag, sealed[:-TAG_BYTES])
+        payload = self._encrypted(key, context + tag, sealed[:-TAG_BYTES])
         return payload if hmac.compare_digest(_tag(key, context, payload), tag) else None
 
     def _key(self, creator: int, to: int) -> bytes | None:
@@ -54,13 +61,21 @@ def _tag(key: bytes, context: bytes, payload: bytes) -> bytes:
     return hashlib.blake2s(made, key=key, digest_size=TAG_BYTES, person=b"message").digest()
 
 
-def _encrypted(key: bytes, nonce: bytes, text: bytes) -> bytes:
-    """`text` with the key stream of this nonce; the same again decrypts it."""
-    start = hashlib.blake2s(nonce, key=key, person=b"stream")
-    stream = bytearray()
-    for counter in range(-(-len(text) // _BLOCK_BYTES)):
-        block = start.copy()
-        block.update(counter.to_bytes(2, "little"))
-        stream += block.digest()
-    both = int.from_bytes(text, "little") ^ int.from_bytes(stream[: len(text)], "little")
-    return both.to_bytes(len(text), "little")
+def _aes_in_counter_mode() -> Encrypt:
+    # Only here: without a key, the mesh needs no such library.
+    try:
+        from cryptography.hazmat.primitives.ciphers import Cipher
+        from cryptography.hazmat.primitives.ciphers.algorithms import AES
+        from cryptography.hazmat.primitives.ciphers.modes import CTR
+    except ImportError as error:
+        raise ConfigurationError(
+            "a mesh key needs the Python package cryptography: pip install cryptography"
+        ) from error
+
+    def encrypted(key: bytes, nonce: bytes, text: bytes) -> bytes:
+        own = hashlib.blake2s(key=key, digest_size=_KEY_BYTES, person=b"encrypt").digest()
+        first_block = nonce.ljust(_BLOCK_BYTES, b"\0")  # the counter begins at its end
+        cipher = Cipher(AES(own), CTR(first_block)).encryptor()
+        return cipher.update(text) + cipher.finalize()
+
+    return encrypted
