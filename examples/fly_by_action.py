@@ -16,6 +16,7 @@ from actionlib_msgs.msg import GoalStatus
 from drone_mesh.msg import FlyAction, FlyFeedback, FlyGoal, FlyResult
 
 SERVER_WITHIN_S = 20.0  # simulated
+CANCELLED_WITHIN_S = 10.0  # simulated
 
 
 def show(feedback: FlyFeedback) -> None:
@@ -30,9 +31,12 @@ def main(drone: int, x: float, y: float, height: int) -> int:
     if not client.wait_for_server(rospy.Duration(SERVER_WITHIN_S)):
         print(f"drone {drone} has no action: start the simulation with actions:=true")
         return 1
-    rospy.core.add_preshutdown_hook(lambda _reason: client.cancel_goal())
     client.send_goal(FlyGoal(latitude=y, longitude=x, height=height), feedback_cb=show)
-    client.wait_for_result()
+    try:
+        client.wait_for_result()
+    except KeyboardInterrupt:
+        client.cancel_goal()
+        client.wait_for_result(rospy.Duration(CANCELLED_WITHIN_S))
     result = client.get_result()
     if client.get_state() == GoalStatus.SUCCEEDED:
         print("arrived")
@@ -45,6 +49,6 @@ if __name__ == "__main__":
     words = rospy.myargv()[1:]
     if len(words) not in (3, 4):
         sys.exit(__doc__)
-    rospy.init_node("fly_by_action", anonymous=True)
+    rospy.init_node("fly_by_action", anonymous=True, disable_signals=True)  # Ctrl-C is ours
     numbers = [float(word) for word in words]
     sys.exit(main(int(numbers[0]), numbers[1], numbers[2], int((numbers[3:] or [0])[0])))
