@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Callable, Sequence
+from typing import Iterator, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, PercentFormatter
@@ -12,9 +12,11 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.roles import Role
 from drone_mesh.report.drawing import figure_with_rows, svg_of
 from drone_mesh.report.story import RunStory
+from drone_mesh.state.model import EventRecord
 from drone_mesh.view.palette import LIGHT
 
 MOST_NAMED = 12  # events of one kind that are labelled; more would overlap
+MOST_IDS = 4  # of nodes in one label
 LABEL_POINTS = (8, 18)  # above their marks; labels close to each other alternate
 CLOSE_SHARE = 0.07  # of the run: labels closer than this would overlap
 MOST_BARS_NAMED = 40  # nodes whose ids all fit below their bars
@@ -35,8 +37,11 @@ def timeline_figure(story: RunStory) -> str:
     share.set_ylabel("routers connected")
     share.yaxis.set_major_formatter(PercentFormatter())
     _mark_events(share, story)
-    hops.plot(times, [s.most_hops for s in story.samples], color=LIGHT.accent, label="most")
-    hops.plot(times, [s.mean_hops for s in story.samples], color=LIGHT.gateway, label="mean")
+    # Where no router is connected, none has hops.
+    most = [s.most_hops if s.routers_connected else math.nan for s in story.samples]
+    mean = [s.mean_hops if s.routers_connected else math.nan for s in story.samples]
+    hops.plot(times, most, color=LIGHT.accent, label="most")
+    hops.plot(times, mean, color=LIGHT.gateway, label="mean")
     hops.set_ylabel("hops")
     hops.set_ylim(bottom=0)
     hops.yaxis.set_major_locator(MaxNLocator(4, integer=True))
@@ -64,22 +69,39 @@ def messages_figure(story: RunStory) -> str:
 
 
 def _mark_events(axes: Axes, story: RunStory) -> None:
-    marks: Sequence[tuple[MeshEventKind, str, str, Callable[[int], str]]] = (
-        (MeshEventKind.POWER_OFF, LIGHT.off, "v", lambda node: f"{node} off"),
-        (MeshEventKind.POWER_ON, LIGHT.off, "^", lambda node: f"{node} on"),
-        (MeshEventKind.FLIGHT_DECIDED, LIGHT.flying, "D", lambda node: f"{node} flies"),
+    marks: Sequence[tuple[MeshEventKind, str, str, str]] = (
+        (MeshEventKind.POWER_OFF, LIGHT.off, "v", "off"),
+        (MeshEventKind.POWER_ON, LIGHT.off, "^", "on"),
+        (MeshEventKind.FLIGHT_DECIDED, LIGHT.flying, "D", "flies"),
     )
-    length_s = story.samples[-1].stamp_s - story.samples[0].stamp_s
-    for kind, colour, shape, words in marks:
+    close_s = CLOSE_SHARE * (story.samples[-1].stamp_s - story.samples[0].stamp_s)
+    labels: list[tuple[float, str, str]] = []
+    for kind, colour, shape, word in marks:
         found = [event for event in story.events if event.kind == kind.value]
-        height, before_s = LABEL_POINTS[0], -math.inf
         for event in found:
             axes.plot([event.stamp_s], [104], marker=shape, color=colour, ms=6, clip_on=False)
-            if len(found) <= MOST_NAMED:
-                close = event.stamp_s - before_s < CLOSE_SHARE * length_s
-                height = LABEL_POINTS[close and height == LABEL_POINTS[0]]
-                before_s = event.stamp_s
-                axes.annotate(
-                    words(event.node), (event.stamp_s, 104), (4, height), size=8, color=colour,
-                    textcoords="offset points", annotation_clip=False,
-                )  # fmt: skip
+        if len(found) <= MOST_NAMED:
+            labels += [(at_s, text, colour) for at_s, text in grouped(found, word, close_s)]
+    height, before_s = LABEL_POINTS[0], -math.inf
+    for at_s, text, colour in sorted(labels):
+        close = at_s - before_s < close_s
+        height = LABEL_POINTS[close and height == LABEL_POINTS[0]]
+        before_s = at_s
+        axes.annotate(
+            text, (at_s, 104), (4, height), size=8, color=colour,
+            textcoords="offset points", annotation_clip=False,
+        )  # fmt: skip
+
+
+def grouped(
+    events: Sequence[EventRecord], word: str, close_s: float
+) -> Iterator[tuple[float, str]]:
+    """(time, text) of one label for all events, oldest first, within so many seconds."""
+    rest = list(events)
+    while rest:
+        first_s = rest[0].stamp_s
+        group = [event for event in rest if event.stamp_s - first_s < close_s]
+        rest = rest[len(group) :]
+        ids = list(dict.fromkeys(str(event.node) for event in group))
+        more = ", …" if len(ids) > MOST_IDS else ""
+        yield first_s, f"{', '.join(ids[:MOST_IDS])}{more} {word}"

@@ -35,7 +35,7 @@ def outages_figure(story: RunStory) -> str:
         if outage.connected_s is None:
             axes.text(end_s, row, " still disconnected", va="center", color=LIGHT.disconnected)
     axes.set_yticks(range(len(nodes)), [f"node {node}" for node in nodes])
-    axes.invert_yaxis()
+    axes.set_ylim(len(nodes) - 0.4, -0.6)  # the lowest id on top, and the same room in a crowd
     axes.set_xlabel("simulated time, s")
     figure.legend(loc="outside upper left", ncols=4, frameon=False, labelcolor=LIGHT.ink)
     return svg_of(figure)
