@@ -8,9 +8,7 @@ import subprocess
 import unittest
 
 import rostest
-from rostest_support import free_port
-
-LIMIT_S = 30.0
+from rostest_support import WALL_LIMIT_S, free_port
 
 
 class BadArgumentsTest(unittest.TestCase):
@@ -21,7 +19,7 @@ class BadArgumentsTest(unittest.TestCase):
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             env={**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"},
-            timeout=LIMIT_S,
+            timeout=WALL_LIMIT_S,
             check=False,
             text=True,
         )

@@ -21,7 +21,7 @@ import rostest
 from rostest_support import WALL_LIMIT_S, call, wait_for
 
 from drone_mesh.msg import MeshState
-from drone_mesh.srv import PowerSwitch
+from drone_mesh.srv import PowerSwitch, SetSpeed
 
 TOOLS = ("status", "snapshot", "report")
 NODES = (
@@ -148,7 +148,9 @@ class ToolsTest(unittest.TestCase):
             self.assertEqual(run("snapshot", f"{self.folder}/live.png").returncode, 0)
             call("/Nodes/2/powerSwitch", PowerSwitch, False)
             wait_for("3 is lost", WALL_LIMIT_S, lambda: self.connected() == 2)
+            call("/DroneFactory/setSpeed", SetSpeed, True, 0.0)  # before the repair mends it
             self.assertEqual(run("status").returncode, 1)
+            call("/DroneFactory/setSpeed", SetSpeed, False, 0.0)
             wait_for("the repair", 2 * WALL_LIMIT_S, lambda: self.connected() == 3)
             self.assertEqual(run("status").returncode, 0)
         finally:

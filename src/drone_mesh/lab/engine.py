@@ -100,7 +100,7 @@ def _children_ignore_ctrl_c() -> Iterator[None]:
 
 def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
     try:
-        from dask_jobqueue import SLURMCluster
+        from dask_jobqueue.slurm import SLURMCluster
     except ImportError as error:
         raise EngineError("--cluster slurm needs: pip install dask-jobqueue") from error
     if shutil.which("sbatch") is None:
@@ -113,7 +113,8 @@ def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
             f"~/.config/dask/jobqueue.yaml: {str(error).splitlines()[0]}"
         ) from error
     cluster.scale(jobs=max(1, workers))
-    return cluster  # type: ignore[no-any-return]
+    started: contextlib.AbstractContextManager[object] = cluster
+    return started
 
 
 def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
