@@ -83,7 +83,7 @@ pip_install() {
 }
 
 # can_check_javascript: eslint needs Node.js 18; Debian 11 has 12.
-can_check_javascript() { node -e 'process.exit(parseInt(process.versions.node) < 18)'; }
+can_check_javascript() { node -e 'process.exit(parseInt(process.versions.node) < 18 ? 1 : 0)'; }
 
 # npm_install: the checks of the page's JavaScript, unless these very versions are installed.
 npm_install() {
