@@ -15,6 +15,7 @@ from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Register
+from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.raspberry import radio_tests
 from drone_mesh.raspberry.bench_radio import BenchRadio
@@ -121,6 +122,27 @@ def test_the_channels_suggested_are_quiet_apart_and_in_the_band():
         heard[channel] = 0
     chosen = radio_tests.quietest(heard, 2)
     assert set(chosen) == {32, 72}
+
+
+class BusyMachine:
+    """Each sleep takes a second longer than the chip notices: the process waited for a core."""
+
+    def __init__(self, runtime: Runtime) -> None:
+        self._runtime = runtime
+        self._waited_s = 0.0
+
+    def now_s(self) -> float:
+        return self._runtime.now_s() + self._waited_s
+
+    def sleep(self, seconds: float) -> None:
+        self._runtime.sleep(seconds)
+        self._waited_s += 1.0
+
+
+def test_a_machine_that_is_busy_while_a_packet_is_sent_is_no_fault_of_the_radio(bench):
+    bench.radio.set_up()
+    bench.radio.runtime = BusyMachine(bench.radio.runtime)
+    assert not bench.radio.send(SETTINGS.node_address(5), bytes(32)).acknowledged
 
 
 @pytest.mark.slow
