@@ -176,12 +176,13 @@ class OrderBook:
         self._schedule()
 
     def _pursue(self, order: _Order) -> None:
-        order.unanswered += 1
         order.due_s = math.inf
         if order.seeking:
             if not self._seek(order):
                 self._no_route(order)
-        elif order.state is OrderState.ASKED:
+            return
+        order.unanswered += 1
+        if order.state is OrderState.ASKED:
             if order.unanswered >= len(REPEAT_AFTER_S):
                 self._move(order, OrderState.GIVEN_UP, "the drone did not reply")
                 return

@@ -67,6 +67,19 @@ def test_the_order_is_lost_if_three_searches_of_a_second_each_find_nothing():
     assert rig.kinds()[-1] == "NO_ROUTE"
 
 
+def test_searches_do_not_count_as_orders_without_a_reply():
+    rig = gateway_rig()
+    rig.hear(LOST_BEHIND_2)
+    rig.wait(2.5)
+    rig.hear(FROM_5_THROUGH_2)
+    assert len(rig.sent(ORDER)) == 1
+    rig.wait(29.0)
+    assert len(rig.sent(ORDER)) == 3
+    assert "ORDER_GIVEN_UP" not in rig.kinds()
+    rig.wait(2.0)
+    assert "ORDER_GIVEN_UP" in rig.kinds()
+
+
 def test_a_drone_whose_path_breaks_again_is_searched_for_three_times():
     rig = gateway_rig()
     rig.hear(LOST_BEHIND_2)

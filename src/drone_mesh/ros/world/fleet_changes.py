@@ -16,7 +16,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.node_presence import node_runs
 from drone_mesh.ros.graph.present_drones import PresentDrones
-from drone_mesh.ros.world.fleet_hands import FleetHands
+from drone_mesh.ros.world.drone_spawner import DroneSpawner
 from drone_mesh.srv import (
     AddDrone,
     AddDroneRequest,
@@ -45,7 +45,7 @@ class FleetChanges:
     def __init__(
         self,
         factory: DroneFactory,
-        hands: FleetHands,
+        spawner: DroneSpawner,
         watch: MasterWatch,
         needed: Mapping[int, str],
     ) -> None:
@@ -55,7 +55,7 @@ class FleetChanges:
         """
         self._needed = needed
         self._factory = factory
-        self._hands = hands
+        self._spawner = spawner
         self._watch = watch
         self._hosts: dict[int, str] = {}  # of drones added here: which ROS node runs their nodes
         self._worker = ThreadPoolExecutor(1, "fleet changes")
@@ -90,12 +90,12 @@ class FleetChanges:
     def _add(self, request: AddDroneRequest) -> AddDroneResponse:
         role = Role.GATEWAY if request.gateway else Role.ROUTER
         wanted = None if request.id == AddDroneRequest.LOWEST_FREE else request.id
-        drone = self._hands.put(role, request.longitude, request.latitude, wanted)
+        drone = self._spawner.spawn(role, request.longitude, request.latitude, wanted)
         node_id = drone.node_id
         host = self._least_busy_host()
         self._hosts[node_id] = host
         self._publish()
-        self._hands.start_node(node_id, role)
+        self._spawner.start_node(node_id, role)
         message = (
             f"added {role.word} {node_id} at x {request.longitude:g} m, y {request.latitude:g} m; "
             f"{self._await_start(node_id, host)}"
@@ -109,10 +109,10 @@ class FleetChanges:
             raise FleetRefused(f"drone {node_id} has to stay: {self._needed[node_id]}")
         self._hosts.pop(node_id, None)
         self._publish(without=node_id)
-        self._hands.end_node(node_id)
+        self._spawner.end_node(node_id)
         if not _comes_true(lambda: not node_runs(node_id)):
             _log.warning("the process of node %d does not end it", node_id)
-        self._hands.take(drone)
+        self._spawner.despawn(drone)
         message = f"removed {drone.ROLE.word} {node_id}"
         _log.info("%s", message)
         return RemoveDroneResponse(success=True, message=message)
@@ -120,7 +120,7 @@ class FleetChanges:
     def _least_busy_host(self) -> str:
         """The host with the fewest added drones; empty: there is none."""
         busy = Counter(self._hosts.values())
-        return min(self._hands.hosts(), key=lambda host: (busy[host], host), default="")
+        return min(self._spawner.hosts(), key=lambda host: (busy[host], host), default="")
 
     def _await_start(self, node_id: int, host: str) -> str:
         if not host:

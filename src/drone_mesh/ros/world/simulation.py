@@ -13,12 +13,12 @@ from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.host.emulated_radios import EmulatedRadios
 from drone_mesh.ros.host.mesh_host import MeshHost
+from drone_mesh.ros.world.drone_spawner import DroneSpawner
 from drone_mesh.ros.world.drone_views import drone_views
 from drone_mesh.ros.world.engine_server import EngineServers
 from drone_mesh.ros.world.external_engines import ExternalEngines
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.fleet_changes import FleetChanges
-from drone_mesh.ros.world.fleet_hands import FleetHands
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.ros.world.world_window import window_of
@@ -138,7 +138,7 @@ class Simulation:
         watch = MasterWatch(names.FLEET_PARAM, names.SIM_TIME_PARAM)
         changes = FleetChanges(
             self._factory,
-            FleetHands(self._factory, runner, state, engines, host, radios),
+            DroneSpawner(self._factory, runner, state, engines, host, radios),
             watch,
             MQTT_SENDER if configuration.internet == "mqtt" else {},
         )

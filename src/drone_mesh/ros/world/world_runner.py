@@ -29,7 +29,7 @@ _MEASURE_PERIOD_S = 1.0  # wall
 _LOG_PERIOD_S = 10.0  # wall
 _TOO_SLOW = 0.95  # of the requested factor
 _NAP_S = 0.001  # wall; while the mesh works off what is due
-_ERRAND_LOOK_S = 0.2  # wall; how soon the end of the world is noticed while waiting for it
+_TASK_LOOK_S = 0.2  # wall; how soon the end of the world is noticed while waiting for it
 _LONGEST_NAP_S = 0.05  # wall; a new speed or Ctrl-C takes effect after this at the latest
 
 _log = logging.getLogger(__name__)
@@ -54,7 +54,7 @@ class WorldRunner:
         self._hosts = PacedHosts(nodes)
         self._paused = False
         self._wanted = factor
-        self._errands: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+        self._tasks: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._over = threading.Event()
         self._clock = DirectPublisher(names.CLOCK_TOPIC, Clock, STUCK_SUBSCRIBER_S)
         self._factor = rospy.Publisher(names.FACTOR_TOPIC, Float32, latch=True, queue_size=1)
@@ -80,10 +80,10 @@ class WorldRunner:
         Raises FleetRefused if the simulation ends before.
         """
         future: Future[Result] = Future()
-        self._errands.append((function, future))
+        self._tasks.append((function, future))
         while True:
             try:
-                return future.result(_ERRAND_LOOK_S)
+                return future.result(_TASK_LOOK_S)
             except TimeoutError:
                 if self._over.is_set():
                     raise FleetRefused("the simulation ends") from None
@@ -95,7 +95,7 @@ class WorldRunner:
         logged_s = measured_s
         try:
             while not is_over():
-                self._run_errands()
+                self._run_tasks()
                 self._step_when_due(pace)
                 if time.monotonic() - measured_s[1] >= _MEASURE_PERIOD_S:
                     measured_s = self._measure(measured_s)
@@ -105,9 +105,9 @@ class WorldRunner:
         finally:
             self._over.set()
 
-    def _run_errands(self) -> None:
-        while self._errands:
-            function, future = self._errands.popleft()
+    def _run_tasks(self) -> None:
+        while self._tasks:
+            function, future = self._tasks.popleft()
             try:
                 future.set_result(function())
             except Exception as error:  # for the thread that waits

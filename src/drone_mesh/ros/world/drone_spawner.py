@@ -1,4 +1,4 @@
-"""FleetHands: what it takes to put one more drone into a running simulation, or to take one out."""
+"""DroneSpawner: spawns and despawns one drone of a running simulation, with its engine and node."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.factory import DroneFactory
 
 
-class FleetHands:
+class DroneSpawner:
     """Used by one thread. What changes the world waits for the thread of the world."""
 
     def __init__(
@@ -37,23 +37,23 @@ class FleetHands:
         self._host = host
         self._radios = radios
 
-    def put(
+    def spawn(
         self, role: Role, longitude: float, latitude: float, node_id: int | None
     ) -> VirtualDrone:
         """Put a drone into the world, and offer its engine. Raises FleetRefused."""
 
-        def put() -> VirtualDrone:
+        def spawn() -> VirtualDrone:
             drone = self._factory.add(role, longitude, latitude, node_id)
             if self._radios is not None:
                 self._radios.place(drone)
             return drone
 
-        drone = self._runner.between_steps(put)
+        drone = self._runner.between_steps(spawn)
         if self._engines is not None:
             self._engines.offer(drone)
         return drone
 
-    def take(self, drone: VirtualDrone) -> None:
+    def despawn(self, drone: VirtualDrone) -> None:
         """Withdraw the engine of a drone, and take it out of the world. Raises FleetRefused."""
         if self._engines is not None:
             self._engines.withdraw(drone.node_id)
