@@ -83,3 +83,4 @@ class Case:
 FULL = tuple(map(Case.parse, ("17/6", "100/6", "100/1", "254/6", "254/1", "17/6@0", "100/6+fly")))
 QUICK = tuple(map(Case.parse, ("17/6", "100/6", "17/6@0")))
 SOAK = Case.parse("100/6@0")
+OVERLOAD = Case.parse("254/6")

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Sequence
 
-from drone_mesh.bench import cases, inprocess, report, soak
+from drone_mesh.bench import cases, inprocess, overload, report, soak
 from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import RosResult, measure
 from drone_mesh.bench.progress import Progress
@@ -34,6 +34,7 @@ examples:
   rosrun drone_mesh bench --quick
   rosrun drone_mesh bench --sizes 100/6 100/1 --launch hosts:=2 --json result.json
   rosrun drone_mesh bench --hours 1                    an hour: memory, threads, connections
+  rosrun drone_mesh bench --busy 2 4 8                 does a busy machine lose connections?
   python3 -m drone_mesh.bench --only inprocess         needs no ROS
 """
 
@@ -43,6 +44,12 @@ def _positive(text: str) -> float:
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"invalid value {text}: must be above 0")
     return value
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"invalid number {text}: must be whole, 0 or more")
+    return int(text)
 
 
 def _size(text: str) -> Case:
@@ -81,7 +88,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seconds",
         type=_positive,
-        help=f"wall seconds to measure each size; default: {WINDOW_S:g}",
+        help=f"seconds to measure each size, of wall time (default: {WINDOW_S:g}); with --busy of "
+        "simulated time",
     )
     parser.add_argument(
         "--hours",
@@ -89,6 +97,15 @@ def make_parser() -> argparse.ArgumentParser:
         help="instead of the tables: run one size (default: "
         f"{_in_short(cases.SOAK)}) for this many hours of simulated time and report whether "
         "memory, threads or connections grow",
+    )
+    parser.add_argument(
+        "--busy",
+        nargs="+",
+        type=_count,
+        metavar="LOOPS",
+        help="instead of the tables: run one size (default: "
+        f"{_in_short(cases.OVERLOAD)}) for {overload.SIMULATED_S:g} simulated seconds beside each "
+        "of these numbers of programs that never wait, and report how many connections are lost",
     )
     parser.add_argument(
         "--launch",
@@ -128,6 +145,7 @@ class Benchmark:
         self._failed: list[dict[str, str]] = []
         self._inprocess: list[inprocess.InProcessResult] = []
         self._soak: soak.SoakResult | None = None
+        self._overload: list[overload.OverloadResult] = []
         self._key = None if options.key_file is None else read_key_file(options.key_file)
 
     def run(self) -> int:
@@ -136,6 +154,8 @@ class Benchmark:
         try:
             if options.hours is not None:
                 self._run_soak()
+            elif options.busy is not None:
+                self._run_overload()
             else:
                 if options.only != INPROCESS:
                     self._run_ros()
@@ -148,7 +168,8 @@ class Benchmark:
             return EXIT_INTERRUPTED
         self._print_results()
         grew = self._soak is not None and (verdict := self._soak.verdict()) and not verdict.steady
-        return EXIT_FAILED if self._failed or grew else 0
+        lost = any(result.disconnected for result in self._overload)
+        return EXIT_FAILED if self._failed or grew or lost else 0
 
     def _run_ros(self) -> None:
         options = self._options
@@ -189,6 +210,29 @@ class Benchmark:
         except BenchmarkError as error:
             self._fail(case, error)
 
+    def _run_overload(self) -> None:
+        options = self._options
+        check_environment()
+        case = options.sizes[0] if options.sizes else cases.OVERLOAD
+        self._progress.begin(f"{case}, busy loops")
+
+        def show(result: overload.OverloadResult) -> None:
+            self._overload.append(result)
+            print(report.overload_line(result), flush=True)
+
+        try:
+            overload.overload(
+                case,
+                options.busy,
+                options.launch,
+                self._port(),
+                self._progress,
+                show,
+                options.seconds or overload.SIMULATED_S,
+            )
+        except BenchmarkError as error:
+            self._fail(case, error)
+
     def _port(self) -> int:
         port: int = self._options.port or free_port()
         return port
@@ -221,6 +265,7 @@ class Benchmark:
             "machine": asdict(self._machine),
             "ros": [asdict(result) for result in self._ros],
             "inprocess": [asdict(result) for result in self._inprocess],
+            "overload": [asdict(result) for result in self._overload],
             "soak": None if self._soak is None else soak.as_json(self._soak),
             "failed": self._failed,
         }

@@ -115,6 +115,10 @@ class Watch:
             return max(0.0, connected_s - max(started.values()))
         return self.all_connected.sim_s - self.all_on.sim_s
 
+    def disconnected_since(self, sim_s: float) -> int:
+        """How many times a node lost its connection after `sim_s`, by the events so far."""
+        return sum(h.kind == DISCONNECTED and h.sim_s > sim_s for h in tuple(self._happenings))
+
     def total(self, name: str) -> float | None:
         """The sum of a figure over all sources; None: no source publishes it."""
         values = [figures.values[name] for figures in self._sources_of(name)]

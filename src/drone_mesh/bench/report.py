@@ -10,6 +10,7 @@ from typing import Sequence
 
 from drone_mesh.bench.inprocess import InProcessResult
 from drone_mesh.bench.measurement import RosResult
+from drone_mesh.bench.overload import OverloadResult
 from drone_mesh.bench.soak import Sample, SoakResult
 
 UNKNOWN = "-"
@@ -192,6 +193,16 @@ def inprocess_table(results: Sequence[InProcessResult]) -> str:
                 for result in results
             ],
         )
+    )
+
+
+def overload_line(result: OverloadResult) -> str:
+    """One line per number of busy loops."""
+    return (
+        f"{result.drones} drones, {result.spacing_m:g} m, {result.busy_loops} busy loops: "
+        f"{result.disconnected} disconnected in {result.simulated_s:.0f} simulated seconds, "
+        f"{result.routers_connected} routers connected at the end, "
+        f"real-time factor {result.reached_real_time_factor:.2f}"
     )
 
 

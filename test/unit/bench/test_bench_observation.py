@@ -113,3 +113,16 @@ def test_figures_add_up_over_their_sources_and_the_worst_is_remembered():
     assert watch.received_s("sent") == 3.0
     assert watch.total("unheard of") is None
     assert watch.received_s("unheard of") == 0.0
+
+
+def test_connections_lost_before_the_measurement_do_not_count():
+    watch = watch_of(
+        3,
+        Happening(4.0, 1, DISCONNECTED),
+        Happening(5.0, 1, CONNECTED),
+        look(6.0, on=3, connected=2),
+        Happening(7.0, 1, DISCONNECTED),
+        Happening(7.5, 2, DISCONNECTED),
+        Happening(8.0, 1, CONNECTED),
+    )
+    assert watch.disconnected_since(6.0) == 2

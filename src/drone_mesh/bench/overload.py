@@ -1,0 +1,122 @@
+"""Runs beside programs that never wait: does an overloaded machine lose connections?"""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+from dataclasses import dataclass
+from typing import Callable, Iterator, Sequence
+
+from drone_mesh.bench.cases import Case
+from drone_mesh.bench.measurement import CONNECTED_WITHIN_S, await_all_on
+from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.system import BenchmarkError, System
+
+SIMULATED_S = 300.0
+SECOND_WITHIN_S = 60.0  # wall, for each simulated second; slower counts as standing still
+
+
+@dataclass(frozen=True)
+class OverloadResult:
+    """One fleet beside a number of busy loops."""
+
+    drones: int
+    spacing_m: float
+    busy_loops: int
+    simulated_s: float
+    wall_s: float
+    disconnected: int  # events of any node
+    routers_connected: int  # at the end
+
+    @property
+    def reached_real_time_factor(self) -> float:
+        """Simulated seconds per second."""
+        return self.simulated_s / self.wall_s
+
+
+@contextlib.contextmanager
+def busy_loops(count: int) -> Iterator[None]:
+    """`count` processes that never wait.
+
+    Each has a session of its own; otherwise the kernel's autogroups would give all of them
+    together the share of one.
+    """
+    command = [sys.executable, "-c", "while True: pass"]
+    loops = [subprocess.Popen(command, start_new_session=True) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+        for loop in loops:
+            loop.wait()
+
+
+def overload(
+    case: Case,
+    counts: Sequence[int],
+    launch_args: list[str],
+    port: int,
+    progress: Progress,
+    on_result: Callable[[OverloadResult], None],
+    simulated_s: float = SIMULATED_S,
+) -> None:
+    """Run one fleet, once all are connected, beside each number of busy loops in turn.
+
+    `on_result` gets each result at once.
+
+    Raises BenchmarkError when it does not start or connect, ends by itself or stands still.
+    """
+    with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
+        await_all_on(system, case, progress)
+        watch = system.watch
+        if not system.wait_for(
+            lambda: watch.all_connected is not None,
+            CONNECTED_WITHIN_S,
+            lambda: progress.say("waiting until all are connected"),
+        ):
+            raise BenchmarkError(f"not all connected after {CONNECTED_WITHIN_S:g} s")
+        for count in counts:
+            with busy_loops(count):
+                result = _run(system, case, count, simulated_s, progress)
+            progress.clear()
+            on_result(result)
+    progress.clear()
+
+
+def _run(
+    system: System, case: Case, count: int, simulated_s: float, progress: Progress
+) -> OverloadResult:
+    watch = system.watch
+    first = watch.last
+    assert first is not None
+    end_s = first.sim_s + simulated_s
+    next_s = first.sim_s
+    while next_s < end_s:
+        next_s = min(end_s, next_s + 1.0)
+
+        def reached(sim_s: float = next_s) -> bool:
+            return watch.last is not None and watch.last.sim_s >= sim_s
+
+        def say(sim_s: float = next_s) -> None:
+            progress.say(
+                f"{count} busy loops: simulated {simulated_s - end_s + sim_s:.0f} s of "
+                f"{simulated_s:g} s, {watch.disconnected_since(first.sim_s)} disconnected"
+            )
+
+        if not system.wait_for(reached, SECOND_WITHIN_S, say):
+            raise BenchmarkError(
+                f"{count} busy loops: a simulated second takes more than {SECOND_WITHIN_S:g} s"
+            )
+    last = watch.last
+    assert last is not None
+    return OverloadResult(
+        drones=case.drones,
+        spacing_m=case.spacing_m,
+        busy_loops=count,
+        simulated_s=last.sim_s - first.sim_s,
+        wall_s=last.wall_s - first.wall_s,
+        disconnected=watch.disconnected_since(first.sim_s),
+        routers_connected=last.connected,
+    )
