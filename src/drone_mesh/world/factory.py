@@ -67,12 +67,13 @@ class DroneFactory:
         drones = {drone.node_id: drone for drone in self.drones}
         if len(drones) == MAX_DRONES:
             raise FleetRefused(f"the fleet is full: node ids allow at most {MAX_DRONES} drones")
+        lowest_free = min(set(range(MAX_DRONES)) - drones.keys())
         if node_id is None:
-            node_id = min(set(range(MAX_DRONES)) - drones.keys())
+            node_id = lowest_free
         if not 0 <= node_id < MAX_DRONES:
             raise FleetRefused(f"invalid drone id {node_id}: must be 0..{MAX_DRONES - 1}")
         if node_id in drones:
-            raise FleetRefused(f"drone {node_id} exists already: choose another id")
+            raise FleetRefused(f"drone {node_id} exists already; the lowest free id is {lowest_free}")
         place = StartPlace(node_id, role, longitude, latitude)
         self._check_place(place)
         drones[node_id] = self._make(place)

@@ -49,7 +49,7 @@ def test_drones_are_listed_by_id_whatever_the_order_in_which_they_were_added():
 @pytest.mark.parametrize(
     ("longitude", "latitude", "node_id", "why"),
     [
-        (9.0, 9.0, 2, "drone 2 exists already"),
+        (9.0, 9.0, 2, "drone 2 exists already; the lowest free id is 4"),
         (9.0, 9.0, 254, "invalid drone id 254: must be 0..253"),
         (9.0, 9.0, -1, "invalid drone id -1: must be 0..253"),
         (math.nan, 9.0, None, "invalid place: longitude nan is not a finite number"),
