@@ -73,7 +73,9 @@ class DroneFactory:
         if not 0 <= node_id < MAX_DRONES:
             raise FleetRefused(f"invalid drone id {node_id}: must be 0..{MAX_DRONES - 1}")
         if node_id in drones:
-            raise FleetRefused(f"drone {node_id} exists already; the lowest free id is {lowest_free}")
+            raise FleetRefused(
+                f"drone {node_id} exists already; the lowest free id is {lowest_free}"
+            )
         place = StartPlace(node_id, role, longitude, latitude)
         self._check_place(place)
         drones[node_id] = self._make(place)
