@@ -17,7 +17,6 @@ from drone_mesh.nrf24.registers import (
     ARD,
     ERX,
     MAX_RT,
-    RF_PWR,
     RX_EMPTY,
     STATUS_FLAGS,
     TX_DS,
@@ -25,7 +24,7 @@ from drone_mesh.nrf24.registers import (
     Register,
 )
 from drone_mesh.nrf24.runtime import Runtime
-from drone_mesh.nrf24.settings import RadioSettings, TxPower
+from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 
 POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms [DS Table 16]
@@ -60,6 +59,7 @@ class BenchRadio:
     ) -> None:
         self.link = ChipLink(spi)
         self.settings = settings
+        self.node_id = node_id
         self.runtime = runtime
         self._spi, self._ce = spi, ce
         self._registers = settings.registers(node_id)
@@ -108,10 +108,11 @@ class BenchRadio:
         self.link.write_byte(Register.RF_CH, self.settings.channel)
         self._ce.value = True
 
-    def set_power(self, power: TxPower) -> None:
-        """Send with this power from now on."""
-        before = self.link.read_byte(Register.RF_SETUP)
-        self.link.write_byte(Register.RF_SETUP, RF_PWR.put(list(TxPower).index(power), before))
+    def use(self, settings: RadioSettings) -> None:
+        """Go on with these settings. RadioError if the chip does not have them."""
+        self.settings = settings
+        self._registers = settings.registers(self.node_id)
+        self.set_up()
 
     def send(self, to: bytes, payload: bytes, retransmits: int = 0) -> Sent:
         """Send with acknowledgement. Raises NeitherSentNorFailed."""

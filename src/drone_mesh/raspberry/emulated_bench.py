@@ -9,30 +9,22 @@ from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
-from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.range_test import answer
 
 PARTNER_ID = 1
 
 
 class EmulatedPartner:
-    """Node 1 at this place; it acknowledges what it receives, and presents nothing itself."""
+    """Node 1 at this place; it acknowledges what it receives, and follows a range measurement."""
 
     def __init__(self, clock: WallClock, settings: RadioSettings, place: Location) -> None:
         self._air = Air(clock, LogDistance(random.Random()), random.Random())
         chip = EmulatedChip(self._air, "partner", place.to_vector())
-        self._radio = NRF24LowLevelInterface(
-            chip.spi,
-            chip.ce,
-            chip.irq,
-            node_id=PARTNER_ID,
-            settings=settings,
-            runtime=clock.runtime,
-        )
-        self._radio.begin()
-        self._runtime = clock.runtime
+        self._radio = BenchRadio(chip.spi, chip.ce, PARTNER_ID, settings, clock.runtime)
         self._ended = False
-        self._reading = clock.runtime.start(self._read, "partner")
+        self._answering = clock.runtime.start(self._answer, "partner")
 
     def other_chip(self) -> EmulatedChip:
         """The chip that the tools work on, at (0, 0, 0)."""
@@ -41,9 +33,9 @@ class EmulatedPartner:
     def close(self) -> None:
         """Stop answering."""
         self._ended = True
-        self._reading.join()
+        self._answering.join()
         self._radio.close()
 
-    def _read(self) -> None:
-        while not self._ended:
-            self._radio.receive(0.1)
+    def _answer(self) -> None:
+        for _ in answer(self._radio, lambda: self._ended):
+            pass

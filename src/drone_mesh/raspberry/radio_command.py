@@ -19,12 +19,13 @@ from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice, open_spi
-from drone_mesh.raspberry import radio_tests
+from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.bench_radio import BenchRadio
 from drone_mesh.raspberry.emulated_bench import PARTNER_ID, EmulatedPartner
 from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
 
 REPORT_ROUNDS = 20
+USUAL_NODES = 17  # our choice: the field case
 DISSECTOR = Path(__file__).with_name("drone_mesh.lua")
 
 
@@ -47,9 +48,12 @@ def _tool(options: argparse.Namespace, radio: BenchRadio, irq: IrqPin | None) ->
     if options.tool == "check":
         return radio_tests.check(radio, irq)
     if options.tool == "scan":
-        return radio_tests.scan(radio, options.rounds)
+        return radio_tests.scan(radio, options.rounds, options.nodes)
     if options.tool == "range":
-        return radio_tests.measure_range(radio, options.to, options.packets, options.distance)
+        rates = tuple(DATA_RATES.values()) if options.all_rates else ()
+        return range_test.measure_range(radio, options.to, options.packets, options.distance, rates)
+    if options.tool == "answer":
+        return range_test.answer(radio, lambda: False)
     if options.tool == "listen":
         until_s = time.monotonic() + options.seconds
         return _listen(radio, lambda: time.monotonic() >= until_s, options.pcapng)
@@ -80,7 +84,7 @@ def _report(radio: BenchRadio, irq: IrqPin | None, file: Path) -> Iterator[str]:
     ]
     for part, made in (
         ("check", radio_tests.check(radio, irq)),
-        ("scan", radio_tests.scan(radio, REPORT_ROUNDS)),
+        ("scan", radio_tests.scan(radio, REPORT_ROUNDS, USUAL_NODES)),
     ):
         lines.append(f"== {part}")
         try:
@@ -165,14 +169,28 @@ def _parser() -> argparse.ArgumentParser:
     )
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
     tools.add_parser("check", help="test wiring, SPI, CE, supply and IRQ")
-    scan = tools.add_parser("scan", help="show the 126 channels as bars, and the quietest ones")
+    scan = tools.add_parser("scan", help="show the 126 channels as bars; suggest channel and rate")
     scan.add_argument("--rounds", type=whole(1, 10_000), default=100, help="(default: %(default)s)")
+    scan.add_argument(
+        "--nodes",
+        type=whole(1, MAX_NODE_ID + 1),
+        default=USUAL_NODES,
+        help="size of the mesh, which decides the suggested rate (default: %(default)s)",
+    )
     reach = tools.add_parser("range", help="measure the loss to a node at each power, as CSV")
     reach.add_argument("--to", type=whole(0, MAX_NODE_ID), required=True, help="id of that node")
     reach.add_argument(
         "--packets", type=whole(1, 100_000), default=1000, help="(default: %(default)s)"
     )
     reach.add_argument("--distance", type=float, help="metres, to compare with the figures of 2019")
+    reach.add_argument(
+        "--all-rates",
+        action="store_true",
+        help="at each rate too; 'answer' must run at that node, with the same --rate as here",
+    )
+    tools.add_parser(
+        "answer", help="be the far end of 'range --all-rates': acknowledge, and follow its rates"
+    )
     ear = tools.add_parser("listen", help="print packets to all nodes and to --id, decoded")
     ear.add_argument("--seconds", type=float, default=float("inf"), help="(default: until Ctrl-C)")
     ear.add_argument(

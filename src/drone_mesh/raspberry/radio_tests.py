@@ -1,4 +1,4 @@
-"""The field tools' work: check a radio, scan the band, measure a range, listen. Output is lines."""
+"""The field tools' work: check a radio, scan the band, listen. Output is lines."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from typing import Callable, Iterator
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.messages import MessageType
-from drone_mesh.nrf24.emulator.measured import measured_losses
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import IrqPin
 from drone_mesh.nrf24.registers import Register
-from drone_mesh.nrf24.settings import TxPower
 from drone_mesh.raspberry.bench_radio import BenchRadio
 
 Lines = Iterator[str]
@@ -23,6 +21,8 @@ CHANNELS = 126
 BAR = 40  # columns of a bar
 BAND_END = 83  # the licence-free band ends at 2483.5 MHz
 WIFI = ((1, 12), (6, 37), (11, 62))  # Wi-Fi channel and its middle, as a channel of the radio
+MOST_NODES = ((50, "250k"), (101, "1M"), (254, "2M"))  # docs/performance.md, "The shared channel"
+_RATES_IN_WORDS = ", ".join(f"{rate} for up to {most}" for most, rate in MOST_NODES)
 USERS_DATA = 255  # a type that no node processes
 PATTERNS = (bytes(5), b"\xff" * 5, b"\x55" * 5, b"\xaa\x55\xaa\x55\xaa")
 
@@ -71,8 +71,11 @@ def _check_irq(radio: BenchRadio, irq: IrqPin) -> str:
     return "ok   IRQ: falls when a packet was sent" if fell else "FAIL IRQ: never falls: wiring?"
 
 
-def scan(radio: BenchRadio, rounds: int, suggest: int = 3) -> Lines:
-    """How often each channel carried a signal of more than -64 dBm, and the quietest channels."""
+def scan(radio: BenchRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
+    """How often each channel carried a signal of more than -64 dBm, and the quietest channels.
+
+    The last line has the options for a mesh of so many nodes.
+    """
     radio.set_up()
     heard = [0] * CHANNELS
     for _ in range(rounds):
@@ -86,7 +89,13 @@ def scan(radio: BenchRadio, rounds: int, suggest: int = 3) -> Lines:
         yield f"{channel:3d} {2400 + channel} MHz {count / rounds:5.0%} {bar}{note}"
     quiet = quietest(heard, suggest)
     yield f"quietest in the licence-free band: {' '.join(map(str, quiet))}"
-    yield f"for all nodes of a mesh alike: --channel {quiet[0]}"
+    yield f"data rate by number of nodes, slower reaches further: {_RATES_IN_WORDS}"
+    yield f"options of all nodes alike: --channel {quiet[0]} --rate {rate_for(nodes)}"
+
+
+def rate_for(nodes: int) -> str:
+    """The slowest rate, with the longest range, at which so many nodes connect within 20 s."""
+    return next(rate for most, rate in MOST_NODES if nodes <= most)
 
 
 def quietest(heard: list[int], count: int) -> list[int]:
@@ -102,27 +111,6 @@ def quietest(heard: list[int], count: int) -> list[int]:
         if all(abs(channel - other) >= 5 for other in chosen):
             chosen.append(channel)
     return chosen[:count]
-
-
-def measure_range(radio: BenchRadio, to: int, packets: int, distance_m: float | None) -> Lines:
-    """CSV: packets, losses and retransmissions at each power, to a node that is running."""
-    radio.set_up()
-    address = radio.settings.node_address(to)
-    rate = radio.settings.data_rate.value // 1000
-    yield "rate_kbit_s,power_dbm,packets,lost,retransmissions,loss"
-    for power in reversed(TxPower):
-        radio.set_power(power)
-        sent = [radio.send(address, _probe(to), retransmits=15) for _ in range(packets)]
-        lost = sum(not one.acknowledged for one in sent)
-        again = sum(one.retransmits for one in sent)
-        yield f"{rate},{power.value},{packets},{lost},{again},{lost / packets:.4f}"
-    if distance_m is not None:
-        losses = measured_losses()
-        nearest = min(losses, key=lambda point: abs(point[0] - distance_m))
-        yield (
-            "# measured in 2019 (amplified modules, line of sight, 250 kbit/s) "
-            f"at {nearest[0]:g} m: {nearest[1]:.4f}"
-        )
 
 
 def listen(

@@ -129,3 +129,8 @@ def test_chips_without_plus_work_beside_plus_chips_in_shockburst_mode(lab):
 def test_a_chip_without_plus_is_refused_in_the_mode_that_it_cannot_do(lab):
     with pytest.raises(RadioError, match="FEATURE was written as 01 and reads as 00"):
         lab.driver(1, plus=False, data_rate=DataRate.MBPS_1)
+
+
+def test_a_chip_without_plus_is_refused_at_the_rate_that_it_does_not_have(lab):
+    with pytest.raises(RadioError, match="RF_SETUP was written as 26 and reads as 06"):
+        lab.driver(1, plus=False, broadcast_mode=BroadcastMode.SHOCKBURST)

@@ -16,9 +16,10 @@ from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Register
 from drone_mesh.nrf24.runtime import Runtime
-from drone_mesh.nrf24.settings import RadioSettings
+from drone_mesh.nrf24.settings import DataRate, RadioSettings
 from drone_mesh.raspberry import radio_tests
 from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.options import parse_gateway
 from drone_mesh.raspberry.radio_command import main
 
 SETTINGS = RadioSettings()
@@ -124,6 +125,22 @@ def test_the_channels_suggested_are_quiet_apart_and_in_the_band():
     assert set(chosen) == {32, 72}
 
 
+@pytest.mark.parametrize(
+    ("nodes", "rate"), [(2, "250k"), (50, "250k"), (51, "1M"), (101, "1M"), (254, "2M")]
+)
+def test_the_rate_suggested_is_the_slowest_that_carries_so_many_nodes(nodes, rate):
+    assert radio_tests.rate_for(nodes) == rate
+
+
+@pytest.mark.slow
+def test_a_scan_ends_with_options_that_the_gateway_takes(capsys):
+    assert main(["--emulated", "30", "scan", "--rounds", "1", "--nodes", "101"]) == 0
+    options = capsys.readouterr().out.splitlines()[-1].partition("alike: ")[2].split()
+    radio = parse_gateway(options, {}).radio
+    assert radio.data_rate is DataRate.MBPS_1
+    assert 1 <= radio.channel <= 82
+
+
 class BusyMachine:
     """Each sleep takes a second longer than the chip notices: the process waited for a core."""
 
@@ -143,32 +160,6 @@ def test_a_machine_that_is_busy_while_a_packet_is_sent_is_no_fault_of_the_radio(
     bench.radio.set_up()
     bench.radio.runtime = BusyMachine(bench.radio.runtime)
     assert not bench.radio.send(SETTINGS.node_address(5), bytes(32)).acknowledged
-
-
-@pytest.mark.slow
-def test_the_range_tool_counts_what_is_lost_at_each_power(bench):
-    node = bench.make(EmulatedChip(bench.air, "node", (60.0, 0.0, 0.0)), 5)
-    node.set_up()
-    ended = threading.Event()
-
-    def read() -> None:
-        while not ended.is_set():
-            node.receive()
-
-    reader = threading.Thread(target=read)
-    reader.start()
-    try:
-        lines = list(radio_tests.measure_range(bench.radio, 5, packets=10, distance_m=50.0))
-    finally:
-        ended.set()
-        reader.join()
-    assert lines[0] == "rate_kbit_s,power_dbm,packets,lost,retransmissions,loss"
-    rows = [line.split(",") for line in lines[1:5]]
-    assert [row[1] for row in rows] == ["0", "-6", "-12", "-18"]
-    losses = [float(row[5]) for row in rows]
-    assert losses[0] < 0.5
-    assert losses[3] == 1.0
-    assert lines[5].endswith("at 50 m: 0.0037")
 
 
 def test_what_is_heard_is_decoded(bench):

@@ -32,7 +32,7 @@ class ChipCore(abc.ABC):
         self.warnings: list[str] = []
         self._warned: set[str] = set()
         self._position = position
-        self.registers = RegisterBank()
+        self.registers = RegisterBank(variant.plus)
         self.rx_fifo = RxFifo(variant.partial_read_removes)
         self.tx_fifo = TxFifo()
         self.flags = 0  # RX_DR, TX_DS and MAX_RT, where they stand in STATUS

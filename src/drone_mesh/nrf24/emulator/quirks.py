@@ -14,7 +14,7 @@ class ChipVariant:
     Where no source settles a behaviour, there is a switch.
     """
 
-    plus: bool = True  # False: FEATURE and DYNPD must be unlocked by ACTIVATE 0x73
+    plus: bool = True  # False: no 250 kbit/s; ACTIVATE 0x73 must unlock FEATURE and DYNPD
     power_up_ns: int = POWER_UP_NS  # Tpd2stby, depends on the crystal
     no_ack_bit: int = 1  # on the air, for "do not acknowledge": 1 by the datasheet, 0 in nRF5 chips
     duplicates_by_pipe: bool = True  # False: one memory of the last PID and CRC for all pipes

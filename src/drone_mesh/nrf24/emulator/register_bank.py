@@ -41,6 +41,8 @@ _WRITABLE: dict[int, int] = {
 }
 _ADDRESSES = 0x20
 _WRITABLE_BITS = [_WRITABLE.get(address, 0xFF) for address in range(_ADDRESSES)]
+_WRITABLE_WITHOUT_PLUS = list(_WRITABLE_BITS)
+_WRITABLE_WITHOUT_PLUS[Register.RF_SETUP] = 0x1F  # no RF_DR_LOW and no CONT_WAVE
 _TX_POWERS_DBM = (-18, -12, -6, 0)  # RF_PWR [DS Table 17]
 
 
@@ -50,7 +52,8 @@ class RegisterBank:
     The derived attributes are renewed by each write, so that the radio need not compute anything.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, plus: bool = True) -> None:
+        self._writable = _WRITABLE_BITS if plus else _WRITABLE_WITHOUT_PLUS
         self.reset()
 
     def reset(self) -> None:
@@ -70,7 +73,7 @@ class RegisterBank:
         value = self._values[register]
         data = data[: len(value)]
         if len(value) == 1:
-            data = bytes((data[0] & _WRITABLE_BITS[register],))
+            data = bytes((data[0] & self._writable[register],))
         if value[: len(data)] == data:
             return
         value[: len(data)] = data
