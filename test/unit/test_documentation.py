@@ -1,4 +1,4 @@
-"""What README and docs tell the reader to type works as it stands there."""
+"""The commands and the Python code in README and docs work as printed."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def test_each_block_of_commands_is_run_by_a_test_or_says_why_not(block):
     assert block.test == "simulation" or re.fullmatch(r"none, \w.+", block.test), block.test
 
 
-def test_commands_stand_in_blocks_of_bash():
-    """Another block would escape the test above. "$ ..." is a session with its output."""
+def test_all_commands_are_in_bash_blocks():
+    """The test above reads no other blocks. "$ ..." is a session with its output."""
     for page in PAGES:
         opening = None
         for line in page.read_text(encoding="utf-8").splitlines():
