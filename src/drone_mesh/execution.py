@@ -83,7 +83,7 @@ class _Periodic:
         self.next_tick_s = math.inf
 
 
-class Seat:
+class ExecutorSlot:
     """One component's place in an executor. Its antenna needs `submit` before the component exists.
 
     `submit` may be called by any thread; everything else is done by the executor's worker.
@@ -132,7 +132,9 @@ class MeshExecutor:
         """
         self._clock = clock
         self._clock_is_poked = clock_is_poked
-        self._queue: queue.SimpleQueue[tuple[float, Work, Seat | None] | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[float, Work, ExecutorSlot | None] | None] = (
+            queue.SimpleQueue()
+        )
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._stopping = False
         self._on_idle: Callable[[], None] = lambda: None
@@ -142,9 +144,9 @@ class MeshExecutor:
         self._next_due_s = math.inf
         self._worst_lag_s = 0.0
         # Only for the worker.
-        self._deadlines: list[tuple[float, int, Seat | _Periodic]] = []
+        self._deadlines: list[tuple[float, int, ExecutorSlot | _Periodic]] = []
         self._order = itertools.count()
-        self._said_s: dict[str, float] = {}
+        self._logged_s: dict[str, float] = {}
         self.failures: Counter[str] = Counter()  # by name of the exception
 
     # Any thread ------------------------------------------------------------------------------
@@ -163,13 +165,13 @@ class MeshExecutor:
         if self._thread.is_alive():
             self._thread.join()
 
-    def seat(self) -> Seat:
+    def slot(self) -> ExecutorSlot:
         """A place for one more component."""
-        return Seat(self)
+        return ExecutorSlot(self)
 
-    def submit(self, function: Work, seat: Seat | None = None) -> None:
+    def submit(self, function: Work, slot: ExecutorSlot | None = None) -> None:
         """Run `function(now_s)` on the worker's thread, after all earlier submissions."""
-        self._queue.put((self._clock(), function, seat))
+        self._queue.put((self._clock(), function, slot))
 
     def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
         """Call `function` once per period, first after one; returns a function to stop it."""
@@ -200,7 +202,7 @@ class MeshExecutor:
 
     def _work(self) -> None:
         deadlines = self._deadlines
-        waiting: tuple[float, Work, Seat | None] | None = None
+        waiting: tuple[float, Work, ExecutorSlot | None] | None = None
         while not self._stopping:
             if waiting is None:
                 block = not deadlines or deadlines[0][0] > self._clock()
@@ -214,14 +216,14 @@ class MeshExecutor:
             if due_s <= now_s and (waiting is None or due_s <= waiting[0]):
                 self._tick_first(now_s)
             elif waiting is not None:
-                submitted_s, function, seat = waiting
+                submitted_s, function, slot = waiting
                 waiting = None
                 self._working_since_s = submitted_s
-                self._run(function, now_s, seat)
+                self._run(function, now_s, slot)
             self._next_due_s = deadlines[0][0] if deadlines else math.inf
             self._working_since_s = math.inf
 
-    def _take(self, block: bool) -> tuple[float, Work, Seat | None] | None:
+    def _take(self, block: bool) -> tuple[float, Work, ExecutorSlot | None] | None:
         """The next submitted function; None: check the deadlines again."""
         timeout_s = None
         if block and not self._clock_is_poked and self._deadlines:
@@ -233,7 +235,7 @@ class MeshExecutor:
 
     def _tick_first(self, now_s: float) -> None:
         due_s, _, driven = heapq.heappop(self._deadlines)
-        if isinstance(driven, Seat):
+        if isinstance(driven, ExecutorSlot):
             if due_s != driven.scheduled_s:
                 return  # it was rescheduled meanwhile
             driven.scheduled_s = math.inf
@@ -241,22 +243,22 @@ class MeshExecutor:
             return  # cancelled
         self._working_since_s = due_s
         self._worst_lag_s = max(self._worst_lag_s, now_s - due_s)
-        self._run(driven.tick, now_s, driven if isinstance(driven, Seat) else None)
+        self._run(driven.tick, now_s, driven if isinstance(driven, ExecutorSlot) else None)
         if isinstance(driven, _Periodic):
             self._schedule(driven, driven.next_tick_s)
 
-    def _run(self, function: Work, now_s: float, seat: Seat | None) -> None:
+    def _run(self, function: Work, now_s: float, slot: ExecutorSlot | None) -> None:
         not_before_s = -math.inf
         try:
             function(now_s)
         except Exception as error:  # a failure of one node must not stop the others
             self._report(error, now_s)
             not_before_s = now_s + RETRY_AFTER_S
-        if seat is not None and seat.next_tick_s != seat.scheduled_s:
-            seat.scheduled_s = max(seat.next_tick_s, not_before_s)
-            self._schedule(seat, seat.scheduled_s)
+        if slot is not None and slot.next_tick_s != slot.scheduled_s:
+            slot.scheduled_s = max(slot.next_tick_s, not_before_s)
+            self._schedule(slot, slot.scheduled_s)
 
-    def _schedule(self, driven: Seat | _Periodic, due_s: float) -> None:
+    def _schedule(self, driven: ExecutorSlot | _Periodic, due_s: float) -> None:
         if due_s < math.inf:
             heapq.heappush(self._deadlines, (due_s, next(self._order), driven))
 
@@ -266,6 +268,6 @@ class MeshExecutor:
     def _report(self, error: Exception, now_s: float) -> None:
         kind = type(error).__name__
         self.failures[kind] += 1
-        if now_s - self._said_s.get(kind, -math.inf) >= FAILURE_PERIOD_S:
-            self._said_s[kind] = now_s
+        if now_s - self._logged_s.get(kind, -math.inf) >= FAILURE_PERIOD_S:
+            self._logged_s[kind] = now_s
             _log.error("%s in a mesh node (%d so far)", kind, self.failures[kind], exc_info=error)

@@ -69,11 +69,11 @@ def advance(executor, clock, now_s):
     settle(executor)
 
 
-def seat_with(executor, driven):
-    seat = executor.seat()
-    seat.submit(lambda _now_s: seat.take(driven))
+def slot_with(executor, driven):
+    slot = executor.slot()
+    slot.submit(lambda _now_s: slot.take(driven))
     settle(executor)
-    return seat
+    return slot
 
 
 def test_functions_run_in_the_order_of_submission_with_the_time(executor, clock):
@@ -87,7 +87,7 @@ def test_functions_run_in_the_order_of_submission_with_the_time(executor, clock)
 
 def test_a_component_is_ticked_when_it_is_due_and_not_before(executor, clock):
     ticker = Ticker(first_s=10.0, period_s=10.0)
-    seat_with(executor, ticker)
+    slot_with(executor, ticker)
     advance(executor, clock, 9.99)
     assert ticker.ticks == []
     advance(executor, clock, 10.0)
@@ -99,7 +99,7 @@ def test_a_component_is_ticked_when_it_is_due_and_not_before(executor, clock):
 def test_everything_runs_on_one_thread_that_is_not_the_callers(executor, clock):
     tickers = [Ticker(first_s=1.0), Ticker(first_s=1.0)]
     for ticker in tickers:
-        seat_with(executor, ticker)
+        slot_with(executor, ticker)
     threads = []
     executor.submit(lambda _now_s: threads.append(threading.get_ident()))
     advance(executor, clock, 1.0)
@@ -111,8 +111,8 @@ def test_everything_runs_on_one_thread_that_is_not_the_callers(executor, clock):
 
 def test_a_deadline_that_a_packet_moved_forward_is_kept(executor, clock):
     ticker = Ticker(first_s=100.0)
-    seat = seat_with(executor, ticker)
-    seat.submit(lambda _now_s: setattr(ticker, "next_tick_s", 2.0))
+    slot = slot_with(executor, ticker)
+    slot.submit(lambda _now_s: setattr(ticker, "next_tick_s", 2.0))
     settle(executor)
     advance(executor, clock, 2.0)
     assert [now_s for now_s, _ in ticker.ticks] == [2.0]
@@ -120,8 +120,8 @@ def test_a_deadline_that_a_packet_moved_forward_is_kept(executor, clock):
 
 def test_a_deadline_that_was_put_off_does_not_fire_at_the_old_time(executor, clock):
     ticker = Ticker(first_s=1.0)
-    seat = seat_with(executor, ticker)
-    seat.submit(lambda _now_s: setattr(ticker, "next_tick_s", 5.0))
+    slot = slot_with(executor, ticker)
+    slot.submit(lambda _now_s: setattr(ticker, "next_tick_s", 5.0))
     settle(executor)
     advance(executor, clock, 1.0)
     assert ticker.ticks == []
@@ -131,8 +131,8 @@ def test_a_deadline_that_was_put_off_does_not_fire_at_the_old_time(executor, clo
 
 def test_an_exception_in_one_component_is_logged_once_and_stops_no_other(executor, clock, caplog):
     stubborn, ticker = Stubborn(first_s=1.0), Ticker(first_s=1.0, period_s=1.0)
-    seat_with(executor, stubborn)
-    seat_with(executor, ticker)
+    slot_with(executor, stubborn)
+    slot_with(executor, ticker)
     with caplog.at_level(logging.ERROR):
         for now_s in (1.0, 2.0, 3.0):
             advance(executor, clock, now_s)
@@ -144,7 +144,7 @@ def test_an_exception_in_one_component_is_logged_once_and_stops_no_other(executo
 
 def test_a_component_that_fails_and_stays_due_is_not_called_in_a_tight_loop(executor, clock):
     stubborn = Stubborn(first_s=1.0)
-    seat_with(executor, stubborn)
+    slot_with(executor, stubborn)
     advance(executor, clock, 1.0)
     advance(executor, clock, 1.9)
     settle(executor)
@@ -164,7 +164,7 @@ def test_call_every_skips_the_periods_it_slept_through_and_ends_when_cancelled(e
 
 
 def test_lateness_is_measured_in_seconds_of_the_clock(executor, clock):
-    seat_with(executor, Ticker(first_s=1.0))
+    slot_with(executor, Ticker(first_s=1.0))
     started, go_on = threading.Event(), threading.Event()
 
     def block(_now_s):

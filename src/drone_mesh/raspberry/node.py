@@ -52,7 +52,7 @@ class RadioNode:
         self.radio = radio
         self.engine = engine
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
-        self._seat = self._executor.seat()
+        self._seat = self._executor.slot()
         self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
         self._origin = options.flight.origin
         self.events = EventHistory() if events is None else events

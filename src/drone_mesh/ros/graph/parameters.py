@@ -20,7 +20,7 @@ PACKAGE = "drone_mesh"
 Result = TypeVar("Result")
 
 
-def or_stop(read: Callable[[], Result]) -> Result:
+def or_exit(read: Callable[[], Result]) -> Result:
     """The result of `read`; a ConfigurationError ends the program with its one line and code 1."""
     try:
         return read()

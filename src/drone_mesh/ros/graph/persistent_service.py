@@ -40,7 +40,7 @@ Response = TypeVar("Response", bound=Message)
 
 
 class ServiceClass(Protocol[Request, Response]):
-    """What genpy makes of a .srv file."""
+    """The class that genpy generates from a .srv file."""
 
     _request_class: type[Request]
     _response_class: type[Response]
@@ -139,3 +139,18 @@ class PersistentService(Generic[Request, Response]):
                 ok, length = _ANSWER_HEAD.unpack_from(data)
                 end = _ANSWER_HEAD.size + length
         return bool(ok), data[_ANSWER_HEAD.size : end]
+
+
+def call_once(
+    name: str, service_class: ServiceClass[Request, Response], request: Request, timeout_s: int
+) -> Response:
+    """Call a service on a connection of its own. Raises ServiceGone and ServiceRefused.
+
+    `timeout_s`: whole wall seconds to wait for the answer.
+    """
+    service = PersistentService(name, service_class, timeout_s)
+    try:
+        service.connect()
+        return service.call(request)
+    finally:
+        service.close()

@@ -9,7 +9,7 @@ from typing import Callable
 import rospy
 
 from drone_mesh.communication.interfaces import IMeshDebugInfo
-from drone_mesh.execution import Seat
+from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import NodeDebugInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
@@ -33,11 +33,15 @@ class AntennaPanel:
     """
 
     def __init__(
-        self, node_id: int, seat: Seat, is_on: Callable[[], bool], switch: Callable[[bool], None]
+        self,
+        node_id: int,
+        slot: ExecutorSlot,
+        is_on: Callable[[], bool],
+        switch: Callable[[bool], None],
     ) -> None:
-        """`switch` is called in a thread of rospy, and submits the node's part to `seat`."""
+        """`switch` is called in a thread of rospy, and submits the node's part to `slot`."""
         self._node_id = node_id
-        self._seat = seat
+        self._seat = slot
         self._is_on = is_on
         self._switch = switch
         self._service: rospy.Service | None = None

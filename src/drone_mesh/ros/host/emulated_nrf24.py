@@ -10,7 +10,7 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.execution import Seat
+from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import NRF24
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
@@ -30,14 +30,14 @@ class EmulatedNRF24(IWirelessCommunication):
     A send only queues the packet; two threads of the antenna send and receive.
     """
 
-    def __init__(self, node_id: int, radio: NRF24LowLevelInterface, seat: Seat) -> None:
-        """`seat` drives the mesh component of this node."""
-        self._seat = seat
+    def __init__(self, node_id: int, radio: NRF24LowLevelInterface, slot: ExecutorSlot) -> None:
+        """`slot` drives the mesh component of this node."""
+        self._seat = slot
         self._received = rospy.Publisher(
             names.node_topic(node_id), NRF24, queue_size=_RECEIVED_QUEUE
         )
-        self._antenna = NRF24HighLevelInterface(radio, seat.submit, on_payload=self._show)
-        self._panel = AntennaPanel(node_id, seat, self.on, self._switch_power)
+        self._antenna = NRF24HighLevelInterface(radio, slot.submit, on_payload=self._show)
+        self._panel = AntennaPanel(node_id, slot, self.on, self._switch_power)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Set the chip up and listen. Raises RadioError."""

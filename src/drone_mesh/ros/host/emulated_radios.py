@@ -7,7 +7,7 @@ import logging
 import random
 from typing import Callable, Iterable
 
-from drone_mesh.execution import MeshExecutor, Seat
+from drone_mesh.execution import ExecutorSlot, MeshExecutor
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
@@ -98,11 +98,11 @@ class EmulatedRadios:
         """Start the worker."""
         self._executor.start()
 
-    def seat(self) -> Seat:
+    def slot(self) -> ExecutorSlot:
         """A place in the worker of all nodes."""
-        return self._executor.seat()
+        return self._executor.slot()
 
-    def antenna(self, node_id: int, seat: Seat) -> EmulatedNRF24:
+    def antenna(self, node_id: int, slot: ExecutorSlot) -> EmulatedNRF24:
         """The antenna of a node, with a driver for its chip."""
         chip = self._chips[node_id]
         radio = NRF24LowLevelInterface(
@@ -114,7 +114,7 @@ class EmulatedRadios:
             runtime=self._wall_clock.runtime,
             rng=random.Random(f"{self._seed} radio {node_id}"),
         )
-        antenna = EmulatedNRF24(node_id, radio, seat)
+        antenna = EmulatedNRF24(node_id, radio, slot)
         self._antennas[node_id] = antenna
         return antenna
 

@@ -44,7 +44,7 @@ class RosDroneEngineConnector(IDroneEngine):
         self._why_not_fly = why_not_fly
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
         self._gone_until_s = -math.inf  # monotonic
-        self._complaints = ThrottledLog(_log)
+        self._throttled_log = ThrottledLog(_log)
         # Latched: an order that comes before rospy has connected to the engine must not be lost.
         self._goal = rospy.Publisher(
             names.goal_topic(node_id), LocationMsg, queue_size=10, latch=True
@@ -91,7 +91,7 @@ class RosDroneEngineConnector(IDroneEngine):
         try:
             answer = self._ask()
         except (ServiceGone, ServiceRefused) as error:
-            self._complaints.warning(f"drone {self._node_id} has no position", str(error))
+            self._throttled_log.warning(f"drone {self._node_id} has no position", str(error))
             raise LocationUnknown(str(error)) from error
         return location_of(answer)
 

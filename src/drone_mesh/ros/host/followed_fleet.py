@@ -32,6 +32,6 @@ class FollowedFleet:
             _log.debug("the drones are not known: %s", error)
             return
         for node_id in self._served.keys() - wanted.keys():
-            self._host.dismiss(node_id)
-        self._host.serve({n: role for n, role in wanted.items() if n not in self._served})
+            self._host.end_node(node_id)
+        self._host.start_nodes({n: role for n, role in wanted.items() if n not in self._served})
         self._served = wanted

@@ -38,7 +38,7 @@ class HostReports:
     def __init__(self) -> None:
         self._hosted: list[tuple[NodeState, MeshnetworkComponent, Callable[[], bool]]] = []
         self._batcher = EventBatcher()
-        self._complaints = ThrottledLog(_log)
+        self._throttled_log = ThrottledLog(_log)
         self._publisher = rospy.Publisher(names.REPORTS_TOPIC, HostReport, queue_size=REPORTS_QUEUE)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="host reports", daemon=True)
@@ -85,7 +85,7 @@ class HostReports:
             try:
                 describe_component(state, component, antenna_on(), now_s)
             except Exception as error:  # a routing technique whose tables change meanwhile
-                self._complaints.warning(
+                self._throttled_log.warning(
                     "a node could not be described", f"node {state.id}: {error!r}"
                 )
             report.nodes.append(state)

@@ -8,7 +8,7 @@ import rospy
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.errors import GoalRefused
-from drone_mesh.execution import Seat
+from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_of
@@ -26,10 +26,10 @@ class RosInternetMock(IInternetConnection):
     `connect` and `disconnect` are for the executor's worker, to which orders are submitted.
     """
 
-    def __init__(self, node_id: int, seat: Seat) -> None:
+    def __init__(self, node_id: int, slot: ExecutorSlot) -> None:
         """`node_id` is the gateway's."""
         self._node_id = node_id
-        self._seat = seat
+        self._seat = slot
         self._subscriber: rospy.Subscriber | None = None
         self._answers: rospy.Publisher | None = None
 

@@ -102,7 +102,7 @@ class MeshHost:
                 return
             time.sleep(_LOOK_PERIOD_S)
 
-    def serve(self, nodes: Mapping[int, Role]) -> None:
+    def start_nodes(self, nodes: Mapping[int, Role]) -> None:
         """Start these nodes, one after the other; given are their ids and what they are."""
         begun_s = time.monotonic()
         if not nodes:
@@ -117,7 +117,7 @@ class MeshHost:
         for node_id, role in nodes.items():
             self._submit_start(node_id, role, on_start)
 
-    def dismiss(self, node_id: int) -> None:
+    def end_node(self, node_id: int) -> None:
         """End this node for good; returns at once. Not served: nothing changes."""
 
         def end(now_s: float) -> None:
@@ -128,7 +128,7 @@ class MeshHost:
                 self._radios.remove(node_id)
                 _log.info("ended node %d", node_id)
 
-        self._radios.seat().submit(end)  # the worker of all nodes: after the start of this one
+        self._radios.slot().submit(end)  # the worker of all nodes: after the start of this one
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
@@ -140,7 +140,7 @@ class MeshHost:
         for node in list(self.nodes.values()):
             # Only these have threads of their own; the others end with the executor.
             if self._radios.own_threads or isinstance(node, VirtualRaspberryPiGateway):
-                node.seat.submit(node.stop)
+                node.slot.submit(node.stop)
         self._radios.close()
         self.executor.stop()
 
@@ -152,15 +152,15 @@ class MeshHost:
         }
 
     def _submit_start(self, node_id: int, role: Role, on_start: Callable[[], None]) -> None:
-        seat = self._radios.seat()
+        slot = self._radios.slot()
 
         def start(now_s: float) -> None:
             if self._stopping:
                 return
             try:
-                antenna = self._radios.antenna(node_id, seat)
+                antenna = self._radios.antenna(node_id, slot)
                 why_not_fly = functools.partial(self._grounded.reason, node_id)
-                node = _KINDS[role](node_id, self._settings, antenna, seat, why_not_fly)
+                node = _KINDS[role](node_id, self._settings, antenna, slot, why_not_fly)
                 self._reports.add(node.component, node.antenna.on)
                 node.start(now_s)
             except MeshError as error:  # does not go away by itself
@@ -169,4 +169,4 @@ class MeshHost:
                 self.nodes[node_id] = node
                 on_start()
 
-        seat.submit(start)
+        slot.submit(start)

@@ -20,7 +20,7 @@ from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.node_presence import node_runs
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
-from drone_mesh.ros.graph.parameters import configured_obstacles, or_stop
+from drone_mesh.ros.graph.parameters import configured_obstacles, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.host.followed_clock import FollowedClock
 from drone_mesh.ros.host.followed_fleet import FollowedFleet
@@ -106,9 +106,9 @@ def main() -> None:
         if stop.requested():
             return
         fleet = get_fleet_parameter()
-        ids = or_stop(lambda: share_of_host(fleet, get_present_drones()))
+        ids = or_exit(lambda: share_of_host(fleet, get_present_drones()))
         _log.info("serving %s", f"drones {ids.start}..{ids.stop - 1}" if ids else "no drones")
-        settings = or_stop(lambda: MeshSettings.of(fleet, _obstacles_of(fleet)))
+        settings = or_exit(lambda: MeshSettings.of(fleet, _obstacles_of(fleet)))
         host = MeshHost(settings, lambda: clock.now_s, stop.fail)
         # The world waits for declared hosts only.
         rospy.set_param(names.host_param(rospy.get_name()), [ids.start, ids.stop - 1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.execution import MeshExecutor, Seat
+from drone_mesh.execution import ExecutorSlot, MeshExecutor
 from drone_mesh.ros.host.simulator_link import SimulatorLink
 from drone_mesh.ros.host.virtual_nrf24 import VirtualNRF24
 
@@ -34,11 +34,11 @@ class Radios(Protocol):
     def start(self) -> None:
         """Get ready; does not wait for it."""
 
-    def seat(self) -> Seat:
+    def slot(self) -> ExecutorSlot:
         """A place for one more node to be driven in."""
 
-    def antenna(self, node_id: int, seat: Seat) -> IWirelessCommunication:
-        """The antenna of a node, which is driven in `seat`."""
+    def antenna(self, node_id: int, slot: ExecutorSlot) -> IWirelessCommunication:
+        """The antenna of a node, which is driven in `slot`."""
 
     def remove(self, node_id: int) -> None:
         """The antenna of this node has stopped for good."""
@@ -85,13 +85,13 @@ class VirtualRadios:
         """Look for a simulator from now on."""
         self._link.start()
 
-    def seat(self) -> Seat:
+    def slot(self) -> ExecutorSlot:
         """A place in the executor of the host."""
-        return self._executor.seat()
+        return self._executor.slot()
 
-    def antenna(self, node_id: int, seat: Seat) -> IWirelessCommunication:
+    def antenna(self, node_id: int, slot: ExecutorSlot) -> IWirelessCommunication:
         """The antenna of a node."""
-        return VirtualNRF24(node_id, self._link, seat)
+        return VirtualNRF24(node_id, self._link, slot)
 
     def remove(self, node_id: int) -> None:
         """Nothing to do: the antenna has left the link."""

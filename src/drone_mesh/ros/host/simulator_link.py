@@ -39,7 +39,7 @@ class SimulatorLink(rospy.SubscribeListener):
         self._executor = executor
         self._connection: SimulatorConnection | None = None
         self._lock = threading.Lock()
-        self._complaints = ThrottledLog(_log)
+        self._throttled_log = ThrottledLog(_log)
         self._look = threading.Event()
         self._stopping = False
         self._never_handed_over = 0  # written by the executor's worker, as the next one
@@ -80,7 +80,7 @@ class SimulatorLink(rospy.SubscribeListener):
         """
         return self._under_way
 
-    def worked_off(self, sender: str = "") -> None:
+    def packet_processed(self, sender: str = "") -> None:
         """A node of this process is done with a packet of this ROS node. On the worker.
 
         What others than the simulator send to a node is not in the count.
@@ -104,7 +104,7 @@ class SimulatorLink(rospy.SubscribeListener):
         connection = self._connection
         if connection is None:
             if payloads:
-                self._complaints.error("packet not sent", "no simulator")
+                self._throttled_log.error("packet not sent", "no simulator")
                 self._never_handed_over += len(payloads)
             return [False] * len(payloads)
         try:
@@ -115,7 +115,7 @@ class SimulatorLink(rospy.SubscribeListener):
             self._under_way += sum(taken)
             return taken
         except ServiceRefused as error:
-            self._complaints.warning("packet refused", str(error))
+            self._throttled_log.warning("packet refused", str(error))
         except ServiceGone as error:
             self._never_handed_over += len(payloads)
             self._lost(connection, error)
@@ -125,14 +125,14 @@ class SimulatorLink(rospy.SubscribeListener):
         """Hand over a packet for every node in range of the sender in its byte 1."""
         connection = self._connection
         if connection is None:
-            self._complaints.error("packet not sent", "no simulator")
+            self._throttled_log.error("packet not sent", "no simulator")
             self._never_handed_over += 1
             return
         try:
             self._under_way += connection.broadcast(payload)
         except ServiceRefused:
             # A new simulator, to which this antenna is announced in a moment: no line in the log.
-            self._complaints.counts["broadcast refused"] += 1
+            self._throttled_log.counts["broadcast refused"] += 1
         except ServiceGone as error:
             self._never_handed_over += 1
             self._lost(connection, error)

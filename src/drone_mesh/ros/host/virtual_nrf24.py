@@ -12,7 +12,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.execution import Inbox, Seat
+from drone_mesh.execution import ExecutorSlot, Inbox
 from drone_mesh.msg import NRF24
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.host.announcements import probe_of
@@ -33,19 +33,19 @@ class VirtualNRF24(IWirelessCommunication):
     keeps the announcements and the worker's orders in the order of its changes.
     """
 
-    def __init__(self, node_id: int, link: SimulatorLink, seat: Seat) -> None:
-        """`seat` drives the mesh component of this node."""
+    def __init__(self, node_id: int, link: SimulatorLink, slot: ExecutorSlot) -> None:
+        """`slot` drives the mesh component of this node."""
         self.node_id = node_id
         self._probe = probe_of(node_id)
         self._link = link
-        self._seat = seat
-        self._inbox = Inbox(seat.submit)
+        self._seat = slot
+        self._inbox = Inbox(slot.submit)
         self._dropped = 0  # packets that the inbox did not take, as far as the worker knows
         self._on = False
         self._switching = threading.Lock()
         self._mesh: IMeshNetwork | None = None
         self._subscriber: rospy.Subscriber | None = None
-        self._panel = AntennaPanel(node_id, seat, self.on, self._switch_power)
+        self._panel = AntennaPanel(node_id, slot, self.on, self._switch_power)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Power on, subscribe, announce; does not wait for a simulator."""
@@ -104,10 +104,10 @@ class VirtualNRF24(IWirelessCommunication):
             if self._on and self._mesh is not None:
                 self._mesh.on_msg(payload, now_s)
         finally:
-            self._link.worked_off(sender)
+            self._link.packet_processed(sender)
             while self._dropped < self._inbox.dropped:
                 self._dropped += 1
-                self._link.worked_off()
+                self._link.packet_processed()
 
     def _switch_power(self, on: bool) -> None:
         mesh = self._mesh

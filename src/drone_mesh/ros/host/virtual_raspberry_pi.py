@@ -10,7 +10,7 @@ from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.sealed_antenna import SealedAntenna
-from drone_mesh.execution import Seat
+from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet
 from drone_mesh.internet.several import SeveralInternets
@@ -32,7 +32,7 @@ class VirtualRaspberryPi(abc.ABC):
         node_id: int,
         settings: MeshSettings,
         antenna: IWirelessCommunication,
-        seat: Seat,
+        slot: ExecutorSlot,
         why_not_fly: Callable[[], str],
     ) -> None:
         """`why_not_fly` as for RosDroneEngineConnector.
@@ -42,8 +42,8 @@ class VirtualRaspberryPi(abc.ABC):
         self.settings = settings
         self.engine = RosDroneEngineConnector(node_id, why_not_fly, settings.obstacles)
         self.antenna = antenna
-        self.seat = seat
-        self.users = UsersDesk(node_id, seat.submit)
+        self.slot = slot
+        self.users = UsersDesk(node_id, slot.submit)
         self._users_of_node = UsersOfNode(self.users)
         self._observers = [settings.observer]
         if settings.key is not None:
@@ -75,7 +75,7 @@ class VirtualRaspberryPi(abc.ABC):
         self.users.open(self.component.data)
         self._users_of_node.start(self.component.data)
         self.component.start(now_s)
-        self.seat.take(self.component)
+        self.slot.take(self.component)
 
     def stop(self, _now_s: float) -> None:
         """Switch off."""
@@ -103,14 +103,14 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
     """Runs a gateway."""
 
     def _make_internet(self) -> IInternetConnection:
-        mock = RosInternetMock(self.node_id, self.seat)
+        mock = RosInternetMock(self.node_id, self.slot)
         if self.settings.internet == "mock":
             return mock
         if self.settings.internet == "mqtt":
             # One gateway sends what is published: several would send it several times.
             sends, broker = self.node_id == 0, self.settings.broker
-            mqtt = mqtt_internet(self.seat.submit, self.users, broker, sends=sends)
+            mqtt = mqtt_internet(self.slot.submit, self.users, broker, sends=sends)
             self._observers.append(mqtt.observe)
             return SeveralInternets(mock, mqtt)
-        http = http_internet(self.seat.submit, port=DEFAULT_PORT + self.node_id, users=self.users)
+        http = http_internet(self.slot.submit, port=DEFAULT_PORT + self.node_id, users=self.users)
         return SeveralInternets(mock, http)

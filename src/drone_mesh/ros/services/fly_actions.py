@@ -28,11 +28,7 @@ from drone_mesh.ros.graph.conversions import event_record, location_of, whole_me
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
-from drone_mesh.ros.graph.persistent_service import (
-    PersistentService,
-    ServiceGone,
-    ServiceRefused,
-)
+from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
 from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
 from drone_mesh.state.orders import OrderProgress
 
@@ -224,20 +220,17 @@ class FlyActions:
 
 def _order(drone: int, goal: Location) -> None:
     """Order a drone as anyone does. Raises _Refused."""
-    service = PersistentService(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, ORDER_TIMEOUT_S)
     request = RequestDroneFlightRequest(
         drone, goal.latitude, goal.longitude, whole_metres(goal.height)
     )
     try:
-        service.connect()
-        status = service.call(request).status
+        status = call_once(
+            names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request, ORDER_TIMEOUT_S
+        ).status
     except ServiceGone:
         raise _Refused(FlyResult.NO_ROUTE, "the DroneManager does not answer") from None
     except ServiceRefused as error:
-        said = str(error).partition(" responded with an error: ")[2] or str(error)
-        raise _Refused(FlyResult.REFUSED, said) from None
-    finally:
-        service.close()
+        raise _Refused(FlyResult.REFUSED, str(error)) from None
     if status == 0:
         raise _Refused(FlyResult.NO_ROUTE, "no gateway is running")
     if status == 2:

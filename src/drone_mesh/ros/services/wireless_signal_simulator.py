@@ -20,7 +20,7 @@ from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.figures import Figures
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_stop
+from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
 from drone_mesh.ros.services.antenna_topic import AntennaTopic
 from drone_mesh.ros.services.packet_samples import PacketSamples
 from drone_mesh.srv import (
@@ -69,7 +69,7 @@ class WirelessSignalSimulator:
         self._opening = threading.Lock()
         self._antenna_topics: dict[str, AntennaTopic] = {}
         self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
-        self._complaints = ThrottledLog(_log)
+        self._throttled_log = ThrottledLog(_log)
         self._delivered = self._lost = 0
         self._samples = PacketSamples()
         self._samples.start()
@@ -88,7 +88,7 @@ class WirelessSignalSimulator:
             else:
                 self._note(info)
         except AirError as error:
-            self._complaints.warning("DroneInfo dropped", str(error))
+            self._throttled_log.warning("DroneInfo dropped", str(error))
 
     def _antenna_info(self, info: DroneInfo) -> None:
         self._check_topic_type(info)
@@ -96,7 +96,7 @@ class WirelessSignalSimulator:
             self._note(info)
             old_topic = self._open(info.nodeID, info.sub)
         if old_topic is not None:
-            self._complaints.warning(
+            self._throttled_log.warning(
                 "topic changed", f"node {info.nodeID}: from {old_topic} to {info.sub}"
             )
 
@@ -208,10 +208,10 @@ def main() -> None:
     """Run the node."""
     prepare_node(WirelessSignalSimulator.__doc__)
     rospy.init_node("WirelessSignalSimulator")
-    configuration = or_stop(
+    configuration = or_exit(
         lambda: factory_configuration("max_distance", "obstacles", "obstacle_radio")
     )
-    obstacles = or_stop(lambda: configured_obstacles(configuration))
+    obstacles = or_exit(lambda: configured_obstacles(configuration))
     show_library_logs_on_rosout()
     max_distance_m = configuration.max_distance
     sees = None

@@ -7,12 +7,12 @@ import logging
 from drone_mesh.console.orders import OrderRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.persistent_service import (
-    PersistentService,
     Request,
     Response,
     ServiceClass,
     ServiceGone,
     ServiceRefused,
+    call_once,
 )
 from drone_mesh.srv import (
     AddDrone,
@@ -92,15 +92,10 @@ class RosControls:
 
 
 def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
-    service = PersistentService(name, service_class, ORDER_TIMEOUT_S)
     try:
-        service.connect()
-        return service.call(request)
+        return call_once(name, service_class, request, ORDER_TIMEOUT_S)
     except ServiceGone as error:
         log.warning("console: order failed: %s", error)
         raise OrderRefused(f"no answer from {name}: is the simulation running?") from error
     except ServiceRefused as error:
-        said = str(error).partition(" responded with an error: ")[2]
-        raise OrderRefused(said or str(error)) from error
-    finally:
-        service.close()
+        raise OrderRefused(str(error)) from error

@@ -7,7 +7,7 @@ import rospy
 from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
-from drone_mesh.ros.graph.parameters import or_stop
+from drone_mesh.ros.graph.parameters import or_exit
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.simulation import Simulation
 from drone_mesh.world.bullet_world import BulletWorld
@@ -23,6 +23,6 @@ def main() -> None:
     prepare_node(main.__doc__)
     rospy.init_node("DroneFactory", disable_signals=True)
     show_library_logs_on_rosout()
-    parameters = or_stop(FactoryParameters.read)
+    parameters = or_exit(FactoryParameters.read)
     with OrderlyStop() as stop, BulletWorld() as world:
         Simulation(parameters, world).run(stop)

@@ -67,9 +67,9 @@ class DroneSpawner:
     def start_node(self, node_id: int, role: Role) -> None:
         """Start the node of a drone, if nodes run in this process."""
         if self._host is not None:
-            self._host.serve({node_id: role})
+            self._host.start_nodes({node_id: role})
 
     def end_node(self, node_id: int) -> None:
         """End the node of a drone, if nodes run in this process."""
         if self._host is not None:
-            self._host.dismiss(node_id)
+            self._host.end_node(node_id)

@@ -85,7 +85,7 @@ class EngineServer:
         # The world's thread:
         self._reported_s = -math.inf
         self._reported = (False, False)  # whether it flew, whether it was flat
-        self._complaints = ThrottledLog(_log)
+        self._throttled_log = ThrottledLog(_log)
         self._engine.add_listener(self._moved)
         self._engine.observe(self._observed)
         self._goals = rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
@@ -100,7 +100,7 @@ class EngineServer:
         try:
             self._engine.set_goal(goal.latitude, goal.longitude, goal.height)
         except GoalRefused as error:
-            self._complaints.warning(f"drone {self._node_id} refused a goal", str(error))
+            self._throttled_log.warning(f"drone {self._node_id} refused a goal", str(error))
             self._observed(MeshEventKind.GOAL_REFUSED, rospy.get_time(), str(error))
 
     def _observed(self, kind: MeshEventKind, now_s: float, detail: str) -> None:

@@ -69,7 +69,7 @@ class PacedHosts:
         self._under_way = UnderWay()
         self._quiet_s = 0.0  # simulated
         self._strangers: dict[str, float] = {}  # node -> monotonic seconds of the last look at it
-        self._complaints = ThrottledLog(_log)
+        self._throttled_log = ThrottledLog(_log)
         self._seen = (0.0, 0)  # what was done and what is under way, at the last look
         self._stuck_since_s = time.monotonic()  # time stands still, and no work is done
         rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._reported, tcp_nodelay=True)
@@ -99,7 +99,7 @@ class PacedHosts:
         if (done_s, under_way) != self._seen:
             self._seen, self._stuck_since_s = (done_s, under_way), wall_s
         if wall_s - self._stuck_since_s > HOST_TIMEOUT_S:
-            self._complaints.warning(
+            self._throttled_log.warning(
                 "time stands still", f"waiting for {slowest}, {now_s - self._quiet_s:.2f} s behind"
             )
         return True
@@ -116,7 +116,7 @@ class PacedHosts:
     def _reported(self, progress: Header) -> None:
         reporter = progress._connection_header["callerid"]
         if reporter not in self._progress and not self._is_host(reporter):
-            self._complaints.warning("progress ignored", f"{reporter} is not a host of nodes")
+            self._throttled_log.warning("progress ignored", f"{reporter} is not a host of nodes")
             return
         before = self._progress.get(reporter)
         # Two threads of a host report: the later report may know less.

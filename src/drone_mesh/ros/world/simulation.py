@@ -106,7 +106,7 @@ class Simulation:
         host.start()
         if self._present():
             host.wait_for_radios(stop.requested)
-        host.serve({drone.node_id: drone.ROLE for drone in self._present()})
+        host.start_nodes({drone.node_id: drone.ROLE for drone in self._present()})
         return host
 
     def _step(
