@@ -24,7 +24,7 @@ ROSLAUNCHS_OWN = re.compile(
     r"exception in shutdown_process_monitor: 'ProcessMonitor' object has no attribute 'isAlive'\n"
     r"Traceback [^\n]*\n( [^\n]*\n)+AttributeError: [^\n]*'isAlive'\n"
 )
-NODES = ("wireless_signal_simulator", "drone_manager", "drone_factory")
+NODES = ("wireless_signal_simulator", "drone_manager", "drone_factory", "fly_actions")
 
 
 def processes_of(port: int) -> list[str]:
@@ -42,7 +42,7 @@ def processes_of(port: int) -> list[str]:
 
 
 class CtrlCTest(unittest.TestCase):
-    def run_and_interrupt(self, ready: str, *arguments: str) -> None:
+    def run_and_interrupt(self, ready: tuple[str, ...], *arguments: str) -> None:
         port = free_port()
         environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
         with tempfile.TemporaryFile("w+") as output:
@@ -59,7 +59,8 @@ class CtrlCTest(unittest.TestCase):
                 start_new_session=True,
             )
             try:
-                wait_for(f"'{ready}' in the output", 60, lambda: ready in said())
+                for line in ready:
+                    wait_for(f"'{line}' in the output", 60, lambda line=line: line in said())
                 begun_s = time.monotonic()
                 os.killpg(launch.pid, signal.SIGINT)  # as a terminal does: to all of them
                 launch.wait(timeout=30)
@@ -73,16 +74,17 @@ class CtrlCTest(unittest.TestCase):
             self.assertEqual(processes_of(port), [])
 
     def test_while_the_mesh_runs(self) -> None:
-        self.run_and_interrupt("started 31 nodes", "routers:=30")
+        ready = ("started 31 nodes", "offering the flights of 31 drones as actions")
+        self.run_and_interrupt(ready, "routers:=30", "actions:=true")
 
     def test_while_the_world_waits_for_its_next_step(self) -> None:
-        self.run_and_interrupt("started 2 nodes", "routers:=1", "real_time_factor:=0.001")
+        self.run_and_interrupt(("started 2 nodes",), "routers:=1", "real_time_factor:=0.001")
 
     def test_while_the_nodes_are_being_started(self) -> None:
-        self.run_and_interrupt("fleet: gateways 1, routers 30", "routers:=30")
+        self.run_and_interrupt(("fleet: gateways 1, routers 30",), "routers:=30")
 
     def test_while_emulated_radios_are_in_each_others_way(self) -> None:
-        self.run_and_interrupt("started 18 nodes", "radio:=nrf24")
+        self.run_and_interrupt(("started 18 nodes",), "radio:=nrf24")
 
 
 if __name__ == "__main__":

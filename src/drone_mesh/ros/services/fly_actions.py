@@ -77,7 +77,8 @@ class FlyActions:
 
     def __init__(self) -> None:
         rospy.set_param("~actionlib_status_frequency", 0)  # for actionlib: no thread
-        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        # Not a SimpleQueue: its get() waits forever if a signal handler outlasts the time-out.
+        self._work: queue.Queue[Callable[[], None]] = queue.Queue()
         self._servers: dict[int, actionlib.ActionServer] = {}
         self._flights: list[_Flight] = []
         self._states: rospy.Subscriber | None = None
@@ -123,8 +124,11 @@ class FlyActions:
         if present is not None:
             for drone in self._servers.keys() - present.roles.keys():
                 self._withdraw(drone)
-            for drone in present.roles.keys() - self._servers.keys():
+            new = present.roles.keys() - self._servers.keys()
+            for drone in new:
                 self._offer(drone)
+            if new:
+                _log.info("offering the flights of %d drones as actions", len(self._servers))
         for server in self._servers.values():
             if server.status_list:
                 server.publish_status()
