@@ -52,11 +52,11 @@ class RadioNode:
         self.radio = radio
         self.engine = engine
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
-        self._seat = self._executor.slot()
-        self._antenna = NRF24HighLevelInterface(radio, self._seat.submit)
+        self._slot = self._executor.slot()
+        self._antenna = NRF24HighLevelInterface(radio, self._slot.submit)
         self._origin = options.flight.origin
         self.events = EventHistory() if events is None else events
-        self.users = UsersDesk(radio.node_id, self._seat.submit)
+        self.users = UsersDesk(radio.node_id, self._slot.submit)
         self._socket = local_socket(self.users)
         self._internet = None if make_internet is None else make_internet(self)
         antenna: IWirelessCommunication = self._antenna
@@ -87,7 +87,7 @@ class RadioNode:
 
     def submit(self, work: Work) -> None:
         """Have the node's own thread do this soon. Any thread."""
-        self._seat.submit(work)
+        self._slot.submit(work)
 
     def mesh(self, after: int) -> dict[str, Any]:
         """A gateway's `mesh_report`, with the events after this number; for the node's thread."""
@@ -115,7 +115,7 @@ class RadioNode:
 
     def is_alive(self) -> bool:
         """Whether the node's own thread came to its work lately; to be asked again and again."""
-        self._seat.submit(self._beat)
+        self._slot.submit(self._beat)
         return time.monotonic() - self._beat_s < ALIVE_WITHIN_S
 
     def _beat(self, now_s: float) -> None:
@@ -125,7 +125,7 @@ class RadioNode:
         """Start the radio and the mesh software; RadioError if the chip does not answer."""
         self.component.start(time.monotonic())  # before the thread, so that errors reach the caller
         self._started = True
-        self._seat.submit(lambda _now_s: self._seat.take(self.component))
+        self._slot.submit(lambda _now_s: self._slot.take(self.component))
         self._executor.start()
         if self._socket is not None:
             self._socket.start()
@@ -137,7 +137,7 @@ class RadioNode:
         if self._started:
             self._started = False
             self._antenna.fall_silent()  # remaining sends fail at once
-            self._seat.submit(lambda _now_s: self.component.stop())
+            self._slot.submit(lambda _now_s: self.component.stop())
             self._executor.stop()
             counters = dataclasses.asdict(self._antenna.statistics())
             text = ", ".join(f"{name} {count}" for name, count in counters.items())

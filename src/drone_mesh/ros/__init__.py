@@ -1,4 +1,4 @@
-"""Everything that speaks ROS. The rooms around it do not know that it exists."""
+"""The ROS side: nodes, hosts, services and views. No other package imports it."""
 
 import threading
 

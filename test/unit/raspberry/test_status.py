@@ -145,7 +145,7 @@ def test_a_node_whose_thread_hangs_is_not_alive(monkeypatch):
         node = mesh.nodes[1]
         wait_for("it is alive", node.is_alive)
         hung = time.monotonic() + 3.0
-        node._seat.submit(lambda _now_s: time.sleep(max(0.0, hung - time.monotonic())))
+        node._slot.submit(lambda _now_s: time.sleep(max(0.0, hung - time.monotonic())))
         wait_for("it is noticed", lambda: not node.is_alive())
         wait_for("it is alive again", node.is_alive)
 
@@ -175,8 +175,8 @@ def worst_stop_s(seed: int) -> tuple[float, State]:
         wait_for("it has neighbours", lambda: len(gateway.component.get_neighbours()) >= 2)
         mesh.stop(*mesh.nodes[1:])
         for node in (1, 2, 3):
-            gateway._seat.submit(lambda _now_s, node=node: gateway.component.send_heartbeat(node))
-        gateway._seat.submit(lambda _now_s: gateway.component._routing.maintain_routing())
+            gateway._slot.submit(lambda _now_s, node=node: gateway.component.send_heartbeat(node))
+        gateway._slot.submit(lambda _now_s: gateway.component._routing.maintain_routing())
         time.sleep(rng.uniform(0.0, 0.5))
         started_s = time.monotonic()
         mesh.stop(gateway)

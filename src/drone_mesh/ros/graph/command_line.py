@@ -32,7 +32,7 @@ def require_master() -> None:
 
 
 def join_graph(name: str) -> None:
-    """Register as an anonymous node that leaves Ctrl-C to the program. Raises NoMaster."""
+    """Register as an anonymous node without rospy's signal handlers. Raises NoMaster."""
     require_master()
     rospy.init_node(name, anonymous=True, disable_signals=True, disable_rosout=True)
 

@@ -1,4 +1,4 @@
-"""Between the package's own types and ROS messages, in both directions."""
+"""Conversions between the package's own types and ROS messages, in both directions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NO_POSITION = (0.0, 0.0, 0.0)
 
 
 class PlaceMsg(Protocol):
-    """Any message or request with the fields of a place."""
+    """Any message or request that carries a position."""
 
     latitude: float  # m, y
     longitude: float  # m, x
@@ -29,25 +29,25 @@ class PlaceMsg(Protocol):
 
 
 def ros_time(seconds: float) -> rospy.Time:
-    """The nearest nanosecond; rospy.Time.from_sec rounds down: 0.94 s become 0.939999999."""
+    """Rounded to the nearest nanosecond; rospy.Time.from_sec truncates 0.94 s to 0.939999999 s."""
     return rospy.Time(0, round(seconds * 1e9))
 
 
-# Places -----------------------------------------------------------------------------------------
+# Positions ----------------------------------------------------------------------------------------
 
 
 def whole_metres(height: float) -> int:
-    """A height as the int16 fields carry it."""
+    """A height in metres, rounded to the integer that the int16 fields carry."""
     return round(height)
 
 
 def location_of(message: PlaceMsg) -> Location:
-    """The place in a message."""
+    """The position in a message."""
     return Location(message.latitude, message.longitude, float(message.height))
 
 
 def location_msg(latitude: float, longitude: float, height: float) -> LocationMsg:
-    """A place (metres), its height rounded to whole metres."""
+    """A position in metres, its height rounded to whole metres."""
     return LocationMsg(latitude, longitude, whole_metres(height))
 
 
@@ -99,7 +99,7 @@ def event_record(message: MeshEventMsg) -> EventRecord:
 
 
 def state_msg(mesh: MeshStatus) -> MeshState:
-    """The message; nodes that are messages already are taken as they are."""
+    """The state as a message; nodes that already are messages are not copied."""
     message = MeshState(
         max_distance=mesh.max_distance,
         real_time_factor=mesh.real_time_factor,
@@ -117,9 +117,9 @@ def state_msg(mesh: MeshStatus) -> MeshState:
 
 
 def mesh_status(message: MeshState) -> MeshStatus:
-    """The state in a message, whose nodes it shares.
+    """The state in a message; it shares the message's nodes.
 
-    A message of an older definition, from a bag, has defaults for the fields that it lacks.
+    A message of an older definition, from a bag, gets defaults for the fields that it lacks.
     """
     nodes: Sequence[NodeStatus] = message.nodes
     if message._md5sum != MeshState._md5sum:

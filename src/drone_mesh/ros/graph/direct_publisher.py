@@ -1,4 +1,4 @@
-"""DirectPublisher: publishes in the caller's thread, and cuts off subscribers that do not read."""
+"""DirectPublisher: publishes in the caller's thread, disconnects subscribers that do not read."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from rospy.impl.transport import Transport
 class DirectPublisher(rospy.SubscribeListener):
     """A publisher without queues, for topics that carry many small messages. Any thread.
 
-    A queue of rospy costs a thread for each subscriber and two switches for each message, and
-    hides that a subscriber has gone. Without it a subscriber that does not read can block the
-    caller, once its buffers in the kernel are full: for `limit_s`, then it is disconnected.
+    rospy's queue costs a thread per subscriber and two context switches per message, and does not
+    report that a subscriber has gone. Without a queue, a subscriber that stops reading blocks the
+    caller once the kernel's buffers are full: for `limit_s` at most, then it is disconnected.
     """
 
     def __init__(self, topic: str, data_class: type[Message], limit_s: float) -> None:
@@ -35,11 +35,11 @@ class DirectPublisher(rospy.SubscribeListener):
                 connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, self._timeval)
 
     def publish(self, message: Message) -> None:
-        """To all subscribers. Raises ROSException once the topic is closed."""
+        """Send to all subscribers. Raises ROSException once the topic is closed."""
         self._publisher.publish(message)
 
     def has_subscriber(self) -> bool:
-        """Whether a process subscribes to the topic, and is still alive."""
+        """Whether any subscriber is connected and alive."""
         implementation = self._publisher.impl  # None once it is closed
         if implementation is None or not implementation.has_connections():
             return False
@@ -48,7 +48,7 @@ class DirectPublisher(rospy.SubscribeListener):
         return bool(implementation.has_connections())
 
     def connections(self) -> list[Transport]:
-        """The present connections to subscribers."""
+        """The open connections to subscribers."""
         implementation = self._publisher.impl
         return [] if implementation is None else implementation.connections
 

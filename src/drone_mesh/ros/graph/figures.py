@@ -1,4 +1,4 @@
-"""Figures: numbers that a process publishes about its own work."""
+"""Figures: measurements that a process publishes about its own work."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PERIOD_S = 1.0  # wall: diagnostics go on while simulated time stands still
 
 
 class Figures:
-    """Publishes numbers once a second, in a thread of its own.
+    """Publishes measurements once a second, in a thread of its own.
 
     Publishes: /diagnostics (DiagnosticArray), one status "<node>: <task>" with level OK
     """

@@ -1,7 +1,7 @@
 """The parameters by which the factory describes its fleet to other processes.
 
 /drone_mesh/fleet: the configuration that the factory was started with.
-/drone_mesh/drones: the drones that are there now (PresentDrones.to_parameter).
+/drone_mesh/drones: the present drones (PresentDrones.to_parameter).
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ def get_fleet_parameter() -> FactoryConfiguration:
 
 
 def get_present_drones() -> PresentDrones:
-    """The drones that are there now. Raises KeyError before the factory has made any."""
+    """The present drones. Raises KeyError before the factory has created any."""
     return PresentDrones.from_parameter(rospy.get_param(names.DRONES_PARAM))
 
 
 def drones_if_known() -> PresentDrones | None:
-    """The drones that are there now; None: there is no factory, or not yet."""
+    """The present drones; None if there is no factory, or it has not created any yet."""
     try:
         return get_present_drones()
     except KeyError:

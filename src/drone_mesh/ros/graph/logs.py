@@ -11,7 +11,7 @@ COMPLAINT_PERIOD_S = 10.0  # our choice: one line per reason in this (wall) time
 
 
 def show_library_logs_on_rosout() -> None:
-    """Call once, after rospy.init_node(): logs of drone_mesh then appear where rospy's do."""
+    """Send the logs of drone_mesh to the handlers of rospy. Call once, after rospy.init_node()."""
     rosout = logging.getLogger("rosout")
     library = logging.getLogger("drone_mesh")
     library.handlers = list(rosout.handlers)
@@ -20,7 +20,7 @@ def show_library_logs_on_rosout() -> None:
 
 
 class ThrottledLog:
-    """Counts complaints by reason, and logs each reason once per period. Any thread."""
+    """Counts messages by reason and logs each reason once per period. Any thread."""
 
     def __init__(self, log: logging.Logger, period_s: float = COMPLAINT_PERIOD_S) -> None:
         self._log = log
@@ -30,11 +30,11 @@ class ThrottledLog:
         self.counts: Counter[str] = Counter()
 
     def warning(self, reason: str, text: str) -> None:
-        """Count `reason`, and log it with `text` unless it was logged a short while ago."""
+        """Count `reason`; log it with `text` unless it was logged within the last period."""
         self._complain(logging.WARNING, reason, text)
 
     def error(self, reason: str, text: str) -> None:
-        """As warning, at level error."""
+        """Like `warning`, at level error."""
         self._complain(logging.ERROR, reason, text)
 
     def _complain(self, level: int, reason: str, text: str) -> None:

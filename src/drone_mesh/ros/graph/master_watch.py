@@ -1,4 +1,4 @@
-"""MasterWatch: registers a node again when its master was restarted."""
+"""MasterWatch: registers a node again after the master was restarted."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _log = logging.getLogger(__name__)
 
 
 class MasterWatch:
-    """Looks at the master in a thread of its own.
+    """Polls the master in a thread of its own.
 
-    A new master starts empty: connections between nodes stay, but no node finds topics, services
-    and parameters. The watch registers all topics and services of this process again, and restores
-    its private parameters and those that it is given.
+    A new master starts empty: existing connections between nodes survive, but topics, services and
+    parameters cannot be looked up. The watch registers all topics and services of this process
+    again, and restores its private parameters and the public ones that it was given.
     """
 
     def __init__(self, *parameters: str) -> None:
@@ -39,14 +39,14 @@ class MasterWatch:
         self._thread = threading.Thread(target=self._run, name="master watch", daemon=True)
 
     def start(self) -> None:
-        """Note the parameters, and look from now on, until the node shuts down."""
+        """Store the parameters and start polling; the thread ends when the node shuts down."""
         present = {name: rospy.get_param(name) for name in self._names if rospy.has_param(name)}
         self._values = {**present, **self._values}
         rospy.on_shutdown(self._stopped.set)
         self._thread.start()
 
     def keep(self, parameter: str, value: Any) -> None:
-        """Restore this value of a public parameter from now on. One thread after the start."""
+        """Also restore this value of a public parameter. After `start`, from one thread only."""
         self._values = {**self._values, rospy.resolve_name(parameter): value}
 
     def _run(self) -> None:
@@ -54,7 +54,7 @@ class MasterWatch:
         while not self._stopped.wait(PERIOD_S):
             try:
                 master.lookupNode(rospy.get_name())
-            except rosgraph.MasterException:  # it answers, and does not know this node
+            except rosgraph.MasterException:  # a new master, which does not know this node
                 if not (self._stopped.is_set() or rospy.is_shutdown()):
                     self._register_again()
             except NO_ANSWER as error:

@@ -1,4 +1,4 @@
-"""Names of the ROS graph (docs/protocol.md, "ROS interface"), and the names that we added."""
+"""Names in the ROS graph: those of docs/protocol.md, "ROS interface", and our additions."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ GATEWAY_ANSWERS_TOPIC = "/gateway/answers"  # FlightOrderAnswer: each gateway ->
 REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"
 SET_TO_CASUS_SERVICE = "/DroneManager/SetToCasus"
 ORDER_LAYOUT_SERVICE = "/DroneManager/orderLayout"  # OrderLayout
-# The same services under the names that people type first.
+# The same services under their short names.
 SHORT_REQUEST_MOVEMENT_SERVICE = "/requestDroneMovement"
 SHORT_SET_TO_CASUS_SERVICE = "/SetToCasus"
 ALL_DEBUG_TOPIC = "/debug"  # NodeDebugInfo of all nodes, only while there is a subscriber
 
 CLOCK_TOPIC = "/clock"
-FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the factor achieved, once a second
+FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the achieved factor, once a second
 SPEED_SERVICE = "/DroneFactory/setSpeed"  # SetSpeed
 ADD_DRONE_SERVICE = "/DroneFactory/addDrone"  # AddDrone
 REMOVE_DRONE_SERVICE = "/DroneFactory/removeDrone"  # RemoveDrone
-PROGRESS_TOPIC = "/mesh/progress"  # Header: up to when a host in another process has done its work
+PROGRESS_TOPIC = "/mesh/progress"  # Header: progress of a host in another process
 SIM_TIME_PARAM = "/use_sim_time"
 FLEET_PARAM = "/drone_mesh/fleet"  # the factory's configuration, for hosts in other processes
 DRONES_PARAM = "/drone_mesh/drones"  # the ids of the present drones, see fleet_parameter.py

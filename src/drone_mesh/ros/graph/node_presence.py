@@ -1,4 +1,4 @@
-"""Whether the node of a drone runs, wherever that may be."""
+"""Whether the node of a drone runs, in this or any other process."""
 
 from __future__ import annotations
 

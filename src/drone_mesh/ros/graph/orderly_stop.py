@@ -1,4 +1,4 @@
-"""OrderlyStop: first our threads end, then ROS."""
+"""OrderlyStop: ends the program's own threads first, then ROS."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _log = logging.getLogger(__name__)
 
 
 class OrderlyStop:
-    """Around everything that a node does, after init_node(..., disable_signals=True).
+    """Context manager around a node's work, after init_node(..., disable_signals=True).
 
-    rospy would close all topics as soon as Ctrl-C is pressed, while threads still publish. Here
+    rospy would close all topics as soon as Ctrl-C is pressed, while threads still publish. Instead,
     SIGINT, SIGTERM and `rosnode kill` only ask the main thread to leave the `with` block, in which
-    it ends what it started; then ROS is shut down. After `fail` the program exits with code 1.
-    Make it in the main thread.
+    it stops what it started; then ROS shuts down. After `fail` the program exits with code 1.
+    Create it in the main thread.
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class OrderlyStop:
         return self._request.is_made()
 
     def wait(self, timeout_s: float) -> bool:
-        """Return when it is time to leave (True), or after so many wall seconds (False)."""
+        """Wait at most `timeout_s` wall seconds; returns whether the program should stop."""
         return self._request.wait(timeout_s)
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:

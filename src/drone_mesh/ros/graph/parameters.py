@@ -1,4 +1,4 @@
-"""The private parameters of our nodes: launch arguments over the file in ~config."""
+"""The private parameters of our nodes: launch arguments override the file in ~config."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 
 def or_exit(read: Callable[[], Result]) -> Result:
-    """The result of `read`; a ConfigurationError ends the program with its one line and code 1."""
+    """The result of `read`; on a ConfigurationError, print its one line and exit with code 1."""
     try:
         return read()
     except ConfigurationError as error:
@@ -38,11 +38,11 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
 
 
 def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | None:
-    """The boxes that the configuration names; None: none. Raises ConfigurationError."""
+    """The boxes that the configuration names, or None. Raises ConfigurationError."""
     path = configuration.obstacles
     if not path:
         return None
-    if not Path(path).expanduser().is_absolute():  # roslaunch starts nodes in a folder of its own
+    if not Path(path).expanduser().is_absolute():  # roslaunch starts nodes in another folder
         raise ConfigurationError(
             f"invalid obstacles {path!r}: expected an absolute path, such as $PWD/{path}"
         )

@@ -18,13 +18,13 @@ from rospy.impl.validators import ParameterInvalid
 
 from drone_mesh.errors import MeshError
 
-CALL_TIMEOUT_S = 2  # our choice: a service that does not answer in this time (wall seconds) is gone
+CALL_TIMEOUT_S = 2  # our choice: wall seconds without an answer until a service is gone
 _READ_BYTES = 4096  # more than any answer here
-# TCPROS (wiki.ros.org/ROS/TCPROS): a request is its length and its fields; an answer the same,
-# after a byte that is 0 when a text that says what went wrong follows instead.
+# TCPROS (wiki.ros.org/ROS/TCPROS): a request is its length and its fields. An answer has a status
+# byte first; after status 0 an error text follows in place of the fields.
 _REQUEST_HEAD = struct.Struct("<I")
 _ANSWER_HEAD = struct.Struct("<BI")
-_PREFIX = "service cannot process request: "  # which rospy puts before a service's own text
+_PREFIX = "service cannot process request: "  # rospy prepends this to the service's own text
 
 
 class ServiceGone(MeshError):
@@ -49,10 +49,10 @@ class ServiceClass(Protocol[Request, Response]):
 class PersistentService(Generic[Request, Response]):
     """One connection to one service.
 
-    rospy makes the connection. Calls are made here: those of rospy's ServiceProxy have no timeout,
-    report a lost connection only in words, and cost three times as much.
+    rospy makes the connection, this class the calls: those of rospy's ServiceProxy have no timeout,
+    report a lost connection only as text, and cost three times as much.
 
-    Another thread than that of `call` may call `connect` and `close`, but not during a call.
+    A thread other than the caller of `call` may use `connect` and `close`, but not during a call.
     """
 
     def __init__(
@@ -69,18 +69,18 @@ class PersistentService(Generic[Request, Response]):
         self._transport: TCPROSTransport | None = None
 
     def is_connected(self) -> bool:
-        """Whether there is a connection, and the other end has not closed it. Any thread."""
+        """Whether there is a connection that the other end has not closed. Any thread."""
         transport = self._transport
         connection = None if transport is None else transport.socket
         if connection is None or connection.fileno() < 0:
             return False
         poller = select.poll()
         poller.register(connection.fileno(), select.POLLRDHUP)
-        return not poller.poll(0)  # POLLHUP and POLLERR are always looked for
+        return not poller.poll(0)  # POLLHUP and POLLERR are always reported
 
     @property
     def server(self) -> str:
-        """The name of the node that offers the service; empty without a connection, or unknown."""
+        """The name of the node that offers the service; empty if unknown or not connected."""
         return "" if self._transport is None else self._transport.header.get("callerid", "")
 
     def connect(self) -> None:
@@ -98,20 +98,20 @@ class PersistentService(Generic[Request, Response]):
         self._transport = transport
 
     def call(self, request: Request) -> Response:
-        """The answer. Raises ServiceGone without a connection and ServiceRefused for an error."""
+        """Send a request and wait for the answer. Raises ServiceGone and ServiceRefused."""
         fields = io.BytesIO()
         request.serialize(fields)
         return self._response_class().deserialize(self.call_bytes(fields.getvalue()))
 
     def call_bytes(self, fields: bytes) -> bytes:
-        """The fields of the answer to these fields of a request, both as ROS serialises them."""
+        """Like `call`, with the fields of request and answer as ROS serialises them."""
         transport = self._transport
         if transport is None:
             raise ServiceGone(f"{self.name}: not connected")
         try:
             transport.socket.sendall(_REQUEST_HEAD.pack(len(fields)) + fields)
             ok, answer = self._read_answer(transport.socket)
-        # AttributeError: rospy closed the connection under the call, because it shuts down.
+        # AttributeError: rospy shuts down and closed the connection during the call.
         except (OSError, EOFError, AttributeError) as error:
             self.close()
             raise ServiceGone(f"{self.name}: {error}") from error

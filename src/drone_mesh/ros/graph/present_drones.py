@@ -1,4 +1,4 @@
-"""PresentDrones: the drones of a simulation, of which some were added or removed while it ran."""
+"""PresentDrones: the drones of a simulation, including those added or removed at run time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class PresentDrones:
     """The drones that are in the world now, and which processes run the nodes of new ones."""
 
     roles: Mapping[int, Role]  # by id, ascending
-    hosts: Mapping[int, str]  # of those added while it runs: the ROS node; empty: none was there
+    hosts: Mapping[int, str]  # of drones added at run time: the ROS node of each; empty: none
 
     @property
     def gateways(self) -> list[int]:
@@ -21,7 +21,7 @@ class PresentDrones:
         return [node_id for node_id, role in self.roles.items() if role is Role.GATEWAY]
 
     def of_host(self, host: str, share: Collection[int]) -> dict[int, Role]:
-        """What this host runs, if `share` is its part of the drones that have no other host."""
+        """The drones whose nodes this host runs; `share`: its part of those with no other host."""
         return {
             node_id: role
             for node_id, role in self.roles.items()
@@ -29,7 +29,7 @@ class PresentDrones:
         }
 
     def to_parameter(self) -> dict[str, list[Any]]:
-        """As ROS parameters hold it: ids by role, and two lists that belong together."""
+        """As a ROS parameter: ids by role, and two parallel lists for the hosts."""
         gateways = self.gateways
         return {
             "gateways": gateways,
@@ -40,7 +40,7 @@ class PresentDrones:
 
     @classmethod
     def from_parameter(cls, value: Mapping[str, Any]) -> PresentDrones:
-        """The reverse of `to_parameter`."""
+        """Parse the result of `to_parameter`."""
         roles = {node_id: Role.GATEWAY for node_id in value["gateways"]}
         roles.update({node_id: Role.ROUTER for node_id in value["routers"]})
         hosts = dict(zip(value["added"], value["hosts"]))

@@ -1,1 +1,1 @@
-"""Hosts of the mesh software: each drone's virtual Raspberry Pi and its antenna."""
+"""Hosts of the mesh software: the virtual Raspberry Pi and the antenna of each drone."""

@@ -1,4 +1,4 @@
-"""Announcements: the antennas of a process, and which of them the simulator has registered."""
+"""Announcements: registers the antennas of a process with the simulator."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ class Antenna(Protocol):
 
 
 def probe_of(node_id: int) -> bytes:
-    """The packet that an antenna sends to itself: it returns if a simulator has registered it."""
+    """The packet that an antenna sends to itself; it returns once a simulator has registered it."""
     return packet(MessageType.NOTDEFINED, node_id, node_id, node_id, node_id)
 
 
 class Announcements:
     """Announces antennas to the simulator until their own probes return.
 
-    Later it announces them in turn: another DroneInfo with their id could have taken their
-    packets elsewhere.
+    Registered antennas are announced again in turn, because another DroneInfo with their id may
+    have redirected their packets.
 
-    Any thread. `_lock` guards all fields. `_announcing` keeps the order of what is published that
-    of the antennas' power; publishing only puts into a queue.
+    Any thread. `_lock` guards all fields. `_announcing` keeps announcements in the order in which
+    the power of the antennas changed; publishing only appends to a queue.
     """
 
     def __init__(self, publish: Callable[[DroneInfo], None]) -> None:
         self._publish = publish
         self._lock = threading.Lock()
         self._announcing = threading.Lock()
-        self._rota: deque[int] = deque()  # ids of all antennas, the one announced longest ago first
+        self._rota: deque[int] = deque()  # ids of all antennas, least recently announced first
         self._antennas: dict[int, Antenna] = {}
         self._on_registered: dict[int, Callable[[], None]] = {}
         self._unregistered: set[int] = set()
@@ -49,7 +49,7 @@ class Announcements:
         return len(self._antennas)
 
     def add(self, antenna: Antenna, on_registered: Callable[[], None]) -> None:
-        """Announce this antenna; `on_registered` is called each time a simulator registered it."""
+        """Announce this antenna; call `on_registered` each time a simulator registers it."""
         with self._lock:
             self._antennas[antenna.node_id] = antenna
             self._on_registered[antenna.node_id] = on_registered
@@ -58,7 +58,7 @@ class Announcements:
         self.announce(antenna)
 
     def remove(self, antenna: Antenna) -> None:
-        """Forget this antenna. Not known: nothing changes."""
+        """Forget this antenna; an unknown one is ignored."""
         with self._lock:
             self._antennas.pop(antenna.node_id, None)
             self._on_registered.pop(antenna.node_id, None)
@@ -73,7 +73,7 @@ class Announcements:
             self._publish(antenna_info(antenna.node_id, topic, antenna.on()))
 
     def announce_all_to_new_simulator(self) -> None:
-        """No antenna is registered any more: announce them all."""
+        """Announce all antennas: a new simulator has not registered any."""
         with self._lock:
             self._unregistered.update(self._antennas)
         self.announce_unregistered()
@@ -84,7 +84,7 @@ class Announcements:
             self.announce(antenna)
 
     def announce_next(self, count: int) -> None:
-        """Repeat the announcements of up to so many antennas, each in its turn."""
+        """Announce up to `count` antennas again, least recently announced first."""
         with self._lock:
             antennas = [self._antennas[n] for n in list(self._rota)[:count]]
             self._rota.rotate(-count)
@@ -92,12 +92,12 @@ class Announcements:
             self.announce(antenna)
 
     def unregistered(self) -> list[Antenna]:
-        """Antennas whose probe has not returned from the present simulator."""
+        """Antennas whose probe has not returned from the current simulator."""
         with self._lock:
             return [self._antennas[node_id] for node_id in self._unregistered]
 
     def probe_returned(self, node_id: int) -> None:
-        """An antenna received its own probe: it is registered. Again: nothing changes."""
+        """An antenna received its own probe, so it is registered. Repeated calls change nothing."""
         with self._lock:
             if node_id not in self._unregistered:
                 return

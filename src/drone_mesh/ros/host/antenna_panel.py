@@ -41,7 +41,7 @@ class AntennaPanel:
     ) -> None:
         """`switch` is called in a thread of rospy, and submits the node's part to `slot`."""
         self._node_id = node_id
-        self._seat = slot
+        self._slot = slot
         self._is_on = is_on
         self._switch = switch
         self._service: rospy.Service | None = None
@@ -83,7 +83,7 @@ class AntennaPanel:
                     of_all.publish(message)
 
             self._publishers = (publisher, of_all)
-            self._stop_debugging = self._seat.call_every(DEBUG_PERIOD_S, publish)
+            self._stop_debugging = self._slot.call_every(DEBUG_PERIOD_S, publish)
 
     def _debug_info(self, info: IMeshDebugInfo) -> NodeDebugInfo:
         return NodeDebugInfo(
@@ -101,7 +101,7 @@ class AntennaPanel:
         if request.power != self._is_on():
             self._switch(request.power)
             done = threading.Event()
-            self._seat.submit(lambda _now_s: done.set())
+            self._slot.submit(lambda _now_s: done.set())
             if not done.wait(SWITCH_TIMEOUT_S):
                 _log.warning(
                     "node %d: antenna switched, but the node is too busy to react yet",

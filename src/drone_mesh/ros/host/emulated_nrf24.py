@@ -32,7 +32,7 @@ class EmulatedNRF24(IWirelessCommunication):
 
     def __init__(self, node_id: int, radio: NRF24LowLevelInterface, slot: ExecutorSlot) -> None:
         """`slot` drives the mesh component of this node."""
-        self._seat = slot
+        self._slot = slot
         self._received = rospy.Publisher(
             names.node_topic(node_id), NRF24, queue_size=_RECEIVED_QUEUE
         )
@@ -68,11 +68,11 @@ class EmulatedNRF24(IWirelessCommunication):
         return self._antenna.statistics()
 
     def fall_silent(self) -> None:
-        """Make every send fail at once from now on. Any thread."""
+        """From now on every send fails at once. Any thread."""
         self._antenna.fall_silent()
 
     def send_message_to(self, payload: bytes) -> bool:
-        """Queue it for the node in byte 3. False: invalid, no power, or too many wait."""
+        """Queue it for the node in byte 3. False: invalid, no power, or the queue is full."""
         return self._antenna.send_message_to(payload)
 
     def broadcast_message(self, payload: bytes) -> None:
@@ -88,7 +88,7 @@ class EmulatedNRF24(IWirelessCommunication):
         return self._antenna.on()
 
     def _switch_power(self, on: bool) -> None:
-        self._seat.submit(lambda _now_s: self._antenna.switch_power(on))
+        self._slot.submit(lambda _now_s: self._antenna.switch_power(on))
 
     def _show(self, payload: bytes) -> None:
         if not rospy.is_shutdown():

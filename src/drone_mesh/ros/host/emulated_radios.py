@@ -1,4 +1,4 @@
-"""EmulatedRadios: one emulated air, and a chip at the position of each drone."""
+"""EmulatedRadios: one emulated air, with one chip at the position of each drone."""
 
 from __future__ import annotations
 
@@ -66,18 +66,18 @@ class EmulatedRadios:
         )
 
     def place(self, drone: VirtualDrone) -> None:
-        """Put a chip on this drone. The world's thread."""
+        """Place a chip on this drone. In the world's thread."""
         chip = EmulatedChip(self._air, f"node {drone.node_id}", drone.engine.state.position)
         drone.engine.add_listener(functools.partial(_carry, chip))
         self._chips[drone.node_id] = chip
 
     @property
     def under_way(self) -> int:
-        """0: the chips live in wall time, and the world does not wait for them."""
+        """Always 0: the chips run in wall time, and the world does not wait for them."""
         return 0
 
     def figures(self) -> dict[str, float]:
-        """Of the air and all radios. One thread."""
+        """Figures of the air and all radios. One thread."""
         with self._wall_clock.access():
             frames, collisions = self._air.frames, self._air.collisions
             airtime_s, now_s = self._air.airtime_s, self._wall_clock.now_ns / NS_PER_S
@@ -99,7 +99,7 @@ class EmulatedRadios:
         self._executor.start()
 
     def slot(self) -> ExecutorSlot:
-        """A place in the worker of all nodes."""
+        """A slot in the worker of all nodes."""
         return self._executor.slot()
 
     def antenna(self, node_id: int, slot: ExecutorSlot) -> EmulatedNRF24:
@@ -119,16 +119,16 @@ class EmulatedRadios:
         return antenna
 
     def remove(self, node_id: int) -> None:
-        """The chip of this node has no power any more: forget it."""
+        """Discard the chip of this node."""
         self._antennas.pop(node_id, None)
         self._chips.pop(node_id, None)
 
     def time_advanced(self) -> None:
-        """Simulated time was moved."""
+        """Simulated time has advanced."""
         self._executor.time_advanced()
 
     def fall_silent(self) -> None:
-        """Make every send of every node fail at once from now on."""
+        """From now on every send of every node fails at once."""
         for antenna in list(self._antennas.values()):
             antenna.fall_silent()
 

@@ -34,10 +34,12 @@ class RosDroneEngineConnector(IDroneEngine):
     def __init__(
         self, node_id: int, why_not_fly: Callable[[], str], obstacles: Obstacles | None = None
     ) -> None:
-        """`why_not_fly` gives what the world says of this drone; the `obstacles` are the world's.
+        """`why_not_fly` returns why the drone cannot fly, empty if it can.
 
-        The engine itself decides: the topic of its goals has no answer, so that what it will refuse
-        is refused here too.
+        `obstacles` are the world's.
+
+        The engine decides, but the topic of its goals has no reply, so goals that it
+        would refuse are refused here as well.
         """
         self._obstacles = obstacles
         self._node_id = node_id
@@ -45,7 +47,7 @@ class RosDroneEngineConnector(IDroneEngine):
         self._gps = PersistentService(names.gps_service(node_id), RequestGPS)
         self._gone_until_s = -math.inf  # monotonic
         self._throttled_log = ThrottledLog(_log)
-        # Latched: an order that comes before rospy has connected to the engine must not be lost.
+        # Latched: an order that arrives before rospy has connected to the engine must not be lost.
         self._goal = rospy.Publisher(
             names.goal_topic(node_id), LocationMsg, queue_size=10, latch=True
         )
@@ -58,18 +60,18 @@ class RosDroneEngineConnector(IDroneEngine):
             _log.debug("drone %d: %s", self._node_id, error)
 
     def disconnect(self) -> None:
-        """Close the connection, and withdraw the topic of the goals with the last of them."""
+        """Close the connection and unregister the topic of the goals."""
         self._gps.close()
         self._goal.unregister()
 
     def why_not_fly(self) -> str:
-        """As the world says: crashed, or out of battery; empty while it can fly."""
+        """The world's reason: crashed, or battery empty. Empty if the drone can fly."""
         return self._why_not_fly()
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there (metres); the height is rounded to whole metres, as its field requires.
+        """Fly to this position (metres); the height is rounded to whole metres.
 
-        Raises GoalRefused if the drone cannot fly, or obstacles leave it no way.
+        Raises GoalRefused if the drone cannot fly, or obstacles block every path.
         """
         why_not = self._why_not_fly()
         if why_not:
@@ -87,7 +89,7 @@ class RosDroneEngineConnector(IDroneEngine):
             raise GoalRefused(NO_WAY)
 
     def get_location(self) -> Location:
-        """The position that the engine reports. Raises LocationUnknown when it does not answer."""
+        """The position that the engine reports. Raises LocationUnknown if it does not answer."""
         try:
             answer = self._ask()
         except (ServiceGone, ServiceRefused) as error:

@@ -1,4 +1,4 @@
-"""FollowedClock: the world's time in another process, and how far its work has followed."""
+"""FollowedClock: the world's time in another process, and the progress of that process."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ _QUEUE = 100
 
 
 class FollowedClock:
-    """Follows /clock, and reports to the world how far the work of this process is.
+    """Follows /clock, and reports the progress of this process to the world.
 
     Subscribes: /clock (Clock)
     Publishes:  /mesh/progress (Header: stamp = all work up to this simulated time is done;
-                seq = packets handed over less those worked off, modulo 2**32)
+                seq = packets handed over minus packets processed, modulo 2**32)
 
-    `now_s` is set by rospy's thread and read by all; `_reported` is set by the executor's worker.
+    `now_s` is set by rospy's thread and read by any; `_reported` is set by the executor's worker.
     """
 
     def __init__(self) -> None:
         self.now_s = 0.0
         self._host: MeshHost | None = None
-        self._reported = 0  # packets under way, as they were published last
+        self._reported = 0  # packets under way in the last report
         self._progress = rospy.Publisher(
             names.PROGRESS_TOPIC, Header, tcp_nodelay=True, queue_size=_QUEUE
         )
         rospy.Subscriber(names.CLOCK_TOPIC, Clock, self._advance, tcp_nodelay=True)
 
     def drive(self, host: MeshHost) -> None:
-        """Move this host with the clock, and report its work from now on."""
+        """Advance this host with the clock, and report its progress from now on."""
         self._host = host
         host.executor.when_idle(self._idle)
 
@@ -42,7 +42,7 @@ class FollowedClock:
         return self._progress.get_num_connections() > 0
 
     def report_progress(self) -> None:
-        """Report now; also while one piece of work takes long, or time stands still."""
+        """Report now, even during long work or while time stands still."""
         assert self._host is not None
         now_s = self.now_s
         self._publish(ros_time(now_s - self._host.lag_s(now_s)))
@@ -51,11 +51,11 @@ class FollowedClock:
         self.now_s = clock.clock.to_sec()
         if self._host is not None:
             self._host.time_advanced()
-            # Runs after everything that was due by now, or was submitted before.
+            # Runs after all work that was due or submitted before.
             self._host.executor.submit(lambda _now_s: self._publish(clock.clock))
 
     def _idle(self) -> None:
-        """The worker has nothing left to do: the world may be waiting for just that."""
+        """The worker has no work left, and the world may be waiting for that."""
         assert self._host is not None
         if self._host.under_way != self._reported:
             self._publish(ros_time(self.now_s))
@@ -63,6 +63,6 @@ class FollowedClock:
     def _publish(self, done: rospy.Time) -> None:
         assert self._host is not None
         self._reported = self._host.under_way
-        # rospy numbers the headers that messages have, and leaves a message that is one alone.
+        # rospy sets `seq` in a message's header, but not in a message that is a Header.
         packets = self._reported & 0xFFFFFFFF
         self._progress.publish(Header(seq=packets, stamp=done, frame_id=rospy.get_name()))

@@ -1,4 +1,4 @@
-"""FollowedFleet: starts and ends nodes of a host when drones are added and removed."""
+"""FollowedFleet: starts and ends nodes of a host as drones are added and removed."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ _log = logging.getLogger(__name__)
 
 
 class FollowedFleet:
-    """Keeps the nodes of a host those that its share of /drone_mesh/drones names. One thread."""
+    """Keeps a host's nodes equal to its share of /drone_mesh/drones. One thread."""
 
     def __init__(self, host: MeshHost, share: Collection[int]) -> None:
-        """`share`: ids of the drones that are this host's if they have no other."""
+        """`share`: ids of the drones that this host runs unless another host does."""
         self._host = host
         self._share = share
         self._served: dict[int, Role] = {}
 
     def follow(self) -> None:
-        """Compare with the parameter, once, and start and end what differs."""
+        """Read the parameter once; start and end the nodes that differ."""
         try:
             wanted = get_present_drones().of_host(rospy.get_name(), self._share)
-        except (KeyError, *NO_ANSWER) as error:  # of a master that ends, or has just started
+        except (KeyError, *NO_ANSWER) as error:  # the master is ending or has just started
             _log.debug("the drones are not known: %s", error)
             return
         for node_id in self._served.keys() - wanted.keys():

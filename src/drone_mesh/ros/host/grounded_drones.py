@@ -1,4 +1,4 @@
-"""GroundedDrones: which drones would not fly now, as the process that flies them says."""
+"""GroundedDrones: which drones cannot fly now, as reported by the process that flies them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class GroundedDrones:
         self._subscriber = rospy.Subscriber(names.GROUNDED_TOPIC, GroundedDronesMsg, self._changed)
 
     def reason(self, node_id: int) -> str:
-        """Why this drone would not fly now; empty: it would, or that is not known."""
+        """Why this drone cannot fly now; empty if it can, or if that is unknown."""
         return self._reasons.get(node_id, "")
 
     def stop(self) -> None:

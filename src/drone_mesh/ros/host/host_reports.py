@@ -31,8 +31,8 @@ class HostReports:
     Publishes: /mesh/reports (HostReport), once or twice a second of wall time, also while time
                stands still
 
-    The workers call `add` and `drop`, any thread `observe`. Each node's NodeState belongs to the
-    thread.
+    The workers call `add` and `drop`, any thread calls `observe`. The reporting thread owns each
+    node's NodeState.
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class HostReports:
         self._hosted.append((state, component, antenna_on))
 
     def drop(self, node_id: int) -> None:
-        """Report on this node no longer."""
+        """Stop reporting on this node."""
         self._hosted = [hosted for hosted in self._hosted if hosted[0].id != node_id]
 
     def observe(self, event: MeshEvent) -> None:
@@ -70,7 +70,7 @@ class HostReports:
 
     def _run(self) -> None:
         while not (self._stopped.wait(self._period_s()) or rospy.is_shutdown()):
-            # Without a subscriber the events would be lost; they wait for one.
+            # Events wait for a subscriber; published without one they would be lost.
             if self._publisher.get_num_connections():
                 self._report()
 
@@ -84,7 +84,7 @@ class HostReports:
         for state, component, antenna_on in list(self._hosted):
             try:
                 describe_component(state, component, antenna_on(), now_s)
-            except Exception as error:  # a routing technique whose tables change meanwhile
+            except Exception as error:  # the worker changed a routing table meanwhile
                 self._throttled_log.warning(
                     "a node could not be described", f"node {state.id}: {error!r}"
                 )

@@ -19,9 +19,9 @@ _log = logging.getLogger(__name__)
 
 
 class RosInternetMock(IInternetConnection):
-    """Subscribes /gateway (RequestGatewayDroneFlight), and hands each order to its gateway.
+    """Subscribes /gateway (RequestGatewayDroneFlight), and passes each order to its gateway.
 
-    Publishes /gateway/answers (FlightOrderAnswer): what became of each order.
+    Publishes /gateway/answers (FlightOrderAnswer): the outcome of each order.
 
     `connect` and `disconnect` are for the executor's worker, to which orders are submitted.
     """
@@ -29,7 +29,7 @@ class RosInternetMock(IInternetConnection):
     def __init__(self, node_id: int, slot: ExecutorSlot) -> None:
         """`node_id` is the gateway's."""
         self._node_id = node_id
-        self._seat = slot
+        self._slot = slot
         self._subscriber: rospy.Subscriber | None = None
         self._answers: rospy.Publisher | None = None
 
@@ -37,7 +37,7 @@ class RosInternetMock(IInternetConnection):
         """Subscribe; orders go to `commands`."""
 
         def order(request: RequestGatewayDroneFlight) -> None:
-            self._seat.submit(lambda now_s: self._order(commands, request, now_s))
+            self._slot.submit(lambda now_s: self._order(commands, request, now_s))
 
         self.disconnect()
         self._answers = rospy.Publisher(
@@ -58,7 +58,7 @@ class RosInternetMock(IInternetConnection):
         self, commands: IGatewayCommands, request: RequestGatewayDroneFlight, now_s: float
     ) -> None:
         if self._answers is None:
-            return  # the gateway has ended meanwhile
+            return  # the gateway has ended
         goal = location_of(request)
         try:
             taken = commands.send_goal_request_to_drone(

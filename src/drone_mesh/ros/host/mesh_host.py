@@ -69,9 +69,9 @@ class MeshHost:
         self._figures.start()
 
     def lag_s(self, now_s: float) -> float:
-        """For how many simulated seconds the oldest undone work has been waiting.
+        """How long the oldest pending work has been waiting, in simulated seconds.
 
-        Nodes with emulated radios do not count: the chips run in wall time, and so do they.
+        Nodes with emulated radios do not count, because they and their chips run in wall time.
         """
         return self.executor.lag_s(now_s)
 
@@ -82,18 +82,18 @@ class MeshHost:
 
     @property
     def under_way(self) -> int:
-        """Packets that this process handed over, less those that its nodes have worked off."""
+        """Packets that this process handed over, minus those that its nodes have processed."""
         return self._radios.under_way
 
     def time_advanced(self) -> None:
-        """The clock was moved."""
+        """The clock has advanced."""
         self.executor.time_advanced()
         self._radios.time_advanced()
 
     def wait_for_radios(self, give_up: Callable[[], bool]) -> None:
-        """Return when packets can be sent, when that takes too long, or when `give_up` says so.
+        """Return when packets can be sent, after RADIOS_TIMEOUT_S, or when `give_up` returns True.
 
-        Nodes also start without a simulator, but their first packets are lost then.
+        Nodes start without a simulator as well, but their first packets are lost then.
         """
         deadline_s = time.monotonic() + RADIOS_TIMEOUT_S
         while not self._radios.ready and not give_up():
@@ -103,11 +103,11 @@ class MeshHost:
             time.sleep(_LOOK_PERIOD_S)
 
     def start_nodes(self, nodes: Mapping[int, Role]) -> None:
-        """Start these nodes, one after the other; given are their ids and what they are."""
+        """Start these nodes, given by id and role, in this order."""
         begun_s = time.monotonic()
         if not nodes:
             return
-        left = threading.Semaphore(len(nodes) - 1)  # with emulated radios they start side by side
+        left = threading.Semaphore(len(nodes) - 1)  # emulated radios start in parallel
 
         def on_start() -> None:
             if not left.acquire(blocking=False) and not self._stopping:
@@ -118,7 +118,7 @@ class MeshHost:
             self._submit_start(node_id, role, on_start)
 
     def end_node(self, node_id: int) -> None:
-        """End this node for good; returns at once. Not served: nothing changes."""
+        """End this node for good; returns at once. An unknown node is ignored."""
 
         def end(now_s: float) -> None:
             node = self.nodes.pop(node_id, None)
@@ -128,7 +128,7 @@ class MeshHost:
                 self._radios.remove(node_id)
                 _log.info("ended node %d", node_id)
 
-        self._radios.slot().submit(end)  # the worker of all nodes: after the start of this one
+        self._radios.slot().submit(end)  # runs after the start of this node
 
     def stop(self) -> None:
         """Stop all threads; returns when they have ended. Nodes not started yet never start."""
@@ -163,7 +163,7 @@ class MeshHost:
                 node = _KINDS[role](node_id, self._settings, antenna, slot, why_not_fly)
                 self._reports.add(node.component, node.antenna.on)
                 node.start(now_s)
-            except MeshError as error:  # does not go away by itself
+            except MeshError as error:  # retrying would not help
                 self._on_failure(f"node {node_id} cannot start: {error}")
             else:
                 self.nodes[node_id] = node

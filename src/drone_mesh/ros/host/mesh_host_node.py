@@ -1,4 +1,4 @@
-"""The node mesh_host: virtual Raspberry Pis apart from the world, perhaps on another machine."""
+"""The node mesh_host: virtual Raspberry Pis in a process other than the world's."""
 
 from __future__ import annotations
 
@@ -57,16 +57,16 @@ def _obstacles_of(fleet: FactoryConfiguration) -> Obstacles | None:
         return configured_obstacles(fleet)
     except ConfigurationError as error:
         _log.warning(
-            "%s; orders into obstacles are refused by the world only, not by these nodes", error
+            "%s; only the world refuses orders into obstacles, these nodes do not", error
         )
         return None
 
 
 def share_of_host(fleet: FactoryConfiguration, drones: PresentDrones) -> range:
-    """The ids that the parameters select: ~first..~last, or share ~index of ~hosts equal shares.
+    """The ids that the parameters select: ~first..~last, or part ~index of ~hosts equal parts.
 
-    The shares are those of the drones at the start. Raises ConfigurationError for ids that the
-    world does not have or another process serves.
+    The parts divide the drones present at the start. Raises ConfigurationError for ids that the
+    world does not have or another process hosts.
     """
     count = fleet.gateways + fleet.routers
     if rospy.has_param("~hosts"):
@@ -93,7 +93,7 @@ def main() -> None:
     """Virtual Raspberry Pis outside the world's process, perhaps on another machine.
 
     Parameters (private): ~first and ~last (int): the ids to host; or ~index and ~hosts (int):
-    host share number ~index (from 1) of ~hosts equal shares of all drones.
+    host part ~index (from 1) of ~hosts equal parts of all drones.
     """
     prepare_node(main.__doc__)
     rospy.init_node("mesh_host", disable_signals=True)
@@ -117,7 +117,7 @@ def main() -> None:
         host.start()
         try:
             host.wait_for_radios(stop.requested)
-            # Otherwise time would go on while the nodes start, and their timers would be late.
+            # Otherwise time would advance while the nodes start, and their timers would be late.
             _wait_for(
                 "/DroneFactory to subscribe to the progress", clock.is_followed, stop.requested
             )

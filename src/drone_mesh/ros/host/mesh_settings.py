@@ -1,4 +1,4 @@
-"""MeshSettings: what the mesh software of all nodes has in common."""
+"""MeshSettings: the settings that all nodes of a simulation share."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class MeshSettings:
     obstacles: Obstacles | None
     internet: str  # "mock", "http" or "mqtt"
     broker: Broker  # with "mqtt"
-    key: MeshKey | None  # None: nothing is sealed
+    key: MeshKey | None  # None: packets are not sealed
 
     @classmethod
     def of(
@@ -41,9 +41,9 @@ class MeshSettings:
     ) -> MeshSettings:
         """The part of the configuration that concerns the nodes. Raises ConfigurationError.
 
-        `obstacles`: by which nodes refuse orders that no way leads to.
+        `obstacles`: nodes refuse orders to places that these make unreachable.
         """
-        create_routing_technique(configuration.routing)  # one error now instead of one per node
+        create_routing_technique(configuration.routing)  # fail once here instead of once per node
         create_repair_strategy(configuration.repair)
         return cls(
             routing=configuration.routing,

@@ -1,4 +1,4 @@
-"""Radios: the two ways in which the nodes of a host can be given antennas and workers."""
+"""Radios: the two ways to give the nodes of a host antennas and workers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Radios(Protocol):
     """Antennas of all nodes of a host. Any thread may call every function."""
 
     own_threads: bool
-    """Whether antennas have threads of their own, which only stopping their node ends."""
+    """Whether antennas have threads of their own, which end only when their node stops."""
 
     @property
     def ready(self) -> bool:
@@ -22,32 +22,32 @@ class Radios(Protocol):
 
     @property
     def never_handed_over(self) -> int:
-        """Packets, since the start, that the simulated air never received."""
+        """Packets, since the start, that the simulated air never accepted."""
 
     @property
     def under_way(self) -> int:
-        """Packets that were handed over, less those worked off; 0 if these radios do not wait."""
+        """Packets handed over minus packets processed; 0 if these radios do not wait."""
 
     def figures(self) -> dict[str, float]:
-        """Of the channel that all nodes share, for people; empty if they do not share one."""
+        """Figures of the channel that all nodes share; empty if they do not share one."""
 
     def start(self) -> None:
-        """Get ready; does not wait for it."""
+        """Start connecting; does not wait for the connection."""
 
     def slot(self) -> ExecutorSlot:
-        """A place for one more node to be driven in."""
+        """A slot for one more node."""
 
     def antenna(self, node_id: int, slot: ExecutorSlot) -> IWirelessCommunication:
-        """The antenna of a node, which is driven in `slot`."""
+        """The antenna of a node that runs in `slot`."""
 
     def remove(self, node_id: int) -> None:
         """The antenna of this node has stopped for good."""
 
     def time_advanced(self) -> None:
-        """The clock was moved."""
+        """The clock has advanced."""
 
     def fall_silent(self) -> None:
-        """Make every send fail at once from now on."""
+        """From now on every send fails at once."""
 
     def close(self) -> None:
         """Stop all workers and threads; returns when they have ended."""
@@ -78,15 +78,15 @@ class VirtualRadios:
         return self._link.under_way
 
     def figures(self) -> dict[str, float]:
-        """None: packets do not meet on an ideal disc."""
+        """Empty: on an ideal disc packets do not collide."""
         return {}
 
     def start(self) -> None:
-        """Look for a simulator from now on."""
+        """Start looking for a simulator."""
         self._link.start()
 
     def slot(self) -> ExecutorSlot:
-        """A place in the executor of the host."""
+        """A slot in the executor of the host."""
         return self._executor.slot()
 
     def antenna(self, node_id: int, slot: ExecutorSlot) -> IWirelessCommunication:
@@ -94,14 +94,14 @@ class VirtualRadios:
         return VirtualNRF24(node_id, self._link, slot)
 
     def remove(self, node_id: int) -> None:
-        """Nothing to do: the antenna has left the link."""
+        """Does nothing: the antenna has already left the link."""
 
     def time_advanced(self) -> None:
-        """Nothing to do: the host moves its executor itself."""
+        """Does nothing: the host advances its executor itself."""
 
     def fall_silent(self) -> None:
-        """Look for no simulator any more. A send does not take long."""
+        """Stop looking for a simulator; sends to a connected one stay quick."""
         self._link.stop()
 
     def close(self) -> None:
-        """Nothing is left to close."""
+        """Does nothing: there is nothing left to close."""

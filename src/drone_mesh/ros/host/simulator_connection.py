@@ -36,10 +36,10 @@ _log = logging.getLogger(__name__)
 class SimulatorConnection:
     """Hands packets to a simulator. Every call raises ServiceGone or ServiceRefused.
 
-    A simulator that offers only the services of the specification, `message` and `othersinRange`,
-    will do: `messages` and `broadcast` save calls where they are offered.
+    A simulator needs only the services of the specification, `message` and `othersinRange`;
+    `messages` and `broadcast` save calls if it offers them.
 
-    Belongs to the executor's worker, but for `is_connected`, which any thread may call.
+    For the executor's worker only, except `is_connected`, which any thread may call.
     """
 
     def __init__(self) -> None:
@@ -63,7 +63,7 @@ class SimulatorConnection:
 
     @property
     def simulator(self) -> str:
-        """The name of the simulator's node; empty if it does not say so."""
+        """The name of the simulator's node; empty if unknown."""
         return self._message.server
 
     def is_connected(self) -> bool:
@@ -78,13 +78,13 @@ class SimulatorConnection:
                 service.close()
 
     def send(self, payload: bytes) -> bool:
-        """Hand over a packet for the node in its byte 3; True: that node has it."""
+        """Hand over a packet for the node in its byte 3. True: that node received it."""
         # The fields of a WirelessMessageRequest and of its response are single bytes.
         fields = bytes((sender(payload), receiver(payload))) + payload
         return self._message.call_bytes(fields) != b"\0"
 
     def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
-        """Hand over packets of one sender, at least one; for each whether its receiver has it."""
+        """Hand over at least one packet of one sender; returns for each whether it was received."""
         if self._messages is None:
             return [self.send(payload) for payload in payloads]
         packets = b"".join(payloads)
@@ -94,10 +94,10 @@ class SimulatorConnection:
         return [bool(taken) for taken in answer[_LENGTH.size :]]
 
     def broadcast(self, payload: bytes) -> int:
-        """Hand over a packet for every node in range of its sender; returns how many have it."""
+        """Hand over a packet for every node in range; returns how many received it."""
         asker = bytes((sender(payload),))
         if self._broadcast is not None:
-            # The fields of a BroadcastRequest; the answer is the array of the nodes that have it.
+            # The fields of a BroadcastRequest; the answer: an array of the nodes that received it.
             return len(self._broadcast.call_bytes(asker + payload)) - _LENGTH.size
         if self._others is None:
             return 0

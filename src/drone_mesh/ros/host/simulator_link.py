@@ -30,8 +30,8 @@ class SimulatorLink(rospy.SubscribeListener):
     Publishes: /WirelessSignalSimulator (DroneInfo)
     Calls:     /SignalSimulator/message, messages, broadcast, othersinRange
 
-    Three threads meet here. The executor's worker sends. The link's own thread connects, which may
-    take long: meanwhile a send fails at once. Threads of rospy report new subscribers.
+    Three threads meet here. The executor's worker sends. The link's own thread connects, which can
+    take long; sends fail at once during that time. rospy's threads report new subscribers.
     `_connection` is replaced as a whole, under `_lock`.
     """
 
@@ -42,10 +42,10 @@ class SimulatorLink(rospy.SubscribeListener):
         self._throttled_log = ThrottledLog(_log)
         self._look = threading.Event()
         self._stopping = False
-        self._never_handed_over = 0  # written by the executor's worker, as the next one
+        self._never_handed_over = 0  # this and the next: written by the executor's worker
         self._under_way = 0
-        self._simulator = ""  # its name, of the latest one; written by the link's own thread
-        self._probing = False  # the worker has been asked to probe, and has not done so yet
+        self._simulator = ""  # name of the latest one; written by the link's own thread
+        self._probing = False  # the worker was asked to probe and has not done so yet
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC,
             DroneInfo,
@@ -57,7 +57,7 @@ class SimulatorLink(rospy.SubscribeListener):
         self._thread = threading.Thread(target=self._keep_connected, name="simulator_link")
 
     def start(self) -> None:
-        """Look for a simulator from now on."""
+        """Start looking for a simulator."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -74,16 +74,16 @@ class SimulatorLink(rospy.SubscribeListener):
 
     @property
     def under_way(self) -> int:
-        """Packets that this process handed over, less those that its nodes have worked off.
+        """Packets that this process handed over, minus those that its nodes have processed.
 
-        Over all processes together this is how many packets are under way or wait in a queue.
+        The sum over all processes is the number of packets in transit or in a queue.
         """
         return self._under_way
 
     def packet_processed(self, sender: str = "") -> None:
-        """A node of this process is done with a packet of this ROS node. On the worker.
+        """A node of this process has processed a packet of this ROS node. On the worker.
 
-        What others than the simulator send to a node is not in the count.
+        Packets that other ROS nodes than the simulator send are not counted.
         """
         if not (sender and self._simulator) or sender == self._simulator:
             self._under_way -= 1
@@ -96,11 +96,11 @@ class SimulatorLink(rospy.SubscribeListener):
     # Packets, the executor's worker ----------------------------------------------------------
 
     def send(self, payload: bytes) -> bool:
-        """Hand over a packet for the node in its byte 3; True: that node has it."""
+        """Hand over a packet for the node in its byte 3. True: that node received it."""
         return self.send_all((payload,))[0]
 
     def send_all(self, payloads: Sequence[bytes]) -> list[bool]:
-        """Hand over packets of one sender; for each whether the node in its byte 3 has it."""
+        """Hand over packets of one sender; returns for each whether it was received."""
         connection = self._connection
         if connection is None:
             if payloads:
@@ -131,7 +131,7 @@ class SimulatorLink(rospy.SubscribeListener):
         try:
             self._under_way += connection.broadcast(payload)
         except ServiceRefused:
-            # A new simulator, to which this antenna is announced in a moment: no line in the log.
+            # A new simulator, to which this antenna will soon be announced: not worth a log line.
             self._throttled_log.counts["broadcast refused"] += 1
         except ServiceGone as error:
             self._never_handed_over += 1
@@ -204,5 +204,5 @@ class SimulatorLink(rospy.SubscribeListener):
     # A thread of rospy -----------------------------------------------------------------------
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
-        """A new subscriber, perhaps a new simulator. rospy waits for this: only wake the thread."""
+        """A new subscriber, perhaps a new simulator. rospy waits: only wake the thread."""
         self._look.set()

@@ -29,8 +29,8 @@ class VirtualNRF24(IWirelessCommunication):
     Services:   /Nodes/<id>/powerSwitch (PowerSwitch)
 
     The functions of the interface are for the executor's worker. The handlers run in threads of
-    rospy, and hand everything over to the worker. They own only `_on`, a single flag; `_switching`
-    keeps the announcements and the worker's orders in the order of its changes.
+    rospy and pass everything to the worker. They own only `_on`, a single flag; `_switching` keeps
+    the announcements and the worker's orders in the order in which the flag changed.
     """
 
     def __init__(self, node_id: int, link: SimulatorLink, slot: ExecutorSlot) -> None:
@@ -38,9 +38,9 @@ class VirtualNRF24(IWirelessCommunication):
         self.node_id = node_id
         self._probe = probe_of(node_id)
         self._link = link
-        self._seat = slot
+        self._slot = slot
         self._inbox = Inbox(slot.submit)
-        self._dropped = 0  # packets that the inbox did not take, as far as the worker knows
+        self._dropped = 0  # packets that the inbox dropped, as far as the worker knows
         self._on = False
         self._switching = threading.Lock()
         self._mesh: IMeshNetwork | None = None
@@ -55,7 +55,7 @@ class VirtualNRF24(IWirelessCommunication):
             names.node_topic(self.node_id), NRF24, self._heard, tcp_nodelay=True
         )
         self._panel.start()
-        self._link.antennas.add(self, lambda: self._seat.submit(mesh.on_antenna_registered))
+        self._link.antennas.add(self, lambda: self._slot.submit(mesh.on_antenna_registered))
 
     def stop_antenna(self) -> None:
         """Power off, and leave the ROS graph."""
@@ -69,15 +69,15 @@ class VirtualNRF24(IWirelessCommunication):
         self._subscriber = self._mesh = None
 
     def send_message_to(self, payload: bytes) -> bool:
-        """To the node in byte 3. False: it did not receive it, or there is no simulator."""
+        """Send to the node in byte 3. False: it was not received, or there is no simulator."""
         return self._on and self._link.send(payload)
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
-        """Each to the node in its byte 3, in one call."""
+        """Send each to the node in its byte 3, in one call."""
         return self._link.send_all(payloads) if self._on else [False] * len(payloads)
 
     def broadcast_message(self, payload: bytes) -> None:
-        """To every node in range."""
+        """Send to every node in range."""
         if self._on:
             self._link.broadcast(payload)
 
@@ -115,4 +115,4 @@ class VirtualNRF24(IWirelessCommunication):
             with self._switching:  # announcing only puts into a queue
                 self._on = on
                 self._link.antennas.announce(self)
-                self._seat.submit(lambda now_s: mesh.on_antenna_power(on, now_s))
+                self._slot.submit(lambda now_s: mesh.on_antenna_power(on, now_s))

@@ -22,9 +22,9 @@ from drone_mesh.users.desk import UsersDesk
 
 
 class VirtualRaspberryPi(abc.ABC):
-    """Routing technique, engine connector, antenna and the mesh component that they make up.
+    """Routing technique, engine connector, antenna, and the mesh component built from them.
 
-    Belongs to the executor's worker: make it, start it and stop it there.
+    For the executor's worker only: create, start and stop it there.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
         if self.settings.internet == "mock":
             return mock
         if self.settings.internet == "mqtt":
-            # One gateway sends what is published: several would send it several times.
+            # Only one gateway forwards what is published; several would send it several times.
             sends, broker = self.node_id == 0, self.settings.broker
             mqtt = mqtt_internet(self.slot.submit, self.users, broker, sends=sends)
             self._observers.append(mqtt.observe)

@@ -1,4 +1,4 @@
-"""AntennaTopic: the topic of one antenna, with the truth about whether a packet was received."""
+"""AntennaTopic: the topic of one antenna; reports truthfully whether a packet was received."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class AntennaTopic(DirectPublisher):
         super().peer_subscribe(topic, publish, peer_publish)
 
     def deliver(self, message: NRF24) -> bool:
-        """Publish; False if there is no receiver."""
+        """Publish this packet; returns False if there is no receiver."""
         if not self.has_subscriber():
             return False
         try:
             self.publish(message)
-        except rospy.ROSException:  # the topic was closed meanwhile
+        except rospy.ROSException:  # the topic has been closed
             return False
         return bool(self.connections())

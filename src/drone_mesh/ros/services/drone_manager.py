@@ -55,7 +55,7 @@ class DroneManager:
                 (OrderLayout)
     """
 
-    # Its only state, the layouts, never changes, so the handlers may run in parallel.
+    # The layouts, the only state, never change, so the handlers may run in parallel.
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts = layouts
@@ -73,7 +73,7 @@ class DroneManager:
         rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
-        """Status 1: a gateway received the order; 2: but none has a route; 0: there is none."""
+        """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
         goal = location_of(request)
         try:
             check_goal(*goal)
@@ -125,7 +125,7 @@ class DroneManager:
     def _order(
         self, orders: Sequence[Order], fleet: PresentDrones | None
     ) -> tuple[list[int], list[int]]:
-        """Publish these orders, in this order; returns the ids that were sent, or have no route."""
+        """Publish these orders in sequence; returns the ids (sent, without a route)."""
 
         def publish() -> None:
             for node_id, goal in orders:
@@ -136,7 +136,7 @@ class DroneManager:
         return self._answers.await_outcomes(drones, publish, gateways, ANSWERS_TIMEOUT_S)
 
     def _gateway_is_there(self) -> bool:
-        """Whether a gateway subscribes; waits for one, since it may be starting."""
+        """Whether a gateway subscribes; waits for one, which may be starting."""
         deadline_s = time.monotonic() + WAIT_FOR_GATEWAY_S
         while not rospy.is_shutdown():
             if self._gateways.impl is not None:

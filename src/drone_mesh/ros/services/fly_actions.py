@@ -1,4 +1,4 @@
-"""The node /fly_actions: flights of drones as actions (docs/protocol.md, "Actions")."""
+"""The node /fly_actions: drone flights as actions (docs/protocol.md, "Actions")."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class _Refused(Exception):
 
 
 class _Flight:
-    """One accepted goal."""
+    """An order was not sent; the arguments are outcome and reason."""
 
     def __init__(self, handle: actionlib.ServerGoalHandle, drone: int, since_s: float) -> None:
         """`since_s`: simulated; no event of the order is older."""

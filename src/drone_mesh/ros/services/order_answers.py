@@ -1,4 +1,4 @@
-"""OrderAnswers: waits for what the gateways made of orders."""
+"""OrderAnswers: waits for the gateways' answers to orders."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class OrderAnswers:
     def await_outcomes(
         self, drones: Collection[int], order: Callable[[], None], gateways: int, timeout_s: float
     ) -> tuple[list[int], list[int]]:
-        """Call `order`, and wait for the answers; returns (sent, no route).
+        """Call `order`, then wait for the answers; returns the ids (sent, without a route).
 
-        A drone counts as sent as soon as one gateway has sent the order. It has no route when all
-        `gateways` say so. A drone without a full set of answers after `timeout_s` (wall) counts as
-        sent: a gateway need not answer.
+        A drone counts as sent as soon as one gateway has sent the order, and as without a route
+        when all `gateways` report that. A drone without a full set of answers after `timeout_s` (wall)
+        counts as sent, because a gateway need not answer.
         """
         waiter = _Waiter(drones)
         with self._lock:

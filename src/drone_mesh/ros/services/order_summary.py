@@ -1,4 +1,4 @@
-"""OrderSummary: what became of the orders of a layout."""
+"""OrderSummary: the outcome of the orders of a layout."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drone_mesh.drone.fleet import ids_in_words
 
 @dataclass(frozen=True)
 class OrderSummary:
-    """Ids of the drones of a layout, by what became of their orders."""
+    """Ids of the drones of a layout, by the outcome of their orders."""
 
     sent: Sequence[int]
     no_route: Sequence[int]
@@ -33,5 +33,5 @@ def _counted(number: int, noun: str) -> str:
 
 
 def _named(ids: Sequence[int]) -> str:
-    """drone 3; drones 3, 5..9."""
+    """For example: drone 3; drones 3, 5..9."""
     return f"drone{'' if len(ids) == 1 else 's'} {ids_in_words(ids)}"

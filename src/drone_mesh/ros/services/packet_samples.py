@@ -12,7 +12,7 @@ from drone_mesh.msg import PacketSample
 from drone_mesh.ros.graph import names
 from drone_mesh.state.packets import PacketSampler
 
-PERIOD_S = 0.2  # wall time; as often as pages are sent anything
+PERIOD_S = 0.2  # wall time; the frame period of the web console
 QUEUE = 2  # samples that may wait for a slow subscriber
 
 
@@ -26,7 +26,7 @@ class PacketSamples(rospy.SubscribeListener):
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._sampler = PacketSampler(random.Random())  # what is seen of a run, not the run
+        self._sampler = PacketSampler(random.Random())  # affects only what is displayed
         self._watched = threading.Event()
         self._publisher = rospy.Publisher(
             names.PACKETS_TOPIC, PacketSample, subscriber_listener=self, queue_size=QUEUE
@@ -49,11 +49,11 @@ class PacketSamples(rospy.SubscribeListener):
         self._thread.start()
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
-        """A subscriber has come (a thread of rospy)."""
+        """A subscriber has connected (a thread of rospy)."""
         self._watched.set()
 
     def peer_unsubscribe(self, _topic: str, peers: int) -> None:
-        """A subscriber has left, and so many are still there (a thread of rospy)."""
+        """A subscriber has left; `peers` remain (a thread of rospy)."""
         if not peers and not rospy.is_shutdown():
             self._watched.clear()
 

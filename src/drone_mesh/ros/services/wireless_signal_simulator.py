@@ -58,9 +58,9 @@ class WirelessSignalSimulator:
     """
 
     # The handlers run in the threads of rospy's connections. `_lock` guards the node table, the
-    # rays that it casts and the counts, and is never held during a send. `_opening` guards the set
-    # of topics and lets in one antenna's DroneInfo at a time, so that the topic that is open is the
-    # one in the node table.
+    # rays that it casts and the counts, and is never held during a send. `_opening` guards the set of
+    # topics and admits one antenna's DroneInfo at a time, so that the open topic is always the one
+    # in the node table.
 
     def __init__(self, max_distance_m: float, sees: Sees = None) -> None:
         """`sees` as for NodeTable. Raises AirError for an invalid distance."""
@@ -105,15 +105,15 @@ class WirelessSignalSimulator:
             self._nodes.drone_info(info.nodeID, info.position, info.sub, info.on)
 
     def _open(self, node_id: int, topic: str) -> str | None:
-        """Open the node's topic; the topic that it replaces, None if it replaces none."""
+        """Open the node's topic; returns the topic that it replaces, or None."""
         old_topic = self._topics.get(node_id)
         if topic == old_topic:
             return None
         self._topics[node_id] = topic
         if topic not in self._antenna_topics:
             self._antenna_topics[topic] = AntennaTopic(topic)
-        # An antenna's usual topic stays open: whoever takes its packets elsewhere for a moment does
-        # not cost it the connection.
+        # An antenna's usual topic stays open: redirecting its packets for a moment must not
+        # cost it the connection.
         usual = (names.node_topic(node) for node in self._topics)
         if old_topic is not None and old_topic not in {*usual, *self._topics.values()}:
             self._antenna_topics.pop(old_topic).close()

@@ -1,4 +1,4 @@
-"""Reads states and events of a mesh from a rosbag, and writes them into one."""
+"""Reads and writes the states and events of a mesh in a rosbag."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from drone_mesh.ros.graph.conversions import (
 )
 from drone_mesh.state.model import EventRecord, MeshStatus
 
-EARLIEST_S = 1e-3  # a bag refuses a message of the time 0
+EARLIEST_S = 1e-3  # a bag refuses a message with time 0
 
 
 class BagUnusable(MeshError):
@@ -40,7 +40,7 @@ def read_events(path: Path) -> Iterator[EventRecord]:
 
 
 def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> None:
-    """A bag as record.launch makes it, of states and events in any order. Raises BagUnusable."""
+    """Write a bag like record.launch's; states and events in any order. Raises BagUnusable."""
     try:
         with rosbag.Bag(str(path), "w") as bag:
             for status in states:
@@ -68,5 +68,5 @@ def _open(path: Path) -> rosbag.Bag:
         raise BagUnusable(
             f"{path}: the recording was not closed; 'rosbag reindex {path}' repairs it"
         ) from error
-    except (rosbag.ROSBagException, OSError, ValueError) as error:  # of any bytes whatever
+    except (rosbag.ROSBagException, OSError, ValueError) as error:  # for arbitrary bytes
         raise BagUnusable(f"{path}: not a readable bag ({error})") from error

@@ -33,8 +33,8 @@ _KINDS = (STARTED, CONNECTED, DISCONNECTED)
 class Probe:
     """Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent), /diagnostics (DiagnosticArray)
 
-    It watches the state only on request, since publishing it five times a second costs time. Runs
-    on wall time. Handlers are called by threads of rospy; `_lock` keeps their lines whole.
+    Watches the state only on request, because publishing it five times a second costs time. Runs on
+    wall time. rospy's threads call the handlers; `_lock` keeps their output lines whole.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class Probe:
         self._print(Figures(PROBE, time.monotonic()))
 
     def obey(self, order: str) -> None:
-        """Start or stop watching the state, or start the flights."""
+        """Carry out an order: start or stop watching the state, or start the flights."""
         if order == WATCH and self._watching is None:
             self._watching = rospy.Subscriber(names.STATE_TOPIC, MeshState, self._state)
         elif order == REST and self._watching is not None:
@@ -57,7 +57,7 @@ class Probe:
             self._take_off()
 
     def _take_off(self) -> None:
-        """Send all drones far away, side by side, past the DroneManager and the mesh."""
+        """Send all drones far away, in parallel, bypassing the DroneManager and the mesh."""
         for node in self._seen.nodes:
             topic = names.goal_topic(node.id)
             goal = rospy.Publisher(topic, Location, queue_size=1, latch=True)
@@ -92,7 +92,7 @@ class Probe:
                 try:
                     values[pair.key] = float(pair.value)
                 except ValueError:
-                    continue  # words, for people
+                    continue  # text
             self._print(Figures(status.name, time.monotonic(), values))
 
     def _print(self, sight: Sight) -> None:

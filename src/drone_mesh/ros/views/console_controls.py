@@ -1,4 +1,4 @@
-"""RosControls: carries out the console's orders through the same services as anyone else."""
+"""RosControls: carries out the console's orders through the public services."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The node /mesh_console: the web console beside a running system."""
+"""The node /mesh_console: the web console of a running simulation."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ log = logging.getLogger(__name__)
 
 
 class MeshFeed:
-    """Passes what ROS says to the store and the server, which the runner's loop owns.
+    """Passes ROS messages to the store and the server, which the runner's loop owns.
 
     Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent); while a page draws packets,
                 /mesh/packets (PacketSample)
 
-    A restarted master does not know our subscriptions, so they are made again. `_latest` passes
-    from the subscriber's thread to the loop; a loop that lags behind skips states.
+    A restarted master does not know our subscriptions, so they are renewed. `_latest` passes from
+    the subscriber's thread to the loop; a loop that lags behind skips states.
     """
 
     def __init__(self, store: FrameStore, server: ConsoleServer, runner: ConsoleRunner) -> None:
@@ -62,7 +62,7 @@ class MeshFeed:
         self._packets: rospy.Subscriber | None = None
 
     def watch_master(self, stop: StopRequest) -> None:
-        """Keep the subscriptions alive until the program is to end; for the main thread."""
+        """Keep the subscriptions alive until the program ends; for the main thread."""
         while not stop.wait(CHECK_PERIOD_S) and not rospy.is_shutdown():
             try:
                 run_id = rosgraph.Master(rospy.get_name()).getParam("/run_id")
@@ -88,7 +88,7 @@ class MeshFeed:
         ]
 
     def _watch_packets(self) -> None:
-        """The simulator samples packets for as long as there is a subscriber."""
+        """Subscribe while a page draws packets; the simulator samples only with a subscriber."""
         wanted = self._server.packets_wanted
         if wanted and self._packets is None:
             self._packets = rospy.Subscriber(
@@ -122,7 +122,7 @@ class MeshFeed:
 
 
 def layout_offers(layouts: Layouts) -> list[LayoutOffer]:
-    """All layouts: those of several drones first, then those of one."""
+    """All layouts: first those of several drones, then those of one."""
     known = {FIELD_CASE: "field case", GRID_CASE: "10 x 10 grid"}
     named = []
     for case in layouts.cases:
@@ -173,12 +173,12 @@ def _run() -> int:
         whole=whole,
     )
     runner = ConsoleRunner(server, address, port)
-    stop = StopRequest()  # rospy's signal handler makes it, in the thread that waits for it
+    stop = StopRequest()  # created where signals are handled, in the thread that waits
     rospy.on_shutdown(stop.make)
     runner.start()
     name = socket.gethostname() if address in EVERYWHERE else address
     name = f"[{name}]" if ":" in name else name
-    # Not to the log, which is public on /rosout: the token is secret.
+    # Printed, not logged: the log is public on /rosout, the token is secret.
     if demo:
         print("the demonstration begins when a browser opens this page:", flush=True)
     print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)

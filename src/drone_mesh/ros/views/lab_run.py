@@ -51,7 +51,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _wait(process: subprocess.Popen[bytes]) -> int:
-    """A terminal sends Ctrl-C to roslaunch too, which then ends what it started."""
+    """Wait for it. A terminal sends Ctrl-C to roslaunch as well, which then ends its nodes."""
     while True:
         with contextlib.suppress(KeyboardInterrupt):
             return process.wait()

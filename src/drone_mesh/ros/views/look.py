@@ -1,4 +1,4 @@
-"""The latest state of a mesh, live or from a bag, for the command line tools."""
+"""The latest state of a mesh, live or from a bag, for the command-line tools."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class NoState(MeshError):
 
 
 def parse_with_bag(parser: argparse.ArgumentParser) -> argparse.Namespace:
-    """An option parser with --bag and --at."""
+    """Parse the command line after adding --bag and --at to `parser`."""
     parser.add_argument(
         "--bag", type=Path, help="read the state from a bag instead of the live one"
     )

@@ -1,4 +1,4 @@
-"""The legend that stands on the ground of rviz, south of the mesh: a row for each colour."""
+"""The legend on the ground in rviz, south of the mesh: one row per colour."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
 from drone_mesh.view.palette import DARK, Colour
 
-ROUND_TO_M = 5.0  # the place of the legend changes only when the mesh grows or moves by so much
+ROUND_TO_M = 5.0  # the legend moves only when the mesh grows or moves by this much
 LEAST_HEIGHT_M = 0.5  # of a line of text
 LINES_PER_SIDE = 30  # about as many lines as are as high as the mesh
 LINE_SPACING = 1.4  # in heights of the text
@@ -21,7 +21,7 @@ GAP_M = 1.0  # between mesh and legend
 
 
 class LegendRow(NamedTuple):
-    """One colour and its meaning, and where they stand."""
+    """One colour, its meaning, and where to draw them."""
 
     text: str
     colour: Colour
@@ -32,7 +32,7 @@ class LegendRow(NamedTuple):
 
 
 def legend_rows(positions: Iterable[Vector]) -> list[LegendRow]:
-    """The rows beside drones at these positions, at least one."""
+    """The rows to draw beside drones at these positions, of which there is at least one."""
     xs, ys, _zs = zip(*positions)
     west, east, south, north = (
         ROUND_TO_M * side(value / ROUND_TO_M)

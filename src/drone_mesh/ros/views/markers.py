@@ -20,8 +20,8 @@ from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 from drone_mesh.view.picture import Shape, shape_named
 
-MOST_LINKS = 1500  # our choice, per use: 254 drones on 1 m have 18,000, which are one blot
-TIMES_LARGER = 4.0  # than life: the size of the drones
+MOST_LINKS = 1500  # our choice, per use: 254 drones 1 m apart have 18,000, a blot
+TIMES_LARGER = 4.0  # how much larger than life drones are drawn
 MESHES = "package://drone_mesh/meshes/"  # written by scripts/meshes
 FRAME_COLOUR = DARK.muted
 BOX_RADIUS_M = TIMES_LARGER * Role.ROUTER.size_m[0] / math.sqrt(2)
@@ -35,18 +35,18 @@ _Positions = Dict[int, Tuple[float, float, float]]
 
 
 class MarkerMaker:
-    """Makes the markers that changed since the last call. Belongs to one thread."""
+    """Creates the markers that changed since the last call. Belongs to one thread."""
 
     def __init__(self) -> None:
         self._shown: dict[tuple[str, int], object] = {}
         self._lost = LostLinks()
 
     def forget_shown(self) -> None:
-        """Make all markers at the next call, for a new subscriber."""
+        """Create all markers at the next call, for a new subscriber."""
         self._shown.clear()
 
     def markers(self, state: MeshState, wall_s: float) -> MarkerArray:
-        """What changed since the last call."""
+        """The markers that changed since the last call."""
         nodes = [node for node in state.nodes if position_is_known(node)]
         positions = _fanned_positions(nodes)
         lost = self._lost.update(known_links(nodes), wall_s)
@@ -87,7 +87,7 @@ class MarkerMaker:
     def _add_drones(
         self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions
     ) -> None:
-        """Two markers for each drone, since a mesh in rviz has one colour: frame, and lamp."""
+        """Add two markers per drone, frame and lamp, because a mesh in rviz has one colour."""
         for node in nodes:
             colour = DARK.of_node(node.role, condition_of(node))
             flying = len(node.path) > 0
@@ -170,7 +170,7 @@ class MarkerMaker:
     def _changed(
         self, array: MarkerArray, name: str, number: int, content: Sequence[object]
     ) -> Marker | None:
-        """A new marker to fill in if `content` has changed; an empty one deletes the marker."""
+        """A marker to fill in, or None: unchanged, or deleted because `content` is empty."""
         key = (name, number)
         if self._shown.get(key, []) == content:
             return None
@@ -186,7 +186,7 @@ class MarkerMaker:
 
 
 def _fanned_positions(nodes: Sequence[NodeStatus]) -> _Positions:
-    """Where each node is drawn: nodes at one position are fanned out around it."""
+    """Where to draw each node: nodes at one position are fanned out around it."""
     slots = fan_out(nodes)
     positions = {}
     for node in nodes:

@@ -18,7 +18,7 @@ from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.views.markers import MarkerMaker
 from drone_mesh.state.model import NodeStatus, position_is_known
 
-ALL_FRAMES_PERIOD_S = 1.0  # wall time; a drone that does not move is sent no more often
+ALL_FRAMES_PERIOD_S = 1.0  # wall time; period of the frames of drones that do not move
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # x y z w
 
 
@@ -58,7 +58,7 @@ class MeshMarkers:
             self._markers.publish(markers)
 
     def _moved_frames(self, state: MeshState, wall_s: float) -> TFMessage:
-        """map -> drone_<id>, of drones that moved, and once per ALL_FRAMES_PERIOD_S of all."""
+        """Frames map -> drone_<id> of drones that moved; of all once per ALL_FRAMES_PERIOD_S."""
         if wall_s - self._all_framed_s >= ALL_FRAMES_PERIOD_S:
             self._all_framed_s = wall_s
             self._framed.clear()

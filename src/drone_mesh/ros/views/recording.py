@@ -1,4 +1,4 @@
-"""Recording: reads a whole bag into the history that pages look at, while the bag is played."""
+"""Recording: reads a whole bag into the history of the pages while the bag is played."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drone_mesh.ros.views.bag import BagUnusable, read_events, read_states
 from drone_mesh.state.model import MeshStatus
 
 STATES_AT_ONCE = 10  # our choice: 254 nodes keep the server's loop busy for some 50 ms
-LOOP_LIMIT_S = 10.0  # wall time for it
+LOOP_LIMIT_S = 10.0  # wall time in which the loop must accept them
 
 _log = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ class Recording:
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
 
     def start(self) -> None:
-        """Start reading; the runner serves."""
+        """Start reading; the runner must be serving."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -54,7 +54,7 @@ class Recording:
             _log.warning("the time line stays empty: %s", error)
 
     def _hand_over(self, states: Sequence[MeshStatus]) -> None:
-        """Wait for the loop, so that nothing piles up there."""
+        """Add these states in the loop and wait for it, so that no work piles up there."""
         done = threading.Event()
 
         def extend() -> None:

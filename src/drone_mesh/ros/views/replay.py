@@ -1,4 +1,4 @@
-"""rosrun drone_mesh replay: plays a recorded run with one clock; used by replay.launch."""
+"""rosrun drone_mesh replay: plays a recorded run with a single clock; used by replay.launch."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import require_master, run_tool
 from drone_mesh.ros.views.bag import BagUnusable, topics_in_bag
 
-# Topics that rosbag must not publish: --clock makes the time, and nodes make the log of now.
+# Topics that rosbag must not publish: --clock publishes the time, and running nodes the log.
 NOT_PLAYED = {names.CLOCK_TOPIC, "/rosout", "/rosout_agg"}
 
 
 class AlreadyATime(MeshError):
-    """A simulation, or another recording, publishes /clock on this master."""
+    """A simulation or another recording already publishes /clock on this master."""
 
     def __init__(self, nodes: list[str]) -> None:
         super().__init__(

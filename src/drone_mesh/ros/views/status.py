@@ -67,7 +67,7 @@ def _show(mesh: MeshStatus, colours: bool) -> int:
 
 
 def _watch(colours: bool) -> int:
-    """Print until Ctrl-C. The subscriber's thread only replaces `latest`."""
+    """Print the table until Ctrl-C. The subscriber's thread only replaces `latest`."""
     latest: list[tuple[MeshStatus, float]] = []
     came = threading.Event()
 
@@ -76,7 +76,7 @@ def _watch(colours: bool) -> int:
         came.set()
 
     rospy.Subscriber(names.STATE_TOPIC, MeshState, take, queue_size=1)
-    MasterWatch().start()  # after a restart of the master the states come again
+    MasterWatch().start()  # states arrive again after a restart of the master
     if not came.wait(WAIT_S):
         raise NoState
     try:

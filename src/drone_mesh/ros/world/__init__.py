@@ -1,1 +1,1 @@
-"""The node /DroneFactory: the world, its time, and the state of the whole mesh."""
+"""The node /DroneFactory: the world, its clock, and the state of the whole mesh."""

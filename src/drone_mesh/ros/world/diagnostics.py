@@ -1,4 +1,4 @@
-"""The state of the mesh as diagnostics: one summary, and one status per node with trouble."""
+"""The state of the mesh as diagnostics: one summary, and one status per node with a problem."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drone_mesh.state.trouble import Trouble, find_trouble, summarise
 
 
 def diagnostics_msg(mesh: MeshStatus) -> DiagnosticArray:
-    """One summary, and one entry for each node with trouble."""
+    """One summary, and one entry for each node with a problem."""
     troubles = find_trouble(mesh.nodes)
     summary = summarise(mesh.nodes, troubles)
     by_id = {node.id: node for node in mesh.nodes}

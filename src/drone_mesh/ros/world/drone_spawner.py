@@ -18,7 +18,7 @@ from drone_mesh.world.factory import DroneFactory
 
 
 class DroneSpawner:
-    """Used by one thread. What changes the world waits for the thread of the world."""
+    """For one thread only. Changes to the world are made in the world's thread."""
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class DroneSpawner:
         host: MeshHost | None,
         radios: EmulatedRadios | None,
     ) -> None:
-        """`engines`: None, other nodes fly the drones. `host`: None, others run all nodes."""
+        """`engines` is None if other nodes fly the drones, `host` if others run all nodes."""
         self._factory = factory
         self._runner = runner
         self._state = state
@@ -40,7 +40,7 @@ class DroneSpawner:
     def spawn(
         self, role: Role, longitude: float, latitude: float, node_id: int | None
     ) -> VirtualDrone:
-        """Put a drone into the world, and offer its engine. Raises FleetRefused."""
+        """Add a drone to the world and offer its engine. Raises FleetRefused."""
 
         def spawn() -> VirtualDrone:
             drone = self._factory.add(role, longitude, latitude, node_id)
@@ -54,7 +54,7 @@ class DroneSpawner:
         return drone
 
     def despawn(self, drone: VirtualDrone) -> None:
-        """Withdraw the engine of a drone, and take it out of the world. Raises FleetRefused."""
+        """Withdraw the engine of a drone and remove it from the world. Raises FleetRefused."""
         if self._engines is not None:
             self._engines.withdraw(drone.node_id)
         self._runner.between_steps(functools.partial(self._factory.remove, drone.node_id))
@@ -65,11 +65,11 @@ class DroneSpawner:
         return self._runner.hosts() if self._host is None else [rospy.get_name()]
 
     def start_node(self, node_id: int, role: Role) -> None:
-        """Start the node of a drone, if nodes run in this process."""
+        """Start the node of a drone if this process runs the nodes."""
         if self._host is not None:
             self._host.start_nodes({node_id: role})
 
     def end_node(self, node_id: int) -> None:
-        """End the node of a drone, if nodes run in this process."""
+        """End the node of a drone if this process runs the nodes."""
         if self._host is not None:
             self._host.end_node(node_id)

@@ -1,4 +1,4 @@
-"""The drones of the world in the terms of the mesh's state."""
+"""The world's drones in the terms of the mesh state."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drone_mesh.world.drones import VirtualDrone
 
 
 def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]:
-    """Where these drones are and where they fly. May be called in any thread."""
+    """The positions and flight paths of these drones. Any thread."""
     views = []
     for drone in drones:
         state = drone.engine.state

@@ -33,25 +33,25 @@ class PositionReporter(rospy.SubscribeListener):
     """
 
     def __init__(self, drones: Callable[[], Sequence[VirtualDrone]]) -> None:
-        """`drones` gives all drones of the moment."""
+        """`drones` returns all current drones."""
         self._drones = drones
         self._publisher = rospy.Publisher(
             names.SIGNAL_TOPIC, DroneInfo, tcp_nodelay=True, queue_size=names.SIGNAL_QUEUE
         )
-        # Added once the publisher exists; the report below is for earlier subscribers.
+        # Added once the publisher exists; the report below reaches earlier subscribers.
         implementation = self._publisher.impl
         assert implementation is not None  # it is not closed yet
         implementation.add_subscriber_listener(self)
         self._report_all()
 
     def report(self, info: DroneInfo) -> None:
-        """To all present subscribers."""
+        """Publish to all current subscribers."""
         self._publisher.publish(info)
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """A new subscriber, perhaps a simulator that was restarted: report all positions.
 
-        To all subscribers: rospy's way to reach the new one alone is not safe beside other threads.
+        Goes to all subscribers: rospy's way to reach only the new one is not thread-safe.
         """
         self._report_all()
 
@@ -77,7 +77,7 @@ class EngineServer:
         reporter: PositionReporter,
         happened: Callable[[EventRecord], None],
     ) -> None:
-        """`happened` is called in any thread with what happens to the drone."""
+        """`happened` is called in any thread with each event of the drone."""
         self._happened = happened
         self._node_id = drone.node_id
         self._engine = drone.engine
@@ -125,7 +125,7 @@ class EngineServers:
     def __init__(
         self, drones: Callable[[], Sequence[VirtualDrone]], happened: Callable[[EventRecord], None]
     ) -> None:
-        """`drones` gives all drones of the moment; `happened` as for EngineServer."""
+        """`drones` returns all current drones; `happened` as for EngineServer."""
         self._reporter = PositionReporter(drones)
         self._happened = happened
         self._servers: dict[int, EngineServer] = {}
@@ -136,5 +136,5 @@ class EngineServers:
         self._reporter.report_drone(drone)
 
     def withdraw(self, node_id: int) -> None:
-        """Offer the engine of this drone no longer."""
+        """Withdraw the engine of this drone."""
         self._servers.pop(node_id).close()

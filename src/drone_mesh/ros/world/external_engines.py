@@ -1,4 +1,4 @@
-"""ExternalEngines: the drones are flown by other ROS nodes, and the world shows where they are."""
+"""ExternalEngines: other ROS nodes fly the drones; the world shows their positions."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from drone_mesh.world.drones import VirtualDrone
 
 
 class ExternalEngines:
-    """Subscribes /WirelessSignalSimulator (DroneInfo): what the nodes that fly the drones report.
+    """Subscribes /WirelessSignalSimulator (DroneInfo): reports of the nodes that fly the drones.
 
-    Those nodes offer what an engine of the world would: they subscribe /Drones/<id>/goal, offer
-    /Drones/<id>/gps, and publish DroneInfo without `sub`. Callbacks come in threads of rospy.
+    Those nodes offer what an engine of the world offers: they subscribe /Drones/<id>/goal, offer
+    /Drones/<id>/gps, and publish DroneInfo without `sub`. Callbacks run in threads of rospy.
     """
 
     def __init__(self, drones: Callable[[], Sequence[VirtualDrone]]) -> None:
-        """`drones` gives all drones of the moment."""
+        """`drones` returns all current drones."""
         self._drones = drones
         rospy.Subscriber(
             names.SIGNAL_TOPIC, DroneInfo, self._reported, queue_size=names.SIGNAL_QUEUE

@@ -1,4 +1,4 @@
-"""FactoryParameters: what the node /DroneFactory is started with, checked as a whole."""
+"""FactoryParameters: the parameters of the node /DroneFactory, checked as a whole."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FactoryParameters:
             check_starts(fleet, obstacles)
         if configuration.gui:
             require_screen()
-        # With a bad file of layouts the manager would be restarted for ever; this ends the launch.
+        # With a bad layout file the manager would be restarted for ever; this ends the launch.
         manager_layouts()
         hosts = str(rospy.get_param("~hosts", "") or 1)
         if not hosts.isdigit():

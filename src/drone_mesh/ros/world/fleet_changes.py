@@ -1,4 +1,4 @@
-"""FleetChanges: adds drones to the running simulation, and removes them."""
+"""FleetChanges: adds drones to the running simulation and removes them."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ _log = logging.getLogger(__name__)
 class FleetChanges:
     """Services: /DroneFactory/addDrone (AddDrone), /DroneFactory/removeDrone (RemoveDrone).
 
-    Sets: /drone_mesh/drones, by which other processes learn of each change.
+    Sets /drone_mesh/drones, from which other processes learn of each change.
 
-    One thread makes all changes, one after the other; the first request starts it. Threads of
-    rospy wait for it.
+    One thread makes all changes in sequence; the first request starts it. Threads of rospy wait for
+    it.
     """
 
     def __init__(
@@ -49,15 +49,15 @@ class FleetChanges:
         watch: MasterWatch,
         needed: Mapping[int, str],
     ) -> None:
-        """`watch` restores the parameter when the master was restarted.
+        """`watch` restores the parameter after a restart of the master.
 
-        `needed`: drones that must stay, and why.
+        `needed`: drones that cannot be removed, with the reason.
         """
         self._needed = needed
         self._factory = factory
         self._spawner = spawner
         self._watch = watch
-        self._hosts: dict[int, str] = {}  # of drones added here: which ROS node runs their nodes
+        self._hosts: dict[int, str] = {}  # drone added here -> ROS node that runs its node
         self._worker = ThreadPoolExecutor(1, "fleet changes")
         self._publish()
         self._services = (

@@ -1,4 +1,4 @@
-"""MeshStatePublisher: the state of the whole mesh, merged in the process of the world."""
+"""MeshStatePublisher: merges the state of the whole mesh in the world's process."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from drone_mesh.state.model import EventRecord, MeshStatus, ObstacleStatus
 from drone_mesh.state.roster import DroneView, MeshRoster
 
 WATCHED_PERIOD_S = 0.2  # wall time between two states with a subscriber: flights look smooth
-UNWATCHED_PERIOD_S = 1.0  # and without one: the latched state is at most this old
+UNWATCHED_PERIOD_S = 1.0  # and without one: the greatest age of the latched state
 DIAGNOSTICS_PERIOD_S = 1.0
-REPORTS_KEPT = 64  # of several hosts between two rounds; the newest of each one counts
+REPORTS_KEPT = 64  # of all hosts between two rounds; only the newest of each counts
 EVENTS_QUEUE = 1000
 
 
@@ -44,7 +44,7 @@ class MeshStatePublisher:
                 /diagnostics (DiagnosticArray), 1 Hz
                 /Drones/grounded (GroundedDrones, latched), when it changes
 
-    Handlers of rospy only put reports into a queue; everything else belongs to the one thread.
+    rospy's handlers only put reports into a queue; the object's thread owns everything else.
     """
 
     def __init__(
@@ -57,10 +57,10 @@ class MeshStatePublisher:
         obstacles: Sequence[ObstacleStatus] = (),
         shape: str = "",
     ) -> None:
-        """`look` is called in the thread of this object, and must not wait for the world.
+        """`look` is called in the thread of this object and must not wait for the world.
 
-        `happened` is emptied here, and filled by any thread with what happens to the drones.
-        `routing` and `repair_strategy` are the names of what the nodes use.
+        Any thread fills `happened` with events of the drones; this object empties it. `routing` and
+        `repair_strategy` are the names of what the nodes use.
         """
         self._look = look
         self._max_distance_m = max_distance_m
@@ -86,11 +86,11 @@ class MeshStatePublisher:
 
     @property
     def latest(self) -> MeshStatus | None:
-        """The last published state; None before the first. The next one changes its nodes."""
+        """The last published state, None before the first. The next round changes its nodes."""
         return self._latest
 
     def forget(self, node_id: int) -> None:
-        """This node was removed: show it no longer, even if its host ended before. Any thread."""
+        """Stop showing this removed node, even if its host ended before. Any thread."""
         self._forgotten.append(node_id)
 
     def start(self) -> None:

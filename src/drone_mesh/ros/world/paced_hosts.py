@@ -1,4 +1,4 @@
-"""PacedHosts: how far the nodes have worked, in this process and in others."""
+"""PacedHosts: the progress of the nodes, in this process and in others."""
 
 from __future__ import annotations
 
@@ -14,38 +14,38 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.world.under_way import UnderWay
 
-# Our choice, simulated: a timer is late by this and one step of the world at most, and so is the
-# last of all packets that follow from it. The mesh waits more than ten times as long for an answer.
+# Our choice, simulated: a timer is late by at most this plus one step of the world, and so is the
+# last consequence of an event. The mesh waits more than ten times as long for an answer.
 MAX_LAG_S = 0.03
 HOST_TIMEOUT_S = 2.0  # wall seconds; the world continues without a host that is silent for longer
-LOOK_AGAIN_AFTER_S = 1.0  # wall seconds; between two looks at whether a stranger is a host
+LOOK_AGAIN_AFTER_S = 1.0  # wall seconds; between two checks whether a stranger is a host
 
 _log = logging.getLogger(__name__)
 
 
 class PacedNodes(Protocol):
-    """Nodes that live in the time of the world."""
+    """Nodes that run in the time of the world."""
 
     @property
     def idle(self) -> bool:
-        """Whether they wait for packets, or for time to go on."""
+        """Whether they wait for packets or for time to advance."""
 
     @property
     def under_way(self) -> int:
-        """Packets that they handed over, less those that they have worked off."""
+        """Packets that they handed over, minus those that they have processed."""
 
     def lag_s(self, now_s: float) -> float:
-        """For how many simulated seconds the oldest undone work has been waiting."""
+        """How long the oldest pending work has been waiting, in simulated seconds."""
 
     def time_advanced(self) -> None:
         """The world has made a step."""
 
 
 class _Progress(NamedTuple):
-    """What a host reported last."""
+    """The latest report of a host."""
 
     done_s: float  # simulated; all work up to then is done
-    under_way: int  # packets that it handed over, less those that it has worked off
+    under_way: int  # packets handed over minus packets processed
     reported_s: float  # monotonic
 
 
@@ -53,29 +53,29 @@ class PacedHosts:
     """The nodes of this process, and hosts in other processes.
 
     The mesh is quiet when all hosts have done what was due and no packet is under way, in a queue
-    or between processes. The world may not be ahead of the last quiet moment by more than
-    MAX_LAG_S. So whatever follows from an event, over any number of hops, has happened within that
-    time, however slow the machine is.
+    or between processes. The world is never more than MAX_LAG_S ahead of the last quiet moment, so all
+    consequences of an event, over any number of hops, happen within that time, however slow the
+    machine is.
 
     Subscribes: /mesh/progress (Header), of processes that have declared themselves hosts
 
-    Threads of rospy fill `_progress` and `_strangers`; all else belongs to the world's thread.
+    Threads of rospy fill `_progress` and `_strangers`; the world's thread owns everything else.
     """
 
     def __init__(self, nodes: PacedNodes | None) -> None:
-        """`nodes` are those of this process, if there are any."""
+        """`nodes` are those of this process, or None."""
         self._nodes = nodes
         self._progress: dict[str, _Progress] = {}
         self._under_way = UnderWay()
         self._quiet_s = 0.0  # simulated
-        self._strangers: dict[str, float] = {}  # node -> monotonic seconds of the last look at it
+        self._strangers: dict[str, float] = {}  # node -> monotonic seconds of the last check
         self._throttled_log = ThrottledLog(_log)
-        self._seen = (0.0, 0)  # what was done and what is under way, at the last look
+        self._seen = (0.0, 0)  # work done and packets under way at the last call
         self._stuck_since_s = time.monotonic()  # time stands still, and no work is done
         rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._reported, tcp_nodelay=True)
 
     def are_behind(self, now_s: float) -> bool:
-        """Whether the mesh was quiet too long ago for another step of the world."""
+        """Whether the last quiet moment is too long ago for another step of the world."""
         wall_s = time.monotonic()
         slowest, done_s, under_way, idle = "the nodes of this process", now_s, 0, True
         if self._nodes is not None:
@@ -105,7 +105,7 @@ class PacedHosts:
         return True
 
     def others(self) -> list[str]:
-        """The hosts in other processes that report. Any thread."""
+        """The hosts in other processes that send reports. Any thread."""
         return list(self._progress)
 
     def time_advanced(self) -> None:
@@ -119,13 +119,13 @@ class PacedHosts:
             self._throttled_log.warning("progress ignored", f"{reporter} is not a host of nodes")
             return
         before = self._progress.get(reporter)
-        # Two threads of a host report: the later report may know less.
+        # Two threads of a host send reports, so a later report may show less progress.
         done_s = max(0.0 if before is None else before.done_s, progress.stamp.to_sec())
         under_way = progress.seq - 2**32 if progress.seq >= 2**31 else progress.seq
         self._progress[reporter] = _Progress(done_s, under_way, time.monotonic())
 
     def _is_host(self, reporter: str) -> bool:
-        """Whether it has declared itself a host; the master is not asked for each message."""
+        """Whether it has declared itself a host; asks the master at most once a second."""
         now_s = time.monotonic()
         if now_s - self._strangers.get(reporter, -math.inf) < LOOK_AGAIN_AFTER_S:
             return False

@@ -1,4 +1,4 @@
-"""Simulation: the world, its drones, and by default their nodes, built and run."""
+"""Simulation: builds and runs the world, its drones, and by default their nodes."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class Simulation:
     """Built in `world` and run in the main thread, which steps the world."""
 
     def __init__(self, parameters: FactoryParameters, world: BulletWorld) -> None:
-        """Make the drones. Nothing runs yet."""
+        """Create the drones. Nothing runs yet."""
         self._parameters = parameters
         self._world = world
-        self._happened: deque[EventRecord] = deque()  # to the drones; any thread fills it
+        self._happened: deque[EventRecord] = deque()  # events of the drones; any thread fills it
         configuration = parameters.configuration
         self._factory = DroneFactory(
             world,
@@ -62,7 +62,7 @@ class Simulation:
         )
 
     def run(self, stop: OrderlyStop) -> None:
-        """Offer the engines, start the nodes, and step until `stop` is requested."""
+        """Offer the engines, start the nodes, and step the world until `stop` is requested."""
         engines = None
         if self._parameters.configuration.drones == "external":
             ExternalEngines(self._present)
@@ -98,7 +98,7 @@ class Simulation:
         return None
 
     def _start_host(self, radios: EmulatedRadios | None, stop: OrderlyStop) -> MeshHost | None:
-        """The nodes of this process, while they start; None: they run in others."""
+        """Start the nodes of this process; returns None if other processes run them."""
         if self._parameters.hosts != 1:
             return None
         world = self._world

@@ -1,4 +1,4 @@
-"""WorldRunner: steps the world, publishes /clock, and keeps world and mesh together."""
+"""WorldRunner: steps the world, publishes /clock, and keeps world and mesh in step."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from drone_mesh.srv import SetSpeed, SetSpeedRequest, SetSpeedResponse
 from drone_mesh.world.interfaces import World
 from drone_mesh.world.pace import Pace
 
-# Wall; our choice. The kernel holds minutes of /clock for a subscriber before a send blocks at all.
+# Wall; our choice. The kernel buffers minutes of /clock for a subscriber before a send blocks.
 STUCK_SUBSCRIBER_S = 0.02
 _MEASURE_PERIOD_S = 1.0  # wall
 _LOG_PERIOD_S = 10.0  # wall
 _TOO_SLOW = 0.95  # of the requested factor
-_NAP_S = 0.001  # wall; while the mesh works off what is due
-_TASK_LOOK_S = 0.2  # wall; how soon the end of the world is noticed while waiting for it
+_NAP_S = 0.001  # wall; while the mesh processes what is due
+_TASK_LOOK_S = 0.2  # wall; how soon a waiting caller notices the end of the simulation
 _LONGEST_NAP_S = 0.05  # wall; a new speed or Ctrl-C takes effect after this at the latest
 
 _log = logging.getLogger(__name__)
@@ -41,10 +41,10 @@ class WorldRunner:
     """Steps a world in the thread that calls `run`.
 
     Publishes: /clock (Clock) at 100 Hz of simulated time; /DroneFactory/real_time_factor (Float32),
-               the factor achieved, once a second. Subscribes: /mesh/progress (Header).
+               the achieved factor, once a second. Subscribes: /mesh/progress (Header).
     Services:  /DroneFactory/setSpeed (SetSpeed)
 
-    The world never runs ahead of the nodes' undone work: when the machine is too slow, simulated
+    The world never runs ahead of pending work of the nodes: when the machine is too slow, simulated
     time slows down, and no timer is late. Threads of rospy set `_paused` and `_wanted`.
     """
 
@@ -75,9 +75,9 @@ class WorldRunner:
         return self._hosts.others()
 
     def between_steps(self, function: Callable[[], Result]) -> Result:
-        """What `function` returns or raises, called in the thread of `run`. Any other thread.
+        """Call `function` in the thread of `run`; returns its result. Any other thread.
 
-        Raises FleetRefused if the simulation ends before.
+        Raises what `function` raises, and FleetRefused if the simulation ends first.
         """
         future: Future[Result] = Future()
         self._tasks.append((function, future))
@@ -110,11 +110,11 @@ class WorldRunner:
             function, future = self._tasks.popleft()
             try:
                 future.set_result(function())
-            except Exception as error:  # for the thread that waits
+            except Exception as error:  # passed to the waiting thread
                 future.set_exception(error)
 
     def _step_when_due(self, pace: Pace) -> None:
-        """Make a step, or take a nap if none is due."""
+        """Make a step, or sleep briefly if none is due."""
         now_s = self._world.now_s
         if self._paused or self._wanted != pace.factor:
             pace.restart(self._wanted)
@@ -133,7 +133,7 @@ class WorldRunner:
             self._hosts.time_advanced()
 
     def _measure(self, before_s: tuple[float, float]) -> tuple[float, float]:
-        """Publish the factor since `before_s` (simulated, wall); returns the two times of now."""
+        """Publish the factor since `before_s` (simulated, wall); returns the current times."""
         now_s = self._world.now_s, time.monotonic()
         self._factor.publish((now_s[0] - before_s[0]) / (now_s[1] - before_s[1]))
         return now_s

@@ -18,7 +18,7 @@ from drone_mesh.world.interfaces import World
 def window_of(
     world: World, drones: Callable[[], Sequence[VirtualDrone]], state: MeshStatePublisher
 ) -> WindowProcess:
-    """A window, not started yet: positions as they are now, all else from the latest state."""
+    """A window that is not started yet; it shows current positions and the latest state."""
     lost_links = LostLinks()
 
     def look() -> Scene:
