@@ -16,6 +16,7 @@ from rostest_support import WALL_LIMIT_S, call, wait_for
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from drone_mesh.msg import Location
 from drone_mesh.srv import PowerSwitch
 
 RVIZ_LIMIT_S = 40.0  # software rendering takes its time
@@ -94,8 +95,24 @@ class MeshMarkersTest(unittest.TestCase):
         call("/Nodes/2/powerSwitch", PowerSwitch, True)
         wait_for("no lost links", WALL_LIMIT_S, lambda: self.points("links: lost") == 0)
 
+    def test_3_the_rotors_of_a_drone_turn_while_it_flies(self) -> None:
+        goals = rospy.Publisher("/Drones/2/goal", Location, queue_size=1, latch=True)
+        turned: set[float] = set()
+
+        def rotors_turn() -> bool:
+            marker = self.markers.get(("rotors", 0))
+            if marker is not None:
+                self.assertEqual(len(marker.points), 4 * 2)  # of one drone
+                turned.add(round(marker.points[0].x - marker.points[1].x, 3))
+            return len(turned) > 2
+
+        goals.publish(latitude=0.0, longitude=6.0, height=20)
+        wait_for("turning rotors", WALL_LIMIT_S, rotors_turn)
+        wait_for("rotors at rest", WALL_LIMIT_S, lambda: ("rotors", 0) not in self.markers)
+        goals.unregister()
+
     @unittest.skipUnless(shutil.which("rviz") and shutil.which("Xvfb"), "rviz or Xvfb is missing")
-    def test_3_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:
+    def test_4_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:
         config = os.path.join(rospkg.RosPack().get_path("drone_mesh"), "config", "drone_mesh.rviz")
         read, write = os.pipe()
         screen = subprocess.Popen(

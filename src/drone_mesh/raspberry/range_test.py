@@ -1,9 +1,8 @@
 """The range measurement: loss at each rate and power. The far end follows the announced rate.
 
-A node never changes its rate because of a packet: only `answer` does, which somebody has started
-there. It follows for a limited time: after `hold_s` without a packet, and when it is told so, it
-is back at its own rate. The announcement and its confirmation use the rate that both ends were
-started with, at full power.
+A node never changes its rate because of a packet. Only `answer` does, and a person starts it. It
+returns to its own rate when the measuring end asks for it, and after `hold_s` without a packet. The
+announcement and its confirmation use the rate that both ends were started with, at full power.
 """
 
 from __future__ import annotations

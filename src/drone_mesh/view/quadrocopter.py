@@ -8,13 +8,19 @@ from __future__ import annotations
 
 import enum
 import math
+from typing import Tuple
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.view.solids import Solid, bar, dome, normal, polygon, prism
 
 MOTORS = ((0.063, 0.063), (-0.063, 0.063), (-0.063, -0.063), (0.063, -0.063))  # x, y
 ROTOR_RADIUS_M = 0.037
+BLADE_WIDTH_M = 0.012
 ROTOR_LOW_M, ROTOR_HIGH_M = 0.070, 0.074
+DISC_HIGH_M = 0.072
+ROTOR_RAD_PER_S = 9.0  # our choice: a real one is a blur
+
+_Place = Tuple[float, float]
 
 
 class Part(enum.Enum):
@@ -24,6 +30,7 @@ class Part(enum.Enum):
     LAMP = "lamp"  # in the colour of the drone's condition
     BLADES = "blades"  # of the rotors, at rest
     DISCS = "discs"  # the rotors as one sees them in flight
+    ROTOR = "rotor"  # the blades of one rotor, around the origin
 
 
 def solid_of(role: Role, part: Part) -> Solid:
@@ -34,16 +41,29 @@ def solid_of(role: Role, part: Part) -> Solid:
         return _gateway_lamp() if role is Role.GATEWAY else _router_lamp()
     if part is Part.BLADES:
         return [triangle for motor in range(4) for triangle in rotor(motor, 0.6 + 0.9 * motor)]
+    if part is Part.ROTOR:
+        return prism(bar(*blade_ends((0.0, 0.0), 0.0), BLADE_WIDTH_M), DISC_HIGH_M, ROTOR_HIGH_M)
     discs = (polygon(motor, ROTOR_RADIUS_M, 12) for motor in MOTORS)
-    return [t for disc in discs for t in prism(disc, ROTOR_LOW_M, ROTOR_HIGH_M)]
+    return [t for disc in discs for t in prism(disc, ROTOR_LOW_M, DISC_HIGH_M)]
 
 
 def rotor(motor: int, turned_rad: float) -> Solid:
     """The two blades on one motor."""
-    x, y = MOTORS[motor]
-    reach_x, reach_y = (ROTOR_RADIUS_M * f(turned_rad) for f in (math.cos, math.sin))
-    blades = bar((x - reach_x, y - reach_y), (x + reach_x, y + reach_y), 0.012)
+    blades = bar(*blade_ends(MOTORS[motor], turned_rad), BLADE_WIDTH_M)
     return prism(blades, ROTOR_LOW_M, ROTOR_HIGH_M)
+
+
+def blade_ends(motor: _Place, turned_rad: float) -> tuple[_Place, _Place]:
+    """Where the two blades on the motor at this place end."""
+    reach_x, reach_y = (ROTOR_RADIUS_M * f(turned_rad) for f in (math.cos, math.sin))
+    x, y = motor
+    return (x - reach_x, y - reach_y), (x + reach_x, y + reach_y)
+
+
+def turned_rad(time_s: float, motor: int) -> float:
+    """How far the rotor on a motor of a flying drone has turned; two turn each way."""
+    turned = math.fmod(ROTOR_RAD_PER_S * time_s, 2 * math.pi)
+    return turned if motor % 2 == 0 else -turned
 
 
 def _frame() -> Solid:

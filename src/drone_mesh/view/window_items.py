@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Sequence, Tuple
 
 import pybullet
@@ -96,6 +97,7 @@ class WindowItems:
         )
 
     def _show_drones(self, drones: Sequence[DronePicture], scale: float, rescaled: bool) -> None:
+        now_s = time.monotonic()  # while simulated time stands still, no scene comes to be shown
         shown = {drone.node_id: drone for drone in drones}
         for node_id, (body, before) in list(self._drones.items()):
             now = shown.get(node_id)
@@ -113,6 +115,7 @@ class WindowItems:
                     self._bodies.move_drone(body, drone, scale)
                 if before.colour != drone.colour:
                     self._bodies.colour_drone(body, drone)
+                self._bodies.turn_rotors(body, drone, now_s)
             self._drones[drone.node_id] = (body, drone)
 
     def _show_ids(self, scale: float, with_ids: bool) -> None:

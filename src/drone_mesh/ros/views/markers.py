@@ -19,6 +19,13 @@ from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known
 from drone_mesh.view.fan import fan_offset, fan_out
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 from drone_mesh.view.picture import Shape, shape_named
+from drone_mesh.view.quadrocopter import (
+    BLADE_WIDTH_M,
+    MOTORS,
+    ROTOR_HIGH_M,
+    blade_ends,
+    turned_rad,
+)
 
 MOST_LINKS = 1500  # our choice, per use: 254 drones 1 m apart have 18,000, a blot
 TIMES_LARGER = 4.0  # how much larger than life drones are drawn
@@ -58,6 +65,7 @@ class MarkerMaker:
                 self._add_boxes(array, of_role, role, positions)
         else:
             self._add_drones(array, nodes, positions)
+            self._add_rotors(array, nodes, positions, state.header.stamp.to_sec())
         for use, links in links_by_use(nodes, lost).items():
             lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
             colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
@@ -104,6 +112,26 @@ class MarkerMaker:
                     marker.color = _colour(tint)
                     marker.pose.position = _point(positions[node.id], up=0.0)
         self._delete_gone(array, ("frames", "lamps"), nodes)
+
+    def _add_rotors(
+        self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions, time_s: float
+    ) -> None:
+        """The blades of all drones in flight, as one marker; they turn in simulated time."""
+        flying = [positions[node.id] for node in nodes if len(node.path) > 0]
+        marker = self._changed(array, "rotors", 0, [time_s, *flying] if flying else [])
+        if marker:
+            marker.type = Marker.LINE_LIST
+            marker.scale.x = TIMES_LARGER * BLADE_WIDTH_M
+            marker.color = _colour(FRAME_COLOUR)
+            blades = [
+                (TIMES_LARGER * x, TIMES_LARGER * y)
+                for number, motor in enumerate(MOTORS)
+                for x, y in blade_ends(motor, turned_rad(time_s, number))
+            ]
+            up = TIMES_LARGER * ROTOR_HIGH_M
+            marker.points = [
+                Point(x + dx, y + dy, z + up) for x, y, z in flying for dx, dy in blades
+            ]
 
     def _add_obstacles(self, array: MarkerArray, boxes: Sequence[ObstacleStatus]) -> None:
         for number, box in enumerate(boxes):
