@@ -56,9 +56,7 @@ def _obstacles_of(fleet: FactoryConfiguration) -> Obstacles | None:
     try:
         return configured_obstacles(fleet)
     except ConfigurationError as error:
-        _log.warning(
-            "%s; only the world refuses orders into obstacles, these nodes do not", error
-        )
+        _log.warning("%s; only the world refuses orders into obstacles, these nodes do not", error)
         return None
 
 

@@ -42,8 +42,8 @@ class OrderAnswers:
         """Call `order`, then wait for the answers; returns the ids (sent, without a route).
 
         A drone counts as sent as soon as one gateway has sent the order, and as without a route
-        when all `gateways` report that. A drone without a full set of answers after `timeout_s` (wall)
-        counts as sent, because a gateway need not answer.
+        when all `gateways` report that. A drone without a full set of answers after `timeout_s`
+        (wall) counts as sent, because a gateway need not answer.
         """
         waiter = _Waiter(drones)
         with self._lock:

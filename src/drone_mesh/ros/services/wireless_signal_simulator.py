@@ -58,9 +58,9 @@ class WirelessSignalSimulator:
     """
 
     # The handlers run in the threads of rospy's connections. `_lock` guards the node table, the
-    # rays that it casts and the counts, and is never held during a send. `_opening` guards the set of
-    # topics and admits one antenna's DroneInfo at a time, so that the open topic is always the one
-    # in the node table.
+    # rays that it casts and the counts, and is never held during a send. `_opening` guards the set
+    # of topics and admits one antenna's DroneInfo at a time, so that the open topic is always the
+    # one in the node table.
 
     def __init__(self, max_distance_m: float, sees: Sees = None) -> None:
         """`sees` as for NodeTable. Raises AirError for an invalid distance."""

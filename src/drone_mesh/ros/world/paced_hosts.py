@@ -53,8 +53,8 @@ class PacedHosts:
     """The nodes of this process, and hosts in other processes.
 
     The mesh is quiet when all hosts have done what was due and no packet is under way, in a queue
-    or between processes. The world is never more than MAX_LAG_S ahead of the last quiet moment, so all
-    consequences of an event, over any number of hops, happen within that time, however slow the
+    or between processes. The world is never more than MAX_LAG_S ahead of the last quiet moment, so
+    all consequences of an event, over any number of hops, happen within that time, however slow the
     machine is.
 
     Subscribes: /mesh/progress (Header), of processes that have declared themselves hosts
