@@ -11,10 +11,11 @@ import time
 from inprocess_mesh import InProcessMesh
 
 from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.gateway_client import GatewayControls
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.runner import ConsoleRunner
-from drone_mesh.console.server import FRAME_PERIOD_S, ConsoleServer
+from drone_mesh.console.server import ALL_ACTIONS, FRAME_PERIOD_S, ConsoleServer
 from drone_mesh.layouts import Layouts
 from drone_mesh.web.access import access_for
 
@@ -68,6 +69,7 @@ def main() -> None:
     parser.add_argument(
         "--recorded", type=float, default=0.0, help="simulated seconds of a recording; 2 a second"
     )
+    parser.add_argument("--real", action="store_true", help="offer what a real gateway can do")
     options = parser.parse_args()
     logging.basicConfig(level=logging.INFO)
     mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
@@ -81,6 +83,7 @@ def main() -> None:
         access,
         LAYOUTS,
         options.demonstrate,
+        GatewayControls.ACTIONS if options.real else ALL_ACTIONS,
         recording=options.recording,
         whole=whole,
     )

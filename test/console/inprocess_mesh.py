@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.orders import OrderRefused
+from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.inprocess.network import Network
 from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.state.events import EventBatcher
@@ -116,3 +117,20 @@ class InProcessMesh:
     def speed(self, paused: bool, factor: float) -> str:
         self.paused, self.factor = paused, factor or self.factor
         return "paused" if paused else f"speed {self.factor:g}"
+
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
+        with self._lock:
+            nodes = self._network.nodes
+            if node is None:
+                node = min(set(range(MAX_DRONES)) - nodes.keys())
+            elif node in nodes:
+                raise OrderRefused(f"drone {node} exists already: choose another id")
+            add = self._network.add_gateway if gateway else self._network.add_router
+            add(node, x, y, self._network.now_s())
+        return f"added {'gateway' if gateway else 'router'} {node} at x {x:g} m, y {y:g} m"
+
+    def remove(self, node: int) -> str:
+        with self._lock:
+            gone = self._network.nodes.pop(node)
+            gone.component.stop()
+        return f"removed router {node}"

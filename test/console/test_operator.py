@@ -181,3 +181,71 @@ def test_a_file_that_is_no_layout_is_refused_with_its_line(page, tmp_path):
     page.page.click("#files-button")
     page.page.set_input_files("#load-places", str(path))
     page.wait_for("the reason", lambda: "line 3" in page.page.inner_text("#toasts"))
+
+
+def test_a_drone_is_added_with_a_click_on_the_map_and_removed_again(page):
+    page.page.click("#add")
+    assert page.page.get_attribute("#add-id", "placeholder") == "lowest free (18)"
+    page.page.mouse.click(*on_screen(page, 30.0, 15.0))
+    assert page.page.input_value("#add-x") in ("29.9", "30", "30.1")
+    page.page.fill("#add-y", "14")
+    page.page.click("#add-form [type=submit]")
+    page.wait_for("what came of it", lambda: toast(page) == "added router 18 at x 30 m, y 14 m")
+    page.wait_for("19 drones", lambda: page.drawn("drones") == 19)
+    assert not page.page.is_visible("#add-form")
+    page.page.mouse.click(*on_screen(page, 30.0, 14.0))  # a click selects again
+    assert page.page.inner_text("#node-name") == "Router 18"
+    page.page.click("#remove")
+    assert "Router 18 leaves the simulation" in page.page.inner_text("#confirm-text")
+    page.page.click("#confirm >> text=Cancel")
+    assert page.drawn("drones") == 19
+    page.page.click("#remove")
+    page.page.click("#confirm >> text=Remove 18")
+    page.wait_for("18 drones", lambda: page.drawn("drones") == 18)
+    assert page.page.is_visible("#node-none")
+    assert page.complaints == []
+
+
+def test_a_gateway_is_added_and_removed_by_keyboard(page):
+    keyboard = page.page.keyboard
+    keyboard.press("a")
+    keyboard.type("-3,5")
+    keyboard.press("Tab")
+    keyboard.type("far")
+    keyboard.press("Enter")
+    page.wait_for("a reason", lambda: "y must be a number" in page.page.inner_text("#add-error"))
+    assert page.page.get_attribute("#add-y", "aria-invalid") == "true"
+    keyboard.type("8")  # the field that is wrong is selected
+    page.page.select_option("#add-role", "gateway")
+    page.page.fill("#add-id", "3")
+    page.page.press("#add-id", "Enter")
+    page.wait_for("a refusal", lambda: "exists already" in toast(page))
+    page.page.fill("#add-id", "200")
+    page.page.press("#add-id", "Enter")
+    page.wait_for("gateway 200", lambda: page.page.locator("#nodes tr[data-id='200']").count() == 1)
+    page.page.fill("#find", "200")
+    page.page.press("#find", "Enter")
+    assert page.page.inner_text("#node-name") == "Gateway 200"
+    keyboard.press("Delete")
+    keyboard.press("Tab")  # from "Cancel", which has the focus
+    keyboard.press("Enter")
+    page.wait_for("it is gone", lambda: page.drawn("drones") == 18)
+    keyboard.press("a")
+    keyboard.press("Escape")  # leaves the field
+    keyboard.press("Escape")
+    assert not page.page.is_visible("#add-form")
+
+
+def test_the_page_of_a_real_mesh_offers_only_what_its_gateway_can_carry_out(start_console, visit):
+    page = visit(start_console("--real", *FAST).url)
+    page.wait_for_drones(len(PLACES))
+    for key in ("n", "a", "Delete"):
+        page.page.keyboard.press(key)
+    assert page.page.is_visible("#fly-form [type=submit]")
+    for order in ("#power", "#pause", "#demonstrate", "#add", "#add-form", "#remove", "#confirm"):
+        assert not page.page.is_visible(order), order
+
+
+def toast(page: Visit) -> str:
+    """The latest one."""
+    return str(page.page.evaluate("document.querySelector('#toasts').lastChild?.textContent ?? ''"))

@@ -268,6 +268,18 @@ def test_at_phone_width_nothing_sticks_out_and_each_view_is_one_tap_away(start_c
         page.page.tap(f"nav button[data-tab={tab}]")
         assert page.page.locator(f"#{card}-card").is_visible()
         assert page.page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert not page.page.is_visible(".legend")
+    page.page.tap("#show-legend")
+    legend = page.page.locator(".legend").bounding_box()
+    assert legend is not None
+    assert legend["x"] >= 0
+    assert legend["x"] + legend["width"] <= 390
+    for entry in ("known link", "flight path", "heartbeat"):
+        assert page.page.locator(f".legend li:has-text('{entry}')").is_visible()
+    page.wait_for(
+        "no drone is below the legend",
+        lambda: max(on_screen(page, *place)[1] for place in PLACES) < legend["y"],
+    )
 
 
 def test_a_finger_that_moves_the_map_sends_no_drone_away(start_console, visit):
@@ -411,7 +423,7 @@ def test_on_a_phone_the_selected_node_its_switch_and_its_close_button_stay_on_th
         lambda: page.page.inner_text("#node-condition") == "not connected to a gateway",
         within_s=20.0,
     )
-    for selector in ("#node-close", "#power", "#fly-form button"):
+    for selector in ("#node-close", "#power", "#fly-form [type=submit]", "#remove"):
         box = page.page.locator(selector).bounding_box()
         assert box is not None
         assert box["x"] >= 0, selector
@@ -424,6 +436,15 @@ def test_on_a_phone_the_selected_node_its_switch_and_its_close_button_stay_on_th
         x, y = on_screen(page, *place)
         assert card["x"] <= x <= card["x"] + card["width"], place
         assert top["y"] + top["height"] <= y <= card["y"] + card["height"], place
+
+
+def test_the_chart_of_hops_has_a_gap_while_no_router_is_connected(page):
+    page.wait_for("hops", lambda: page.page.inner_text("#hops-now") not in ("–", ""))
+    page.page.click("#nodes tr[data-id='0']")
+    page.page.click("#power")  # the gateway is off
+    page.page.select_option("#speed", "10")
+    page.wait_for("no share", lambda: page.page.inner_text("#share-now") == "0 %", 30.0)
+    page.wait_for("no hops", lambda: page.page.inner_text("#hops-now") == "–")
 
 
 def test_drones_at_one_position_are_fanned_out_and_each_can_be_selected(start_console, visit):

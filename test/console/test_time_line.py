@@ -6,6 +6,7 @@ import pytest
 from conftest import Visit
 
 HASTE = ("--skip", "5", "--haste", "5")
+ORDERS = ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate", "#add", "#remove")
 
 
 @pytest.fixture
@@ -35,7 +36,7 @@ def test_dragging_back_shows_the_past_and_live_returns_to_the_present(page):
     page.wait_for("5 was on", lambda: page.row(5, 2) == "connected")
     page.wait_for("the badge", lambda: page.page.is_visible("#past"))
     assert clock_s(page) < 12.0
-    for order in ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate"):
+    for order in ORDERS:
         assert not page.page.is_visible(order)
     page.page.click("#time-live")
     page.wait_for("the present", lambda: page.row(5, 2) == "off")
@@ -87,7 +88,7 @@ def test_all_of_a_recording_that_is_played_can_be_looked_at_at_once(start_consol
     page.wait_for("the badge", lambda: page.page.is_visible("#badge"))
     assert page.page.title() == "run.bag: recording"
     page.page.click("#nodes tr[data-id='5']")
-    for order in ("#power", "#fly-form", "#pause", "#layout-form", "#demonstrate"):
+    for order in ORDERS:
         assert not page.page.is_visible(order)
     assert page.page.inner_text("#time-now").endswith(" of 80 s")
     assert clock_s(page) < 40.0

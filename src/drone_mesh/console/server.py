@@ -45,6 +45,7 @@ from drone_mesh.console.orders import (
 )
 from drone_mesh.console.page import Page
 from drone_mesh.console.stage import Stage
+from drone_mesh.state.packets import PacketKind
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied
 
@@ -56,7 +57,7 @@ SEND_TIMEOUT_S = 10.0
 MOST_PAGES = 32
 MOST_ORDERS_WAITING = 16  # per page
 ORDER_THREADS = 8
-ALL_ACTIONS = ("fly", "power", "layout", "speed", "demonstrate", "packets")
+ALL_ACTIONS = ("fly", "power", "layout", "speed", "add", "remove", "demonstrate", "packets")
 COOKIE = "drone_mesh_token"
 POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1
 TRY_LATER = 1013  # registry of close codes of RFC 6455
@@ -220,6 +221,7 @@ class ConsoleServer:
                 "layouts": list(self._layouts),
                 "limits": LIMITS,
                 "actions": list(self._actions),
+                "packet_kinds": [kind.value for kind in PacketKind],
                 "recording": self._recording,
             }
             await self._send(page, json.dumps(hello))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Iterator, Sequence
+from typing import Iterable, Iterator, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, PercentFormatter
@@ -18,6 +18,7 @@ from drone_mesh.view.palette import LIGHT
 MOST_NAMED = 12  # events of one kind that are labelled; more would overlap
 MOST_IDS = 4  # of nodes in one label
 LABEL_POINTS = (8, 18)  # above their marks; labels close to each other alternate
+MARKS_AT = 1.04  # of the share's axis: above a line at 100 %
 CLOSE_SHARE = 0.07  # of the run: labels closer than this would overlap
 MOST_BARS_NAMED = 40  # nodes whose ids all fit below their bars
 
@@ -26,20 +27,15 @@ def timeline_figure(story: RunStory) -> str:
     """The connected share and the hops over time, with marks for what happened."""
     figure, (share, hops) = figure_with_rows(4.2, rows=2, heights=(2, 1))
     times = [sample.stamp_s for sample in story.samples]
-    # A share of no routers does not exist: the line has a gap there.
-    percent = [
-        math.nan if sample.connected_share is None else 100 * sample.connected_share
-        for sample in story.samples
-    ]
-    share.fill_between(times, percent, color=LIGHT.connected, alpha=0.15, lw=0)
-    share.plot(times, percent, color=LIGHT.connected, lw=1.5)
-    share.set_ylim(0, 108)
+    connected = with_gaps(sample.connected_share for sample in story.samples)
+    share.fill_between(times, connected, color=LIGHT.connected, alpha=0.15, lw=0)
+    share.plot(times, connected, color=LIGHT.connected, lw=1.5)
+    share.set_ylim(0, 1.08)
     share.set_ylabel("routers connected")
-    share.yaxis.set_major_formatter(PercentFormatter())
+    share.yaxis.set_major_formatter(PercentFormatter(xmax=1))
     _mark_events(share, story)
-    # Where no router is connected, none has hops.
-    most = [s.most_hops if s.routers_connected else math.nan for s in story.samples]
-    mean = [s.mean_hops if s.routers_connected else math.nan for s in story.samples]
+    most = with_gaps(sample.most_hops for sample in story.samples)
+    mean = with_gaps(sample.mean_hops for sample in story.samples)
     hops.plot(times, most, color=LIGHT.accent, label="most")
     hops.plot(times, mean, color=LIGHT.gateway, label="mean")
     hops.set_ylabel("hops")
@@ -50,6 +46,11 @@ def timeline_figure(story: RunStory) -> str:
     for axes in (share, hops):
         axes.set_xlim(times[0], max(times[-1], times[0] + 1))
     return svg_of(figure)
+
+
+def with_gaps(values: Iterable[float | None]) -> list[float]:
+    """The values of a line, which has a gap where there is none: matplotlib draws no NaN."""
+    return [math.nan if value is None else value for value in values]
 
 
 def messages_figure(story: RunStory) -> str:
@@ -79,7 +80,7 @@ def _mark_events(axes: Axes, story: RunStory) -> None:
     for kind, colour, shape, word in marks:
         found = [event for event in story.events if event.kind == kind.value]
         for event in found:
-            axes.plot([event.stamp_s], [104], marker=shape, color=colour, ms=6, clip_on=False)
+            axes.plot([event.stamp_s], [MARKS_AT], marker=shape, color=colour, ms=6, clip_on=False)
         if len(found) <= MOST_NAMED:
             labels += [(at_s, text, colour) for at_s, text in grouped(found, word, close_s)]
     height, before_s = LABEL_POINTS[0], -math.inf
@@ -88,7 +89,7 @@ def _mark_events(axes: Axes, story: RunStory) -> None:
         height = LABEL_POINTS[close and height == LABEL_POINTS[0]]
         before_s = at_s
         axes.annotate(
-            text, (at_s, 104), (4, height), size=8, color=colour,
+            text, (at_s, MARKS_AT), (4, height), size=8, color=colour,
             textcoords="offset points", annotation_clip=False,
         )  # fmt: skip
 

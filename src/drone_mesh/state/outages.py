@@ -107,8 +107,8 @@ class MeshSample:
     routers_on: int
     routers_connected: int
     messages: int  # sum over all nodes of packets sent since the start
-    mean_hops: float  # over connected routers; 0 when there is none
-    most_hops: int
+    mean_hops: float | None  # over connected routers; None when there is none
+    most_hops: int | None
 
     @property
     def connected_share(self) -> float | None:
@@ -125,6 +125,6 @@ def take_sample(mesh: MeshStatus) -> MeshSample:
         routers_on=len(routers),
         routers_connected=len(hops),
         messages=sum(node.total_messages for node in mesh.nodes),
-        mean_hops=sum(hops) / len(hops) if hops else 0.0,
-        most_hops=max(hops, default=0),
+        mean_hops=sum(hops) / len(hops) if hops else None,
+        most_hops=max(hops, default=None),
     )

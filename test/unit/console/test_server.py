@@ -109,6 +109,10 @@ def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> Non
     asyncio.run(main())
 
 
+ACTIONS = ["fly", "power", "layout", "speed", "add", "remove", "demonstrate", "packets"]
+KINDS = ["heartbeat", "introduction", "position", "repair", "order", "report", "data", "other"]
+
+
 def test_a_page_is_greeted_and_then_gets_everything():
     async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
         page = FakePage(server).open()
@@ -117,7 +121,8 @@ def test_a_page_is_greeted_and_then_gets_everything():
             "type": "hello",
             "layouts": [[0, "0: field case", [[1, 2.0, 3.0, 0.0]]]],
             "limits": {"coordinate": 5000.0, "height": 500.0},
-            "actions": ["fly", "power", "layout", "speed", "demonstrate", "packets"],
+            "actions": ACTIONS,
+            "packet_kinds": KINDS,
             "recording": "",
         }
         assert page.received[1]["full"]

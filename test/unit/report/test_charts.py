@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from drone_mesh.report.charts import grouped
+import math
+
+from drone_mesh.report.charts import grouped, with_gaps
 from drone_mesh.state.model import EventRecord
 
 
@@ -18,3 +20,9 @@ def test_events_close_to_each_other_share_a_label():
 def test_a_label_names_a_few_nodes_of_a_crowd():
     found = events(*((10.0, node) for node in range(6)))
     assert list(grouped(found, "off", close_s=5.0)) == [(10.0, "0, 1, 2, 3, … off")]
+
+
+def test_a_line_has_a_gap_where_there_is_no_value():
+    low, gap, high = with_gaps([0.0, None, 2])
+    assert (low, high) == (0.0, 2)
+    assert math.isnan(gap)

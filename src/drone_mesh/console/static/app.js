@@ -3,6 +3,7 @@
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { chartsCsv, chartsPicture, nodesCsv, placesYaml, save } from "./files.js";
+import { Fleet } from "./fleet.js";
 import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
 import { MapView } from "./map.js";
@@ -48,13 +49,15 @@ function toast(text, bad, undo) {
   setTimeout(close, bad ? FAILURE_MS : TOAST_MS);
 }
 
-/** Sends an order and shows its outcome. `button` is disabled meanwhile; `undo` is the order that takes it back. */
+/** Sends an order and shows its outcome; true if it was carried out. `button` is disabled meanwhile; `undo` is the order that takes it back. */
 async function order(request, button, undo) {
   if (button) button.disabled = true;
   try {
     toast(await connection.order(request), false, undo && (() => order(undo, button)));
+    return true;
   } catch (error) {
     toast(error.message, true);
+    return false;
   } finally {
     if (button) button.disabled = false;
   }
@@ -84,6 +87,7 @@ const panel = new NodePanel(
   },
   (id, x, y, z) => flights.hold([{ id, x, y, z }]),
 );
+const fleet = new Fleet(mesh, map, order);
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
 const packets = new PacketDots(mesh, map, connection, byId("map-card"));
@@ -138,7 +142,7 @@ mesh.addEventListener("layouts", () => {
   const offers = (action) => mesh.actions.includes(action);
   byId("pause").hidden = byId("speed").parentElement.hidden = !offers("speed");
   byId("power").hidden = !offers("power");
-  byId("demonstrate").hidden = !offers("demonstrate");
+  for (const action of ["demonstrate", "add", "remove"]) byId(action).hidden = !offers(action);
 });
 
 // Orders
@@ -256,6 +260,7 @@ byId("show-known").addEventListener("change", (event) =>
 byId("show-ranges").addEventListener("change", (event) =>
   map.setOption("ranges", event.target.checked),
 );
+byId("show-legend").addEventListener("change", () => map.moved || map.fit()); // it covers some of it
 byId("find-form").addEventListener("submit", (event) => {
   event.preventDefault();
   const text = byId("find").value.trim();
@@ -332,9 +337,11 @@ const KEYS = {
   p: () => mesh.canOrder && panel.switchPower(),
   g: () => panel.focusGoal(),
   f: () => map.fit(),
+  a: () => fleet.open(),
+  Delete: () => fleet.remove(),
   z: () => undo(),
   "?": () => byId("help").showModal(),
-  Escape: () => map.cancelDrag() || flights.undo() || mesh.select(null),
+  Escape: () => map.cancelDrag() || fleet.close() || flights.undo() || mesh.select(null),
 };
 
 document.addEventListener("keydown", (event) => {

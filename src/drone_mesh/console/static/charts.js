@@ -32,7 +32,7 @@ export class Charts {
           { colour: "accent", value: (s) => s.most_hops },
           { colour: "gateway", value: (s) => s.mean_hops },
         ],
-        text: (v) => `${v[1].toFixed(1)} / ${v[0]}`,
+        text: (v) => (v[0] === null ? "–" : `${v[1].toFixed(1)} / ${v[0]}`),
       },
     ];
     for (const chart of this.charts) {

@@ -391,3 +391,29 @@ function drawGoal(context, camera, node, goal, colours, r, withText) {
   context.textAlign = "center";
   context.fillText(`${goal.x.toFixed(1)}, ${goal.y.toFixed(1)} m`, px, py - r - 8);
 }
+
+/** Where a drone {x, y, gateway} would be added, and how far (`range`, m) its radio would reach. */
+export function drawNewDrone(context, camera, place, range, colours, r) {
+  const [px, py] = camera.toScreen(place.x, place.y);
+  context.strokeStyle = context.fillStyle = place.gateway ? colours.gateway : colours.accent;
+  context.lineWidth = 2;
+  context.setLineDash([4, 3]);
+  context.beginPath();
+  if (place.gateway) context.roundRect(px - r, py - r, 2 * r, 2 * r, r * 0.35);
+  else context.arc(px, py, r, 0, 2 * Math.PI);
+  context.stroke();
+  context.lineWidth = 1;
+  context.globalAlpha = 0.5;
+  context.beginPath();
+  context.arc(px, py, range * camera.scale, 0, 2 * Math.PI);
+  context.stroke();
+  context.setLineDash([]);
+  context.globalAlpha = 0.07;
+  context.fill();
+  context.globalAlpha = 1;
+  context.font = `600 ${1.4 * r}px system-ui, sans-serif`;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillText("+", px, py);
+  context.textBaseline = "alphabetic";
+}

@@ -1,6 +1,8 @@
 // Sends drones away: asks before a long flight, and holds each order for a moment, so that it can be undone.
 // A drone in flight may be out of reach, so an order that has left cannot be taken back.
 
+import { agreed } from "./confirm.js";
+
 const HOLD_MS = 5000;
 const FAR_M = 50;
 
@@ -77,13 +79,9 @@ export class Flights extends EventTarget {
   async #agreed(moves, what) {
     const far = Math.max(...moves.map((move) => this.#distance(move)));
     if (far <= FAR_M) return true;
-    byId("confirm-text").textContent =
+    const question =
       `${what} would fly ${far.toFixed(0)} m` + (moves.length > 1 ? " at most." : ".");
-    const dialog = byId("confirm");
-    dialog.returnValue = "";
-    dialog.showModal();
-    await new Promise((resolve) => dialog.addEventListener("close", resolve, { once: true }));
-    return dialog.returnValue === "send";
+    return agreed(question, "Send");
   }
 
   #distance({ id, x, y, z }) {

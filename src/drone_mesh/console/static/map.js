@@ -1,7 +1,15 @@
 // The map: pan, zoom, select, drag. Drawing itself is in draw.js.
 
 import { Camera } from "./camera.js";
-import { drawMesh, drawingOrder, droneRadius, hasArms, onScreen, readColours } from "./draw.js";
+import {
+  drawMesh,
+  drawNewDrone,
+  drawingOrder,
+  droneRadius,
+  hasArms,
+  onScreen,
+  readColours,
+} from "./draw.js";
 
 const DRAG_AFTER_PX = 6;
 const NEAR_PX = 8; // a click this close to a drone selects it
@@ -24,6 +32,8 @@ export class MapView {
     this.camera = new Camera();
     this.radius = 0; // of a drone, px
     this.following = false; // keeps the selected node in the middle
+    this.onPlace = null; // called with the place (x, y) of a click, while one is to be chosen
+    this.newDrone = null; // {x, y, gateway}, where a drone would be added
     this.held = []; // [{id, x, y}] that are about to leave
     this.options = { known: true, ranges: false };
     this.colours = readColours();
@@ -79,6 +89,23 @@ export class MapView {
     this.redraw();
   }
 
+  /** The middle of what is to be seen, [x, y] in metres. */
+  middle() {
+    const { top, bottom } = this.#covered();
+    return this.camera.toWorld(this.camera.width / 2, (this.camera.height + top - bottom) / 2);
+  }
+
+  /** A click no longer selects: it says a place, to `onPlace(x, y)`; null: it selects again. */
+  choosePlace(onPlace) {
+    this.onPlace = onPlace;
+  }
+
+  /** Shows where a drone {x, y, gateway} would be added; null: none would. */
+  showPlace(newDrone) {
+    this.newDrone = newDrone;
+    this.redraw();
+  }
+
   fit() {
     const points = [];
     for (const node of this.mesh.nodes.values()) {
@@ -113,6 +140,15 @@ export class MapView {
     const options = { ...this.options, covered: this.#covered() };
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.#goals());
     this.radius = drawn.radius;
+    if (this.newDrone)
+      drawNewDrone(
+        context,
+        this.camera,
+        this.newDrone,
+        this.mesh.clock.range,
+        this.colours,
+        this.radius,
+      );
     this.#describe(drawn);
     this.#keepTurning(drawn);
   }
@@ -250,7 +286,9 @@ export class MapView {
       const { id, x, y } = this.drag;
       this.drag = null;
       this.fly(this.#moves(id, x, y));
-    } else if (!pointer.moved && event.shiftKey && pointer.node !== null)
+    } else if (!pointer.moved && this.onPlace)
+      this.onPlace(...this.camera.toWorld(event.offsetX, event.offsetY));
+    else if (!pointer.moved && event.shiftKey && pointer.node !== null)
       this.mesh.toggle(pointer.node);
     else if (!pointer.moved) this.mesh.select(pointer.node);
     this.redraw();

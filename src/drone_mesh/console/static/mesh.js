@@ -23,6 +23,7 @@ export class Mesh extends EventTarget {
     this.link = "";
     this.layouts = [];
     this.actions = []; // what the server offers: "fly", "power", ...
+    this.packetKinds = []; // the names of the kinds of packets, each with a colour of the palette
     this.limits = { coordinate: Infinity, height: Infinity }; // of goals, m
     this.nodes = new Map(); // id -> node
     this.obstacles = []; // {corners: [[x, y]], top}, m
@@ -104,7 +105,8 @@ export class Mesh extends EventTarget {
     this.#notify("packets", packets);
   }
 
-  applyHello({ layouts, limits, actions, recording }) {
+  applyHello({ layouts, limits, actions, recording, packet_kinds: packetKinds }) {
+    this.packetKinds = packetKinds;
     this.recording = recording;
     this.actions = actions;
     this.layouts = layouts;

@@ -7,16 +7,6 @@ const RUN_MS = 700; // our choice: a packet takes 2 ms, which cannot be seen
 const START_MS = 300; // after a packet arrived in the air its dot starts: every sample is here by then
 const MOST_DOTS = 600;
 const FRAME_MS = 33;
-const KINDS = [
-  "heartbeat",
-  "introduction",
-  "position",
-  "repair",
-  "order",
-  "report",
-  "data",
-  "other",
-];
 
 export class PacketDots {
   #dots = []; // {from, to, kind, start}: ids, and the time in ms at which the dot starts
@@ -32,10 +22,10 @@ export class PacketDots {
     this.canvas = card.querySelector("#packets");
     this.box = card.querySelector("#show-packets");
     this.share = card.querySelector("#packets-share");
-    const legend = card.querySelector("#packets-legend");
-    legend.prepend(...KINDS.map(legendEntry));
+    this.legend = card.querySelector("#packets-legend");
     this.box.checked = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.themeChanged();
+    mesh.addEventListener("layouts", () => this.#listKinds());
     mesh.addEventListener("packets", (event) => this.#take(event.detail));
     for (const what of ["timeline", "layouts"]) mesh.addEventListener(what, () => this.#ask());
     this.box.addEventListener("change", () => this.#ask());
@@ -50,7 +40,13 @@ export class PacketDots {
     const style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(`--${name}`).trim();
     this.edge = colour("card");
-    this.colours = Object.fromEntries(KINDS.map((kind) => [kind, colour(`packet-${kind}`)]));
+    const kinds = this.mesh.packetKinds;
+    this.colours = Object.fromEntries(kinds.map((kind) => [kind, colour(`packet-${kind}`)]));
+  }
+
+  #listKinds() {
+    this.legend.replaceChildren(...this.mesh.packetKinds.map(legendEntry), this.share);
+    this.themeChanged();
   }
 
   /** Packets are sampled only while a page shows them. */

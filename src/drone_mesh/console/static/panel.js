@@ -2,6 +2,7 @@
 
 import { arrowKeys } from "./arrows.js";
 import { orDash } from "./mesh.js";
+import { typedNumber } from "./numbers.js";
 
 export class NodePanel {
   /** `power(id, on)` and `fly(id, x, y, z)` carry out what the buttons say. */
@@ -134,30 +135,14 @@ export class NodePanel {
     event.preventDefault();
     const { coordinate, height } = this.mesh.limits;
     const goal = [
-      this.#number("x", -coordinate, coordinate, false),
-      this.#number("y", -coordinate, coordinate, false),
-      this.#number("z", 0, height, true),
+      typedNumber(byId("fly-x"), "x", -coordinate, coordinate),
+      typedNumber(byId("fly-y"), "y", -coordinate, coordinate),
+      typedNumber(byId("fly-z"), "z", 0, height, true),
     ];
     const wrong = goal.find((entry) => entry.error);
     setText(byId("fly-error"), wrong?.error ?? "");
     if (wrong) wrong.input.select();
     else this.fly(this.mesh.selected, ...goal.map((entry) => entry.value));
-  }
-
-  /** What was typed for one axis: {input, value, error}; nothing is rounded or clipped. */
-  #number(axis, low, high, whole) {
-    const input = byId(`fly-${axis}`);
-    const text = input.value.trim().replace(",", ".");
-    const value = text === "" ? NaN : Number(text);
-    const good =
-      Number.isFinite(value) &&
-      value >= low &&
-      value <= high &&
-      (!whole || Number.isInteger(value));
-    if (good) input.removeAttribute("aria-invalid");
-    else input.setAttribute("aria-invalid", "true");
-    const kind = whole ? "a whole number" : "a number";
-    return { input, value, error: good ? "" : `${axis} must be ${kind} from ${low} to ${high}` };
   }
 }
 
