@@ -161,7 +161,10 @@ def test_table_and_charts_are_saved_as_csv_and_png(page, tmp_path):
     charts = saved(page, "#save-charts", tmp_path).read_text().splitlines()
     assert "routers_connected" in charts[0]
     assert len(charts) > 2
-    assert saved(page, "#save-picture", tmp_path).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    for button, rows in (("#save-nodes-picture", 1 + len(PLACES)), ("#save-charts-picture", 3)):
+        picture = saved(page, button, tmp_path).read_bytes()
+        assert picture[:8] == b"\x89PNG\r\n\x1a\n"
+        assert int.from_bytes(picture[20:24], "big") > 20 * rows  # its height, PNG 11.2.2
 
 
 def test_places_are_saved_and_flown_to_again(page, tmp_path):

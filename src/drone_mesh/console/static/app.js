@@ -2,7 +2,7 @@
 
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
-import { chartsCsv, chartsPicture, nodesCsv, placesYaml, save } from "./files.js";
+import { chartsCsv, chartsPicture, nodesCsv, nodesPicture, placesYaml, save } from "./files.js";
 import { Fleet } from "./fleet.js";
 import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
@@ -237,10 +237,13 @@ byId("group-clear").addEventListener("click", () => mesh.select(null));
 const PLACES_CASE = 900; // in a file that was saved; any other number would do
 byId("files-button").addEventListener("click", () => byId("files").showModal());
 byId("save-nodes").addEventListener("click", () => save("nodes.csv", nodesCsv(mesh), "text/csv"));
+byId("save-nodes-picture").addEventListener("click", async () =>
+  save("nodes.png", await nodesPicture(mesh, charts.colours), "image/png"),
+);
 byId("save-charts").addEventListener("click", () =>
   save("charts.csv", chartsCsv(mesh), "text/csv"),
 );
-byId("save-picture").addEventListener("click", async () => {
+byId("save-charts-picture").addEventListener("click", async () => {
   const figures = [...document.querySelectorAll("#charts-card figure")];
   const shown = figures.filter((figure) => figure.querySelector("canvas").width);
   save("charts.png", await chartsPicture(shown, charts.colours), "image/png");

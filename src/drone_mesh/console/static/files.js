@@ -1,7 +1,9 @@
-// Saves what the page shows: the table and the charts as CSV, the charts as a picture.
+// Saves what the page shows: the table and the charts, as CSV and as pictures, and the places.
 
 import { orDash } from "./mesh.js";
 
+const TEXT_PX = 12; // of the table's picture
+const PICTURE_SCALE = 2; // sharp in print and on a phone, whatever screen it was saved from
 const NODE_COLUMNS = {
   node: (n) => n.id,
   role: (n) => (n.role === 1 ? "gateway" : "router"),
@@ -20,9 +22,36 @@ const NODE_COLUMNS = {
 
 /** The table of nodes. */
 export function nodesCsv(mesh) {
-  const nodes = [...mesh.nodes.values()].sort((a, b) => a.id - b.id);
-  const rows = nodes.map((node) => Object.values(NODE_COLUMNS).map((value) => value(node)));
-  return csv(Object.keys(NODE_COLUMNS), rows);
+  return csv(Object.keys(NODE_COLUMNS), nodeRows(mesh));
+}
+
+/** The table of nodes as a picture, in the colours of the page. */
+export function nodesPicture(mesh, colours) {
+  const picture = document.createElement("canvas");
+  const context = picture.getContext("2d");
+  const font = `${TEXT_PX * PICTURE_SCALE}px system-ui, sans-serif`;
+  const names = Object.keys(NODE_COLUMNS);
+  const rows = [names, ...nodeRows(mesh)].map((row) => row.map(String));
+  context.font = font;
+  const gap = 2 * TEXT_PX;
+  const widths = names.map(
+    (_name, i) => gap + Math.max(...rows.map((row) => context.measureText(row[i]).width)),
+  );
+  const height = 1.7 * TEXT_PX * PICTURE_SCALE;
+  picture.width = gap + widths.reduce((sum, width) => sum + width, 0);
+  picture.height = height * (rows.length + 0.5);
+  context.fillStyle = colours.card;
+  context.fillRect(0, 0, picture.width, picture.height);
+  context.font = font;
+  rows.forEach((row, index) => {
+    context.fillStyle = index ? colours.ink : colours.muted;
+    let left = gap;
+    row.forEach((text, column) => {
+      context.fillText(text, left, height * (index + 0.9));
+      left += widths[column];
+    });
+  });
+  return png(picture);
 }
 
 /** The numbers of the charts. */
@@ -62,7 +91,7 @@ export function chartsPicture(figures, colours) {
     context.drawImage(canvas, 0, top + titleHeight);
     top += canvas.height + titleHeight;
   });
-  return new Promise((resolve) => picture.toBlob(resolve, "image/png"));
+  return png(picture);
 }
 
 /** Hands a file to the person. */
@@ -72,6 +101,15 @@ export function save(name, content, type) {
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+function nodeRows(mesh) {
+  const nodes = [...mesh.nodes.values()].sort((a, b) => a.id - b.id);
+  return nodes.map((node) => Object.values(NODE_COLUMNS).map((value) => value(node)));
+}
+
+function png(canvas) {
+  return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
 }
 
 function csv(columns, rows) {
