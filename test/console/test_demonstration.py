@@ -28,7 +28,7 @@ def test_the_button_shows_a_repair_from_the_loss_to_the_reconnection(start_conso
     page.wait_for_drones(18)
     page.page.click("#demonstrate")
     wait_for_sentence(page, "12 other drones could provide another route")
-    wait_for_sentence(page, "Router 2 is switched off. It was on the way of 3, 4 and 5")
+    wait_for_sentence(page, "Router 2 is switched off. It was on the route of 3, 4 and 5")
     page.wait_for("a countdown", lambda: page.page.is_visible("#story-left"), 30.0)
     wait_for_sentence(page, r"3 bids 18.0 m, 4 bids 15.5 m, 5 bids 15.3 m")
     wait_for_sentence(page, "3 is farthest .* flies to node 2's place")

@@ -1,4 +1,4 @@
-"""A box that stands in the world. Pure geometry."""
+"""A box in the world. Pure geometry."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Box:
         return self.center[2] + self.size[2] / 2
 
     def grown(self, metres: float) -> Box:
-        """The same box, larger by this much on each side but the lower one."""
+        """The same box, enlarged by this much on every side except the bottom."""
         x, y, z = self.size
         center = (self.center[0], self.center[1], self.center[2] + metres / 2)
         size = (x + 2 * metres, y + 2 * metres, z + metres)
@@ -36,7 +36,7 @@ class Box:
 
     @property
     def corners(self) -> tuple[Point, ...]:
-        """Its four corners as seen from above."""
+        """Its four corners, seen from above."""
         x, y, _z = self.center
         long, wide = self.size[0] / 2, self.size[1] / 2
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
@@ -46,7 +46,8 @@ class Box:
         )
 
     def chord(self, a: Vector, b: Vector) -> tuple[float, float] | None:
-        """The part of the segment a..b inside the box, as shares of it; None: it misses the box.
+        """The part of the segment a..b inside the box, as fractions of a..b; None if it misses the
+        box.
 
         Kay and Kajiya's slab test (SIGGRAPH 1986) in the frame of the box.
         """

@@ -18,7 +18,7 @@ Position = Tuple[float, float, float]  # longitude (x), latitude (y), height (z)
 
 
 class AirError(MeshError):
-    """A message or request to the simulated air is invalid. Drop it, or answer with the text."""
+    """Invalid message or request to the simulated air. Drop it, or reply with the text."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def check_node_id(node_id: int) -> None:
 
 
 def check_position(node_id: int, position: Sequence[float]) -> Position:
-    """The position, or AirError if it is not three finite numbers."""
+    """The position. Raises AirError if it is not three finite numbers."""
     if len(position) != 3 or not all(map(math.isfinite, position)):
         raise AirError(
             f"node {node_id}: invalid position {tuple(position)}: expected three finite numbers"
@@ -47,6 +47,6 @@ def check_position(node_id: int, position: Sequence[float]) -> Position:
 
 
 def check_topic(node_id: int, topic: str) -> None:
-    """Raise AirError unless this is a global name of a ROS topic."""
+    """Raise AirError unless this is the global name of a ROS topic."""
     if len(topic) > MAX_TOPIC_LENGTH or not _TOPIC.fullmatch(topic):
         raise AirError(f"node {node_id}: invalid topic name {topic[:60]!r}")

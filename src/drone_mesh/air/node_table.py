@@ -1,4 +1,4 @@
-"""NodeTable: position, listening topic and power of each node, and which are in range."""
+"""NodeTable: position, topic and power of each node, and which nodes are in range of each other."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
 
 Sees = Optional[Callable[[Position, np.ndarray], np.ndarray]]
-"""From a place and (n, 3) others within range to (n,) bool: which of them it has a link to."""
+"""(3,) a position and (n, 3) others within range, metres -> (n,) bool: those that it has a link to."""
 
 
 class NodeTable:
@@ -30,7 +30,7 @@ class NodeTable:
     """
 
     def __init__(self, max_distance_m: float = MAX_DISTANCE_M, sees: Sees = None) -> None:
-        """`sees` is asked about obstacles between nodes within range; None: there are none.
+        """`sees` decides about obstacles between nodes within range; None: there are no obstacles.
 
         Raises AirError unless the distance is a positive number.
         """
@@ -42,7 +42,7 @@ class NodeTable:
         self._positions: dict[int, Position] = {}  # also of nodes that are not registered yet
         self._places: np.ndarray = np.zeros((MAX_NODE_ID + 1, 3))  # (id, xyz), metres
         self._hears: np.ndarray = np.zeros(MAX_NODE_ID + 1, dtype=bool)  # registered, and on
-        # The results of in_range, until a node moves or is switched.
+        # Results of in_range, valid until a node moves or is switched.
         self._in_range: dict[int, tuple[int, ...]] = {}
 
     # DroneInfo -------------------------------------------------------------------------------
@@ -88,7 +88,7 @@ class NodeTable:
     # Requests --------------------------------------------------------------------------------
 
     def node(self, node_id: int) -> Node | None:
-        """The node with this id, if it is registered."""
+        """The registered node with this id, or None."""
         return self._nodes.get(node_id)
 
     def position(self, node_id: int) -> Position | None:
@@ -96,10 +96,10 @@ class NodeTable:
         return self._positions.get(node_id)
 
     def link(self, sender: int, receiver: int) -> str | None:
-        """The topic that reaches `receiver` from `sender`; None if none does.
+        """The topic on which `receiver` hears `sender`; None if there is no link.
 
-        Both must be registered, on, nearer to each other than the maximum distance, and not
-        hidden from each other by obstacles.
+        Both must be registered and on, closer than the maximum distance, and not separated by
+        obstacles.
         """
         source, destination = self._nodes.get(sender), self._nodes.get(receiver)
         if source is None or destination is None or not (source.on and destination.on):
@@ -114,9 +114,9 @@ class NodeTable:
         return None
 
     def in_range(self, node_id: int) -> tuple[int, ...]:
-        """Ids of the nodes that a packet could reach, ascending, without `node_id` itself.
+        """Ids of the nodes that a packet from `node_id` can reach, ascending.
 
-        Raises AirError for a node that is not registered; a node that is off reaches none.
+        Raises AirError for an unregistered node; a node that is off reaches none.
         """
         answer = self._in_range.get(node_id)
         if answer is None:

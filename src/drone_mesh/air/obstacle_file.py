@@ -1,4 +1,4 @@
-"""Reads a file of obstacles: the boxes that stand in the world."""
+"""Reads an obstacle file: the boxes in the world."""
 
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
 import math
@@ -37,14 +37,14 @@ class BoxRow(BaseModel):
     material: Literal["brick", "wood", "window", "stone", "concrete"] = "brick"
 
     def to_box(self, brick_cut_db: float = CUT_DB["brick"]) -> Box:
-        """The box; `brick_cut_db` is what one surface of brick takes."""
+        """The box; `brick_cut_db` is the loss per surface of brick, in dB."""
         (x, y, z), (long, wide, high) = self.center, self.size
         cut_db = brick_cut_db if self.material == "brick" else CUT_DB[self.material]
         return Box((x, y, z), (long, wide, high), math.radians(self.yaw_deg), cut_db)
 
 
 def read_obstacles(path: Union[str, Path], blocks: bool = True) -> Obstacles:
-    """The boxes in this file; with `blocks`, each ends the links that it crosses.
+    """The boxes in this file; with `blocks`, each box cuts the links that cross it.
 
     Raises ConfigurationError: one line with file, line, key and what is expected.
     """
@@ -59,7 +59,7 @@ def read_obstacles(path: Union[str, Path], blocks: bool = True) -> Obstacles:
 
 
 def rows_of_file(path: Path) -> List[Dict[str, Any]]:
-    """Its boxes, unchecked. Raises ConfigurationError: file, line and what is wrong."""
+    """The boxes of the file, unvalidated. Raises ConfigurationError with file, line and reason."""
     return _rows(read_mapping(path))
 
 

@@ -1,4 +1,4 @@
-"""All boxes of the world: what they do to radio links and to flights. Pure geometry."""
+"""All boxes of the world: their effect on radio links and flights. Pure geometry."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 
 METRE_DB = 0.4  # dB per metre inside, the same source as brick
-NO_WAY = "obstacles leave no way there"  # why a goal is refused
-CLEARANCE_M = 0.5  # our choice: a flight keeps so far from a box, above it and beside it
-ABOVE_M = CLEARANCE_M + 1e-6  # so high above a box a flight does not touch its clearance
+NO_WAY = "obstacles leave no way there"  # reason for refusing a goal
+CLEARANCE_M = 0.5  # our choice: least distance between a flight and a box, above and beside it
+ABOVE_M = CLEARANCE_M + 1e-6  # height above a box at which a flight is just clear of it
 
 
 @dataclass(frozen=True)
 class Obstacles:
-    """All boxes, and by which model they attenuate a link.
+    """All boxes, and the model of their attenuation.
 
-    A disc radio of range R has a margin of 10 n log10(R / d) dB at the distance d, with the path
-    loss exponent n: the link is there while the boxes on its way take less than that.
+    A disc radio of range R has a margin of 10 n log10(R / d) dB at distance d, with path loss
+    exponent n. A link exists while the boxes on its path attenuate it by less than that margin.
     """
 
     boxes: Sequence[Box]
-    blocks: bool = True  # any box on the way ends the link; else it damps by cut_db and metre_db
+    blocks: bool = True  # any box cuts the link; otherwise it attenuates by cut_db, metre_db
     metre_db: float = METRE_DB
     exponent: float = 2.0  # of the path loss; 2 is free space
     ceiling_m: float = MAX_HEIGHT_M  # no flight goes higher
 
     def loss_db(self, a: Vector, b: Vector) -> float:
-        """What the boxes take from a signal from a to b, and the same from b to a."""
+        """Attenuation by the boxes between a and b, in dB; the same in both directions."""
         if b < a:
-            a, b = b, a  # one order: both directions give the same bits
+            a, b = b, a  # one order, so both directions give exactly the same result
         loss = 0.0
         for box in self.boxes:
             chord = box.chord(a, b)
@@ -47,25 +47,25 @@ class Obstacles:
         return loss
 
     def margin_db(self, a: Vector, b: Vector, range_m: float) -> float:
-        """How much more the link could bear; above 0 it is there."""
+        """The attenuation in dB that the link could still bear; above 0 the link exists."""
         distance_m = max(math.dist(a, b), 1e-3)  # two drones may share a point
         return 10 * self.exponent * math.log10(range_m / distance_m) - self.loss_db(a, b)
 
     def for_flights(self, half_width_m: float) -> Obstacles:
-        """The same boxes, so much larger: for the centre of a body of this half width."""
+        """The same boxes, enlarged for the centre of a body with this half width (m)."""
         return replace(self, boxes=[box.grown(half_width_m) for box in self.boxes])
 
     def is_free(self, place: Vector) -> bool:
-        """Whether a drone can be there."""
+        """Whether a drone can be at this position."""
         return not any(box.contains(place) for box in self.boxes)
 
     def plan_flight(
         self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
     ) -> FlightPath | None:
-        """The quickest flight over what is in the way, or round it; None where there is none.
+        """The quickest flight over or round the obstacles; None if there is none.
 
-        It climbs at its start and descends at its goal: with a box above one of these, or the goal
-        inside one, there is no way. Over a box that reaches the ceiling there is none either.
+        It climbs at its start and descends at its goal, so there is no flight if a box is above
+        either, or contains the goal. Nor is there one over a box that reaches the ceiling.
         """
         if not self.is_free(goal):
             return None
@@ -107,7 +107,7 @@ class Obstacles:
                     yield path
 
     def _met(self, path: FlightPath) -> list[Box]:
-        """The boxes on a straight way across, or too near to it."""
+        """The boxes on a straight horizontal path, or too close to it."""
         return [
             box
             for box in self.boxes
@@ -115,7 +115,7 @@ class Obstacles:
         ]
 
     def _rises_freely(self, path: FlightPath) -> bool:
-        """Whether its ways up and down meet no box, and stay below the ceiling."""
+        """Whether its climb and descent meet no box and stay below the ceiling."""
         if max(path.above_start[2], path.above_goal[2]) > self.ceiling_m:
             return False
         ends = ((path.start, path.above_start), (path.above_goal, path.goal))

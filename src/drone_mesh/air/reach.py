@@ -1,4 +1,4 @@
-"""How far a simulated radio reaches unless a parameter says otherwise."""
+"""The default range of a simulated radio."""
 
 from __future__ import annotations
 

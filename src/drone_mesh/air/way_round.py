@@ -1,4 +1,4 @@
-"""The shortest way round boxes at one height: straight lines from corner to corner."""
+"""The shortest path round boxes at one height: straight lines from corner to corner."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Sequence
 from drone_mesh.air.box import Box
 from drone_mesh.drone.flight_path import Point
 
-MOST_BOXES = 10  # our choice: on one way; the time for a search grows with the cube
-BESIDE_M = 0.01  # a corner of the way is so far outside a box, which it then does not touch
+MOST_BOXES = 10  # our choice: on one path; the search time grows with the cube
+BESIDE_M = 0.01  # distance of a corner of the path from its box, so that it does not touch it
 
 
 def way_round(
     boxes: Sequence[Box], start: Point, goal: Point, height_m: float
 ) -> tuple[Point, ...] | None:
-    """The corners between start and goal (x, y in metres) at this height, as few metres as can be.
+    """The corners (x, y in metres) of the shortest path from start to goal at this height.
 
-    None: no way, or one past more than MOST_BOXES. Only the boxes that the way meets count: each
-    search adds those that the last way had met.
+    None: there is no path, or it passes more than MOST_BOXES. Only boxes that the path meets count:
+    each search adds those that the previous path met.
     """
     met: list[Box] = []
     while len(met) <= MOST_BOXES:
@@ -43,7 +43,7 @@ def _shortest(
     """A* over the corners of the boxes; two see each other if no box is between them."""
     points = [start, goal, *(c for box in boxes for c in box.grown(BESIDE_M).corners)]
     came_from: dict[int, int] = {}
-    waiting = [(0.0, 0.0, 0, 0)]  # metres in all at least, until the point, point, the one before
+    waiting = [(0.0, 0.0, 0, 0)]  # least total length, length so far, point, previous point
     while waiting:
         _least, metres, here, before = heapq.heappop(waiting)
         if here in came_from:

@@ -57,7 +57,7 @@ class RepairStatus(NamedTuple):
 
     def _flies(self) -> str:
         if self.landed:
-            return "has landed, checks that no other drone stands there"
+            return "has landed, checks that no other drone is there"
         return f"lands: {self.reason}" if self.reason else f"flies to {self._place()}"
 
     def _place(self) -> str:

@@ -1,1 +1,1 @@
-"""The web console: one page that shows the mesh and acts on it. No ROS in here."""
+"""The web console: one page that shows and controls the mesh. Without ROS."""

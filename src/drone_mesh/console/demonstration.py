@@ -1,4 +1,4 @@
-"""RepairDemonstration: arranges a repair, so that a person can follow it sentence by sentence.
+"""RepairDemonstration: arranges a repair that a viewer can follow sentence by sentence.
 
 Five routers form layout 202 of 2019, scaled to the range of the radios: a chain of two, and behind
 it a group of three. Then the second router of the chain is switched off.
@@ -19,36 +19,36 @@ Order = Callable[[MeshControls], object]
 Script = Generator[List[Order], MeshStatus, None]
 Places = Dict[int, Tuple[float, float, float]]  # node -> x y z, m
 
-# x, y from the gateway in ranges of the radio: the chain, then the group that loses it.
+# x, y from the gateway, in ranges of the radio: first the chain, then the group that loses it.
 _PLACES = ((0.0, 4 / 9), (0.0, 12 / 9), (0.0, 18 / 9), (4 / 9, 15 / 9), (-3 / 9, 15 / 9))
 _CHAIN = 2  # routers; the last of them is switched off
 _READY_WITHIN_S = 120.0  # simulated, as all that follows: all connected at their places
-_SETTLE_S = 25.0  # two checks of the default: each has asked where its next hop stands
+_SETTLE_S = 25.0  # two default check periods: each node has asked for its next hop's position
 _REPAIR_WITHIN_S = 240.0
-# Simulated seconds per second: waiting is shortened, and what takes a moment is drawn out.
+# Simulated seconds per second: waiting is sped up, and brief events are slowed down.
 _FAST, _WAITING, _BIDDING, _FLYING = 5.0, 3.0, 0.2, 0.5
 _SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss what follows
 
 
 class RepairDemonstration:
-    """Gives orders and describes what happens. Belongs to one thread, which carries them out."""
+    """Issues orders and describes what happens. Belongs to one thread, which carries them out."""
 
     def __init__(self) -> None:
         self.story = RepairStory()
         self._script: Script = self._play()
         next(self._script)
-        self._factor = 0.0  # that it ordered last; 0: none
+        self._factor = 0.0  # ordered last; 0: none
         self._factor_before = 0.0
-        self._resting: list[int] = []  # what it switched off so that only five take part
-        self._tells_repair = False  # the flights before it also look like losses
+        self._resting: list[int] = []  # nodes switched off so that only five take part
+        self._describes_repair = False  # flights before the repair also look like losses
         self.is_over = False
 
     def advance(self, mesh: MeshStatus) -> list[Order]:
-        """The orders that are due in this state of the mesh. Raises OrderRefused: it cannot go on.
+        """The orders due in this state of the mesh. Raises OrderRefused if it cannot continue.
 
-        When it is over, no orders follow but those of `leave`.
+        Once it is over, only `leave` returns further orders.
         """
-        if self._tells_repair:
+        if self._describes_repair:
             self.story.update(mesh)
         try:
             return self._script.send(mesh)
@@ -57,7 +57,7 @@ class RepairDemonstration:
             return []
 
     def leave(self) -> list[Order]:
-        """The orders that give back what it changed: the speed, and the drones that rested."""
+        """The orders that undo its changes: the speed, and the drones that were switched off."""
         orders = [_power(node_id, True) for node_id in self._resting]
         if self._factor:
             orders.append(_speed(self._factor_before))
@@ -74,7 +74,7 @@ class RepairDemonstration:
         mesh = yield from self._until(
             mesh, "the drones are not all connected", _READY_WITHIN_S, lambda m: _ready(m, cast)
         )
-        self.story.tell(
+        self.story.add(
             f"The gateway sends five drones out: {and_(chain)} as a chain, {and_(group)} as a "
             "group behind it",
             mesh.stamp_s,
@@ -88,7 +88,7 @@ class RepairDemonstration:
             lambda m: _ready(m, cast) and _stand_at(m, goals),
         )
         settled_s = mesh.stamp_s + _SETTLE_S
-        self.story.tell(
+        self.story.add(
             "All are connected. Each asks for the position of its next hop to the gateway, because "
             "it would fly to that place",
             mesh.stamp_s,
@@ -100,17 +100,17 @@ class RepairDemonstration:
             _READY_WITHIN_S,
             lambda m: m.stamp_s >= settled_s and _know_fallback(m, group, lost),
         )
-        begun_s, self._tells_repair = mesh.stamp_s, True
+        begun_s, self._describes_repair = mesh.stamp_s, True
         self.story.update(mesh)
         mesh = yield [_power(lost, False), *self._at_pace(_WAITING)]
         yield from self._follow(mesh, group, begun_s)
 
     def _cast_orders(self, mesh: MeshStatus, gateway: int, cast: Sequence[int]) -> list[Order]:
-        """Those that take part are on, and all others off."""
+        """Switch the cast on and all other nodes off."""
         self._resting = [n.id for n in mesh.nodes if n.on and n.id not in (gateway, *cast)]
         if self._resting:
             count = len(self._resting)
-            self.story.tell(
+            self.story.add(
                 f"{count} other drone{'s' if count > 1 else ''} could provide another route, and "
                 f"{'are' if count > 1 else 'is'} switched off during the demonstration",
                 mesh.stamp_s,
@@ -119,7 +119,7 @@ class RepairDemonstration:
         return [*orders, *(_power(n.id, True) for n in mesh.nodes if n.id in cast and not n.on)]
 
     def _follow(self, mesh: MeshStatus, group: Sequence[int], begun_s: float) -> Script:
-        """Until the group is connected again, at the pace of what happens."""
+        """Describe the repair until the group is connected again, adapting the speed."""
         noticed = False
         while True:
             nodes = [node for node in mesh.nodes if node.id in group]
@@ -148,7 +148,7 @@ class RepairDemonstration:
         return mesh
 
     def _at_pace(self, factor: float) -> list[Order]:
-        """The order that changes the speed, if it is another one than before."""
+        """The order that changes the speed, if it differs from the last one."""
         if factor == self._factor:
             return []
         self._factor = factor

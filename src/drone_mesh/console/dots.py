@@ -1,4 +1,4 @@
-"""PacketDots: packets on their way to a page, which draws each as a dot that runs along a link."""
+"""PacketDots: packets on their way to a page, which draws each as a dot moving along a link."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Dot(NamedTuple):
 
 
 class PacketDots:
-    """What one page has not been sent yet. Belongs to the server's event loop."""
+    """The packets not yet sent to one page. Belongs to the server's event loop."""
 
     def __init__(self) -> None:
         self.wanted = False  # the page draws them
@@ -28,13 +28,13 @@ class PacketDots:
         self._waiting: list[Dot] = []
 
     def add(self, carried: int, dots: Sequence[Dot]) -> None:
-        """So many packets arrived; `dots` are a sample of them."""
+        """`carried` packets arrived; `dots` are a sample of them."""
         if self.wanted:
             self._carried += carried
             self._waiting = [*self._waiting, *dots][-MOST_WAITING:]
 
     def messages(self, is_live: bool) -> Iterator[str]:
-        """What is new for the page, as JSON; nothing for a page that looks at the past."""
+        """New packets for the page, as JSON; none for a page that shows the past."""
         carried, waiting = self._carried, self._waiting
         self._carried, self._waiting = 0, []
         if is_live and carried:

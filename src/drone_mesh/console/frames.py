@@ -1,13 +1,13 @@
-"""FrameStore: what a page should know, and the difference to what it knows already.
+"""FrameStore: the state that a page should show, and its difference to what the page has.
 
 A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), `gone` (ids),
-`events` and `samples` (new ones), `obstacles` and `story` (all, if they have changed). A page that
-has version v gets what changed after v, however long ago that was: a page that falls behind gets a
-larger difference, and nothing is queued for it.
+`events` and `samples` (new ones), `obstacles` and `story` (complete, if they have changed). A page
+at version v gets what changed after v, however long ago: a page that falls behind gets a larger
+difference, and nothing is queued for it.
 
-The fields of a node are those of NodeState.msg, with what is decided here and only shown there:
-its condition, the name of its colour, its trouble, its slot among nodes at the same position, how
-far its latest order has come, and the links it has with nodes of higher ids.
+The fields of a node are those of NodeState.msg, plus decisions that the page only displays: the
+node's condition, the name of its colour, its trouble, its slot among nodes at the same position,
+the progress of its latest order, and its links with nodes of higher ids.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class FrameStore:
     """Belongs to one thread, the server's event loop. Version 0: a page that has nothing yet."""
 
     def __init__(self, history: History | None = None) -> None:
-        """`history` keeps what the store is given, for pages that look back."""
+        """`history` keeps the states given to the store, for pages that look back."""
         self.version = 0
         self.history = history
         self._mesh: MeshStatus | None = None
@@ -75,9 +75,9 @@ class FrameStore:
         wall_s: float,
         more: Mapping[int, Mapping[str, Any]] = NOTHING_MORE,
     ) -> None:
-        """Take over the mesh as it is now.
+        """Replace the state of the mesh.
 
-        `wall_s`: seconds of wall time; `more`: what only real nodes have, by node.
+        `wall_s`: wall time in seconds; `more`: by node, what only real nodes report.
         """
         self._next_version()
         if self._mesh is not None and mesh.stamp_s < self._mesh.stamp_s:
@@ -145,7 +145,7 @@ class FrameStore:
         return self._mesh
 
     def restart(self, samples: Sequence[MeshSample]) -> None:
-        """Begin again, as a page that jumps in time: with these samples and without events."""
+        """Start over, as when a page jumps in time: with these samples and without events."""
         self._next_version()
         self._forget_run()
         self._mesh = None
@@ -153,13 +153,13 @@ class FrameStore:
         self._sampled_at_s = float("-inf")
 
     def set_story(self, story: Mapping[str, Any]) -> None:
-        """Set the story of a demonstration that pages show; empty: none."""
+        """Set the story of a demonstration for the pages; empty: none."""
         if story != self._story[1]:
             self._next_version()
             self._story = self.version, story
 
     def set_link(self, text: str) -> None:
-        """Set why no states arrive, in words for the page; empty: they do."""
+        """Set the reason why no states arrive, as text for the page; empty: they do."""
         if text != self._link:
             self._next_version()
             self._link = text
@@ -233,7 +233,7 @@ class FrameStore:
         self._cache.clear()
 
     def _forget_run(self) -> None:
-        """Simulated time went back: a new world. Charts and log of every page start again."""
+        """Simulated time went back: a new world. Charts and logs of all pages start over."""
         self._run_began_at = self.version
         self._orders.forget()
         self._events.clear()

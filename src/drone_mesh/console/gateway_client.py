@@ -1,4 +1,4 @@
-"""GatewayClient: a real gateway over HTTP, and the page's orders carried out there."""
+"""GatewayClient: reaches a real gateway over HTTP; GatewayControls sends it the page's orders."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two secon
 
 
 class GatewayGone(MeshError):
-    """The gateway does not answer, or not as a gateway does; the text says how."""
+    """The gateway does not answer, or its answer is invalid; the text gives details."""
 
 
 class GatewayClient:
@@ -26,14 +26,14 @@ class GatewayClient:
         self._token = token
 
     def mesh(self, after: int) -> dict[str, Any]:
-        """What it knows, with the events after this number. Raises GatewayGone."""
+        """The mesh as the gateway reports it, with events after this number. Raises GatewayGone."""
         answer = self._ask("GET", f"/mesh?after={after}")
         if not isinstance(answer, dict) or "nodes" not in answer:
             raise GatewayGone(f"{self.url} is not a gateway of this version")
         return answer
 
     def order(self, drone: int, latitude: float, longitude: float, height: int) -> None:
-        """Send a drone to a place. Raises GatewayGone, with the gateway's reason."""
+        """Send a drone to a position in metres. Raises GatewayGone with the gateway's reason."""
         body = {"latitude": latitude, "longitude": longitude, "height": height}
         self._ask("POST", f"/drones/{drone}/goal", json.dumps(body).encode())
 
@@ -61,7 +61,7 @@ def _reason(error: urllib.error.HTTPError) -> str:
 
 
 class GatewayControls:
-    """The MeshControls of a real mesh: it flies drones; nothing else can be ordered from afar."""
+    """The MeshControls of a real mesh: it can fly drones and nothing else."""
 
     ACTIONS = ("fly",)
 

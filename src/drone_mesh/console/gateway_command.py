@@ -29,7 +29,7 @@ PAGE_TOKEN = "DRONE_MESH_CONSOLE_TOKEN"
 
 
 class GatewayFeed:
-    """Asks the gateway once a second, and passes what it answers to the store. One thread."""
+    """Polls the gateway once a second and passes its answers to the store. One thread."""
 
     def __init__(self, client: GatewayClient, store: FrameStore, runner: ConsoleRunner) -> None:
         self._client = client
@@ -39,7 +39,7 @@ class GatewayFeed:
         self._uptime_s = 0.0
 
     def ask(self) -> None:
-        """Once. A gateway that does not answer is shown in the page."""
+        """Poll once. If the gateway does not answer, the page says so."""
         try:
             answer = self._client.mesh(self._seen)
             mesh, more = real_mesh(answer)

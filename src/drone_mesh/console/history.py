@@ -1,4 +1,4 @@
-"""History: the states and events of a run, to look at again; of a live one the last 30 minutes."""
+"""History: recorded states and events of a run; for a live run, the last 30 minutes."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ class History:
 
     @classmethod
     def of(cls, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> History:
-        """A whole recorded run, oldest first."""
+        """The history of a whole recorded run, oldest first."""
         history = cls(math.inf, math.inf)
         history.extend(states)
         history.add_events(sorted(events, key=lambda event: event.stamp_s))
         return history
 
     def extend(self, states: Iterable[MeshStatus]) -> None:
-        """Keep these of a recording, oldest first; of several at the same time only the first."""
+        """Add states of a recording, oldest first; of several with the same time only the first."""
         for state in states:
             if not self.times or state.stamp_s > self.times[-1]:
                 self._append(state)
 
     def add(self, mesh: MeshStatus, wall_s: float) -> None:
-        """Keep this state of a live run, if the last one is old enough. A new run clears it."""
+        """Add a state of a live run unless the last is too recent. A new run clears the history."""
         if self.times and mesh.stamp_s < self.times[-1]:
             self._clear()
         stands_still = bool(self.times) and mesh.stamp_s == self.times[-1]
@@ -75,7 +75,7 @@ class History:
             self._forget(too_old)
 
     def add_events(self, events: Iterable[EventRecord]) -> None:
-        """Keep these, oldest first."""
+        """Add events, oldest first."""
         for event in events:
             self._events.append(event)
             self._event_times.append(event.stamp_s)
@@ -84,11 +84,11 @@ class History:
                 self.marks = [*self.marks[1 - MOST_MARKS :], mark]
 
     def index_at(self, at_s: float) -> int:
-        """Which state shows the mesh as it was at this time."""
+        """Index of the state that shows the mesh at this time."""
         return max(0, bisect.bisect_right(self.times, at_s) - 1)
 
     def state(self, index: int) -> MeshStatus:
-        """The state with this number."""
+        """The state at this index."""
         mesh: MeshStatus
         mesh, rows = pickle.loads(zlib.decompress(self._states[index]))
         nodes = [NodeStatus(**dict(zip(_NODE_FIELDS, row))) for row in rows]
@@ -99,7 +99,7 @@ class History:
         return self._events[: bisect.bisect_right(self._event_times, at_s)]
 
     def samples_until(self, at_s: float) -> Sequence[MeshSample]:
-        """What charts show, up to this time."""
+        """The samples for charts, up to this time."""
         return self._samples[: bisect.bisect_right(self.times, at_s)]
 
     def _append(self, mesh: MeshStatus) -> None:
@@ -111,7 +111,7 @@ class History:
         self._samples.append(take_sample(mesh))
 
     def _forget(self, states: int) -> None:
-        """The oldest ones."""
+        """Drop the oldest `states` states."""
         self._bytes -= sum(map(len, self._states[:states]))
         for kept in (self._states, self.times, self._samples):
             del kept[:states]

@@ -1,4 +1,4 @@
-"""What a page may ask for, and the interface that carries it out."""
+"""The requests that a page may send, and the interface that carries them out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.layouts import MAX_CASE, Order, read_places
 
 MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
-MAX_ORDER_NUMBER = 2**53  # up to here a page's numbers are exact
+MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here
 RECORDED = "this is a recording: it cannot be changed"
 LIMITS = {"coordinate": MAX_COORDINATE_M, "height": MAX_HEIGHT_M}  # metres; for the page's form
 
@@ -40,7 +40,7 @@ class LayoutOffer(NamedTuple):
 
 
 def places_of(orders: Iterable[Order]) -> list[Place]:
-    """Where a layout sends its drones."""
+    """The positions to which a layout sends its drones."""
     return [(drone, goal.longitude, goal.latitude, goal.height) for drone, goal in orders]
 
 
@@ -75,7 +75,7 @@ class PageOrder(_Request, abc.ABC):
 
     @abc.abstractmethod
     def carry_out(self, controls: MeshControls) -> str:
-        """A few words for the page. Raises OrderRefused."""
+        """Carry the order out; returns a short text for the page. Raises OrderRefused."""
 
 
 class _Power(PageOrder):
@@ -137,14 +137,14 @@ class _Remove(PageOrder):
 
 
 class ReadPlaces(_Request):
-    """The page has a layout file, and asks where its drones would fly."""
+    """The page sends a layout file and asks for the positions of its drones."""
 
     do: Literal["places"]
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
     text: str = Field(max_length=MAX_FILE_CHARACTERS)
 
     def places(self) -> list[Place]:
-        """Raises OrderRefused with the line that is wrong."""
+        """Parse the file. Raises OrderRefused, which names the invalid line."""
         try:
             return places_of(read_places(self.text))
         except ConfigurationError as error:
@@ -152,14 +152,14 @@ class ReadPlaces(_Request):
 
 
 class NeighbourWatch(_Request):
-    """The page requests details of one node's neighbours; None: no longer."""
+    """The page requests details of one node's neighbours; None: stop."""
 
     do: Literal["watch"]
     node: NodeOrNone
 
 
 class Demonstrate(_Request):
-    """The page wants the demonstration of a repair to begin, or to end."""
+    """Begin or end the demonstration of a repair."""
 
     do: Literal["demonstrate"]
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
@@ -167,18 +167,18 @@ class Demonstrate(_Request):
 
 
 class PacketWatch(_Request):
-    """The page wants to be shown packets, or no longer."""
+    """Start or stop sending packets to this page."""
 
     do: Literal["packets"]
     on: bool
 
 
 class TimeLine(_Request):
-    """The page wants to look at another moment; None: as it is."""
+    """Show another moment; None: unchanged."""
 
     do: Literal["time"]
     t: MomentOrNone = None
-    step: int = Field(0, ge=-1000, le=1000)  # states on, or back
+    step: int = Field(0, ge=-1000, le=1000)  # states forward, or back if negative
     paused: SwitchOrNone = None
     factor: FactorOrNone = None  # simulated seconds per second
     live: bool = False  # back to the present
@@ -188,7 +188,7 @@ class Recorded:
     """The MeshControls of a recording: nothing can be ordered."""
 
     def power(self, node: int, on: bool) -> str:
-        """Refused, as all that follows."""
+        """Refused, like everything below."""
         raise OrderRefused(RECORDED)
 
     def fly(self, node: int, x: float, y: float, z: float) -> str:  # noqa: D102
@@ -234,7 +234,7 @@ _REQUESTS: TypeAdapter[Request] = TypeAdapter(
 
 
 def parse_request(text: str) -> Request:
-    """Parse a page's message. Raises OrderRefused for anything but a valid request."""
+    """Parse a page's message. Raises OrderRefused unless it is a valid request."""
     try:
         return _REQUESTS.validate_json(text)
     except ValidationError as error:

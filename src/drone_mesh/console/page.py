@@ -1,4 +1,4 @@
-"""Page: one open page, and what it looks at: the present, or a moment of the history."""
+"""Page: one open page, and what it shows: the present or a moment of the history."""
 
 from __future__ import annotations
 
@@ -21,29 +21,30 @@ class Page:
     def __init__(
         self, socket: WebSocket, live: FrameStore, history: History, is_live: bool
     ) -> None:
-        """`is_live`: there is a present, to which the page can return; else there is a history."""
+        """`is_live`: there is a present to return to; otherwise the page shows only the history."""
         self.socket = socket
         self.watching: int | None = None  # the node whose neighbours it shows
         self.packets = PacketDots()
         self.orders: set[asyncio.Task[None]] = set()
         self._live, self._history, self._is_live = live, history, is_live
         self._player = None if is_live else Player(history, history.times[0])
-        self._version = 0  # of what it knows
+        self._version = 0  # of what the page has
         self._time_line: dict[str, Any] = {}
         self._marks: list[dict[str, Any]] = []
 
     @property
     def store(self) -> FrameStore:
-        """What it looks at."""
+        """The store that the page shows."""
         return self._live if self._player is None else self._player.store
 
     def messages(self, wall_s: float) -> Iterator[str]:
-        """What is new for the page; so much wall time has passed."""
+        """Messages with what is new for the page; `wall_s` wall seconds have passed."""
         if self._player is not None:
             self._play(self._player, wall_s)
         store = self.store
         if self._version != store.version:
-            # Only what is sent counts as known: a page that falls behind gets it all at once.
+            # Only what is sent counts as known, so a page that falls behind gets everything at
+            # once.
             frame, self._version = store.frame_since(self._version), store.version
             yield frame
             if self.watching is not None:
@@ -53,7 +54,7 @@ class Page:
             yield from self._time_line_messages()
 
     def move(self, request: TimeLine) -> None:
-        """Look at another moment."""
+        """Move to another moment."""
         if request.live and self._is_live:
             self._look_at(None)
             return
@@ -88,7 +89,7 @@ class Page:
                 self._look_at(None)
 
     def _present_s(self) -> float:
-        """Simulated seconds; of a recording that is played, how far that has come."""
+        """Simulated seconds; for a recording being played, its current position."""
         mesh = self._live.mesh
         return self._history.times[0] if mesh is None else mesh.stamp_s
 

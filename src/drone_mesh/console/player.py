@@ -1,4 +1,4 @@
-"""Player: where in a history one page looks; it plays, pauses, steps and jumps."""
+"""Player: the position of one page in a history; it plays, pauses, steps and jumps."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import replace
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 
-_AHEAD = 60.0  # our choice: a jump of more simulated seconds shows no events one by one
+_AHEAD = 60.0  # our choice: a longer jump, in simulated seconds, shows no single events
 
 
 class Player:
-    """Fills a store of its own with the states of the history. Belongs to the server's loop."""
+    """Fills its own store with states of the history. Belongs to the server's event loop."""
 
     def __init__(self, history: History, at_s: float) -> None:
-        """The history has at least one state."""
+        """`history` must have at least one state."""
         self._history = history
         self.store = FrameStore()
         self.paused, self.factor = False, 1.0
@@ -29,20 +29,20 @@ class Player:
         return self.now_s >= self._history.times[-1]
 
     def advance(self, wall_s: float) -> None:
-        """So much wall time has passed."""
+        """Advance by `wall_s` wall seconds."""
         if not self.paused:
             self.show(self.now_s + wall_s * self.factor)
 
     def step(self, states: int) -> None:
-        """So many states on, or back; and pause."""
+        """Move by this many states, back if negative, and pause."""
         times = self._history.times
         index = min(max(self._history.index_at(self.now_s) + states, 0), len(times) - 1)
         self.pause(True)
         self.show(times[index])
 
     def pause(self, paused: bool) -> None:
-        """Stop or go on."""
-        self.paused, self._shown_s = paused, None  # the page has to learn of it
+        """Pause or resume."""
+        self.paused, self._shown_s = paused, None  # the page must be informed
         self.show(self.now_s)
 
     def show(self, at_s: float) -> None:

@@ -1,4 +1,4 @@
-"""A real mesh as the page shows it, from what its gateway answers to GET /mesh."""
+"""Converts a gateway's answer to GET /mesh into the state that the page shows."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from drone_mesh.state.routes import route_to_gateway
 REPORTS_MISSING_S = 75.0  # our choice: two reports of the default period, and a half
 
 More = Dict[int, Dict[str, Any]]
-"""What only real nodes have, by node: fields for the page."""
+"""By node, the fields for the page that only real nodes have."""
 
 
 def real_mesh(answer: Mapping[str, Any]) -> tuple[MeshStatus, More]:
-    """The mesh, and what a MeshStatus has no field for.
+    """The mesh, and the fields for which MeshStatus has no place.
 
-    Raises KeyError, TypeError or ValueError for anything but such an answer.
+    Raises KeyError, TypeError or ValueError if the answer is invalid.
     """
     gateway = int(answer["gateway"])
     nodes = [_node(entry, gateway) for entry in answer["nodes"]]
@@ -77,7 +77,7 @@ def _more(entry: Mapping[str, Any]) -> dict[str, Any]:
         "earth": entry["earth"],
         "drone": _drone_in_words(entry),
         "channel": f"{tries:.1f} tries per packet" if tries else "",
-        "known_nodes": None,  # not reported, as the next one
+        "known_nodes": None,  # not reported; nor is the next one
         "total_messages": entry.get("messages_sent"),
     }
     if "neighbour_count" in entry:

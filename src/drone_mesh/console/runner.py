@@ -10,7 +10,7 @@ PING_PERIOD_S = 10.0  # a page that disappeared silently is noticed after two of
 
 
 class ConsoleRunner(ServerThread):
-    """Serves from start to stop. The event loop, and with it the FrameStore, is its thread's."""
+    """Serves from start to stop. Its thread owns the event loop, and with it the FrameStore."""
 
     def __init__(self, server: ConsoleServer, bind_address: str, port: int) -> None:
         """Take the port (0: any free one). Raises ConfigurationError if it is not available."""

@@ -1,9 +1,9 @@
 """The console's page and WebSocket, as an ASGI application (Starlette).
 
-Everything runs in one event loop, which owns the FrameStore, except orders: these block, so they
-run in threads of their own. Each page has one task that sends frames. It builds a frame only after
-the page has accepted the one before, so a slow page gets fewer and larger frames; a page that
-accepts nothing for SEND_TIMEOUT_S is disconnected.
+Everything runs in one event loop, which owns the FrameStore, except orders: they block, so they run
+in threads of their own. Each page has one task that sends frames. It builds a frame only after the
+page has accepted the previous one, so a slow page gets fewer and larger frames; a page that accepts
+nothing for SEND_TIMEOUT_S is disconnected.
 """
 
 from __future__ import annotations
@@ -127,10 +127,11 @@ class ConsoleServer:
         whole: History | None = None,
         is_played: bool = True,
     ) -> None:
-        """`demonstrate`: show a repair as soon as a page is open; `actions`: what it offers.
+        """`demonstrate`: show a repair as soon as a page opens; `actions`: the orders it offers.
 
-        `recording`: its name, if the console shows one; `whole`: all of it. Without it, pages look
-        back at the store's history. A recording that is not played is shown from its start.
+        `recording`: its name, if the console shows one; `whole`: its whole history. Without
+        `whole`, pages look back at the store's history. A recording that is not playing is shown
+        from its start.
         """
         self._actions = actions
         self._store = store
@@ -159,12 +160,12 @@ class ConsoleServer:
         return any(page.packets.wanted for page in tuple(self._pages))
 
     def show_packets(self, carried: int, dots: Sequence[Dot]) -> None:
-        """So many packets arrived; `dots` are a sample of them."""
+        """`carried` packets arrived; `dots` are a sample of them."""
         for page in self._pages:
             page.packets.add(carried, dots)
 
     def close(self) -> None:
-        """Accept no more orders. Those under way end by themselves."""
+        """Accept no more orders. Running ones end by themselves."""
         self._workers.shutdown(wait=False)
 
     async def _index(self, request: Request) -> Response:
@@ -196,7 +197,7 @@ class ConsoleServer:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._pages.discard(page)
-            # Both, now that the page is gone: wait_for may have swallowed an earlier cancellation.
+            # Cancel both, because wait_for may have swallowed an earlier cancellation.
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -226,7 +227,7 @@ class ConsoleServer:
             }
             await self._send(page, json.dumps(hello))
             before_s = loop.time()
-            # wait_for may swallow a cancellation that comes as a send ends (before Python 3.12).
+            # Before Python 3.12 wait_for may swallow a cancellation that arrives as a send ends.
             while page in self._pages:
                 started_s = loop.time()
                 for text in page.messages(started_s - before_s):
@@ -300,6 +301,6 @@ class ConsoleServer:
         answer: dict[str, object] = {"type": "answer", "number": number, "done": done, "text": text}
         if places:
             answer["places"] = places
-        # A page that is gone by now needs no answer.
+        # The page may have closed meanwhile.
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
             await self._send(page, json.dumps(answer))

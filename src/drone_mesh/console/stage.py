@@ -33,7 +33,7 @@ class Stage:
         return "the demonstration begins"
 
     def end(self) -> str:
-        """End the demonstration, or close the story of one that is over."""
+        """End the demonstration, or close the story of a finished one."""
         if self._running is not None and not self._running.done():
             self._running.cancel()
             return "the demonstration ends"
@@ -64,12 +64,12 @@ class Stage:
     async def _stop(
         self, demonstration: RepairDemonstration, why: str, mesh: MeshStatus | None
     ) -> None:
-        demonstration.story.tell(f"Not finished: {why}", 0.0 if mesh is None else mesh.stamp_s)
+        demonstration.story.add(f"Not finished: {why}", 0.0 if mesh is None else mesh.stamp_s)
         for order in demonstration.leave():
             try:
                 await self._carry_out([order])
             except OrderRefused:
-                continue  # the mesh may be gone; what can be given back is
+                continue  # the mesh may be gone; undo as much as possible
 
     async def _carry_out(self, orders: Sequence[Order]) -> None:
         loop = asyncio.get_running_loop()
@@ -78,7 +78,7 @@ class Stage:
 
 
 def describe(story: RepairStory, mesh: MeshStatus, running: bool) -> Mapping[str, Any]:
-    """The story for a page: its steps, and the seconds that the mesh still waits at the last."""
+    """The story for a page: its steps, and how many seconds the mesh still waits at the last."""
     steps = [{"t": round(step.at_s, 1), "text": step.text} for step in story.steps]
     wait: dict[str, int] = {}
     if running and story.steps and story.steps[-1].until_s < math.inf:

@@ -1,1 +1,1 @@
-"""The state of the whole mesh: merged, judged, and counted over time. No ROS."""
+"""The state of the whole mesh: merged, assessed, and counted over time. Without ROS."""

@@ -1,4 +1,4 @@
-"""What condition a node is in: decided here, and only shown by every view."""
+"""The condition of a node: decided here, and only displayed by every view."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import enum
 
 from drone_mesh.state.model import NodeStatus
 
-SILENT_AFTER_S = 5.0  # our choice: a host reports twice a second, ten reports are missing then
+SILENT_AFTER_S = 5.0  # our choice: ten missed reports, since a host reports twice a second
 
 
 class Condition(enum.Enum):
-    """What one can expect of a node now. The value is the word that people see."""
+    """What to expect of a node now. The value is the word that views display."""
 
     CONNECTED = "connected"
-    CRASHED = "crashed"  # its drone never flies again; its node may go on working
+    CRASHED = "crashed"  # its drone never flies again, but its node may still work
     FLYING = "flying"
     DISCONNECTED = "disconnected"  # on, and looking for a gateway
     OFF = "off"
-    SILENT = "silent"  # the process that hosts it has stopped reporting: its state is not known
+    SILENT = "silent"  # the process that hosts it has stopped reporting: its state is unknown
 
 
 def condition_of(node: NodeStatus) -> Condition:
-    """The first that holds: silent, off, crashed, flying, connected; else disconnected."""
+    """The first that applies: silent, off, crashed, flying, connected, disconnected."""
     if node.report_age >= SILENT_AFTER_S:
         return Condition.SILENT
     if not node.on:

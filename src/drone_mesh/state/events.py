@@ -1,4 +1,4 @@
-"""Events on their way from the mesh software to people: batched, in bounded memory."""
+"""Events on their way from the mesh software to views: batched, in bounded memory."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ _SEVERAL_AT_ONCE = frozenset(
         MeshEventKind.NODE_MISSING,
     )
 )
-EVENTS_KEPT = 100_000  # our choice: 254 nodes that find 200 neighbours each, and as much again
+EVENTS_KEPT = 100_000  # our choice: twice what 254 nodes that find 200 neighbours each produce
 
 
 class EventBatcher:
     """Accepts events from any thread; one thread takes them out in batches.
 
-    When a crowd of nodes meets, it produces tens of thousands of events within a second. So
-    consecutive neighbours that one node found (or lost, or misses) become one event with many
-    peers.
+    When many nodes meet, they produce tens of thousands of events within a second. Consecutive
+    events about neighbours that one node found (or lost, or misses) therefore become one event with
+    many peers.
     """
 
     def __init__(self) -> None:

@@ -1,7 +1,7 @@
-"""Names of the figures in /diagnostics that add up over processes: the bench reads them."""
+"""Names of the figures in /diagnostics that the benchmark sums over processes."""
 
 from __future__ import annotations
 
-DELIVERED = "delivered"  # packets handed to a node, each receiver of a broadcast counted
+DELIVERED = "delivered"  # packets handed to a node, counting each receiver of a broadcast
 LOST_IN_RANGE = "lost in range"  # packets for a node that is on, in range and has listened before
-WORST_LAG = "worst timer lag"  # s, simulated: how late the latest timer was since the last report
+WORST_LAG = "worst timer lag"  # s, simulated: the longest delay of a timer since the last report

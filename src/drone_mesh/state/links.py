@@ -1,4 +1,4 @@
-"""Links between nodes, and what each of them is used for."""
+"""Links between nodes, and the use of each."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ import numpy as np
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import NodeStatus, position_is_known
 
-JUST_LOST_S = 6.0  # our choice: long enough to be seen
+JUST_LOST_S = 6.0  # our choice: long enough to be noticed
 
 Link = Tuple[int, int]  # the lower id first
 
 
 class LinkUse(enum.Enum):
-    """What a link is used for. The value is the word that people see."""
+    """What a link is used for. The value is the text that views display."""
 
     ROUTE = "route to a gateway"
-    KNOWN = "known link"  # the two are neighbours, and no route leads over it
-    LOST = "lost link"  # it was there a moment ago
+    KNOWN = "known link"  # the two are neighbours, but no route uses the link
+    LOST = "lost link"  # it existed a moment ago
 
 
 def links_by_use(
     nodes: Sequence[NodeStatus], lost: Iterable[Link] = ()
 ) -> dict[LinkUse, set[Link]]:
-    """Every link between these nodes, each under one use. `lost` comes from LostLinks."""
+    """Every link between these nodes, each with exactly one use. `lost` comes from LostLinks."""
     routes = route_links(nodes)
     return {
         LinkUse.ROUTE: routes,
@@ -49,7 +49,7 @@ def known_links(nodes: Sequence[NodeStatus]) -> set[Link]:
 
 
 def route_links(nodes: Sequence[NodeStatus]) -> set[Link]:
-    """The links that packets to a gateway take now."""
+    """The links that packets to a gateway use now."""
     on = {node.id for node in nodes if node.on}
     return {
         (min(node.id, node.next_hop), max(node.id, node.next_hop))
@@ -59,7 +59,7 @@ def route_links(nodes: Sequence[NodeStatus]) -> set[Link]:
 
 
 def shortest(links: set[Link], nodes: Sequence[NodeStatus], most: int) -> list[Link]:
-    """At most `most` of these links, the shortest: a picture of a crowd has no room for more."""
+    """At most `most` of these links, shortest first; a picture of a crowd has no room for more."""
     positions = {node.id: node.position for node in nodes if position_is_known(node)}
     drawable = [link for link in links if link[0] in positions and link[1] in positions]
     if len(drawable) <= most:
@@ -69,14 +69,14 @@ def shortest(links: set[Link], nodes: Sequence[NodeStatus], most: int) -> list[L
 
 
 class LostLinks:
-    """Remembers for a while which links there were. Belongs to one thread."""
+    """Remembers recently lost links for a while. Belongs to one thread."""
 
     def __init__(self) -> None:
         self._links: set[Link] = set()
         self._lost_at_s: dict[Link, float] = {}
 
     def update(self, links: set[Link], wall_s: float) -> list[Link]:
-        """Take the links that exist now; return those that were lost in the last JUST_LOST_S."""
+        """Set the links that exist now; return those lost within the last JUST_LOST_S."""
         for link in self._links - links:
             self._lost_at_s[link] = wall_s
         self._lost_at_s = {

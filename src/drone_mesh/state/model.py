@@ -1,4 +1,4 @@
-"""What is known about a mesh at one moment.
+"""The state of a mesh at one moment.
 
 NodeStatus and MeshStatus are NodeState.msg and MeshState.msg without ROS. NodeStatus has the
 message's field names, so code that reads one accepts the other and nothing has to be copied.
@@ -43,11 +43,11 @@ class NodeStatus:
     airtime: float = 0.0  # share of the time that its frames occupy a shared channel
     tries: float = 0.0  # per packet on a shared channel; 0 on another medium
     queue: int = 0  # packets that wait to be sent
-    given_up: int = 0  # packets that no try could deliver
-    data_sent: int = 0  # messages of users that were handed in here
+    given_up: int = 0  # packets that were given up after all attempts
+    data_sent: int = 0  # users' messages submitted at this node
     data_bytes_sent: int = 0
     data_sent_at: float = 0.0  # simulated s; 0: none
-    data_received: int = 0  # messages of users that were delivered here
+    data_received: int = 0  # users' messages delivered at this node
     data_bytes_received: int = 0
     data_received_at: float = 0.0  # simulated s; 0: none
     data_queued: int = 0  # now
@@ -56,10 +56,10 @@ class NodeStatus:
     bid: float = NO_BID
     place_of: int = NO_ROUTE
     emergency_in: float = math.inf  # simulated s
-    battery: float = math.nan  # percent; NaN: none, or not known
+    battery: float = math.nan  # percent; NaN: none, or unknown
     crashed: bool = False
-    why_not_fly: str = ""  # why its drone would not fly now; empty: it would, or not known
-    repair: str = ""  # what it does about a lost connection, and why; empty: nothing to repair
+    why_not_fly: str = ""  # why its drone cannot fly now; empty: it can, or unknown
+    repair: str = ""  # what the node does about a lost connection, and why; empty: nothing
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def footprint(box: ObstacleStatus) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class EventRecord:
-    """One thing that happened to one node, as MeshEvent.msg describes it."""
+    """One event at one node, as MeshEvent.msg describes it."""
 
     stamp_s: float
     node: int
@@ -109,7 +109,7 @@ class MeshStatus:
 
 
 def channel_in_words(node: NodeStatus) -> str:
-    """What a node does on a shared channel; empty on another medium."""
+    """A node's use of a shared channel, as text; empty on another medium."""
     if not node.tries:
         return ""
     return (
@@ -119,7 +119,7 @@ def channel_in_words(node: NodeStatus) -> str:
 
 
 def data_in_words(node: NodeStatus) -> str:
-    """Which messages of users a node has sent and received; empty: none."""
+    """The users' messages that a node sent and received, as text; empty if none."""
     if not (node.data_sent or node.data_received):
         return ""
     return (

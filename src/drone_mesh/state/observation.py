@@ -24,7 +24,7 @@ def describe_component(
 ) -> None:
     """Fill in the state of a component. May be called in any thread.
 
-    `on` is whether its antenna has power. Position, path, route and report_age are left alone.
+    `on` is whether its antenna has power. Position, path, route and report_age remain unchanged.
     """
     status.on = on
     status.connected = component.get_connected_to_gateway()
@@ -60,7 +60,7 @@ def describe_component(
 def describe_drone(
     node_id: int, role: Role, centre: Vector, path: FlightPath | None, now_s: float
 ) -> DroneView:
-    """Where a simulated drone is and where it flies, given the centre of its box and its path."""
+    """Fill in position and path of a simulated drone, given the centre of its box and its path."""
     half_height_m = role.size_m[2] / 2
     x, y, z = centre
     ahead = path_ahead(path, now_s, half_height_m) if path else ()
@@ -68,7 +68,7 @@ def describe_drone(
 
 
 def describe_obstacles(boxes: Iterable[Box]) -> list[ObstacleStatus]:
-    """These boxes in the terms of a MeshStatus."""
+    """These boxes as parts of a MeshStatus."""
     return [ObstacleStatus(box.center, box.size, box.yaw_rad) for box in boxes]
 
 

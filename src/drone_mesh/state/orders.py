@@ -1,4 +1,4 @@
-"""How far the latest order of each drone has come, from the events of the gateways."""
+"""The progress of each drone's latest order, derived from the events of the gateways."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _OPEN = (OrderState.ASKED, OrderState.UNDER_WAY)
 
 
 class OrderProgress:
-    """Follows one order to its end, through all gateways that sent it."""
+    """Follows one order until it ends, through all gateways that sent it."""
 
     def __init__(self, drone: int, goal: Location, since_s: float) -> None:
-        """Events before `since_s` (simulated seconds) belong to other orders."""
+        """Ignores events before `since_s` (simulated seconds), which belong to earlier orders."""
         self._drone = drone
         self._sent = f"to {goal.in_words()}"
         self._since_s = since_s
@@ -45,7 +45,7 @@ class OrderProgress:
         return self.state not in _OPEN
 
     def take(self, event: EventRecord) -> None:
-        """Take over a new event; most have nothing to do with this order."""
+        """Process a new event; events of other orders are ignored."""
         state = _STATE_OF.get(event.kind)
         if state is None or tuple(event.peers) != (self._drone,) or self.is_over:
             return
@@ -58,20 +58,20 @@ class OrderProgress:
             self._conclude(state, words)
 
     def _conclude(self, state: OrderState, reason: str) -> None:
-        """`state` is that of the order that changed last."""
+        """Update the outcome; `state` is that of the order that changed last."""
         ended = all(other not in _OPEN for other in self._orders.values())
         if state in _OPEN or state is OrderState.ARRIVED or ended:
             self.state, self.reason = state, reason
 
 
 class OrderWatch:
-    """Follows events, and says for each drone how far its latest order has come, in words."""
+    """Follows events and describes the progress of each drone's latest order."""
 
     def __init__(self) -> None:
         self._latest: dict[int, tuple[int, str, str]] = {}  # drone -> gateway, order, words
 
     def take(self, events: Iterable[EventRecord]) -> None:
-        """Take over new events, oldest first. An older order that ends changes nothing."""
+        """Process new events, oldest first. The end of an older order changes nothing."""
         for event in events:
             state = _STATE_OF.get(event.kind)
             order, _, reason = event.detail.partition(": ")
@@ -81,16 +81,16 @@ class OrderWatch:
             gateway, latest, _ = self._latest.get(drone, (event.node, order, ""))
             if gateway == event.node:
                 counts = order == latest or state in (OrderState.ASKED, OrderState.NO_ROUTE)
-            else:  # another gateway may well have no route
+            else:  # another gateway may have no route
                 counts = state is not OrderState.NO_ROUTE
             if counts:
                 words = f"{state.value}: {reason}" if reason else state.value
                 self._latest[drone] = event.node, order, words
 
     def words(self, drone: int) -> str:
-        """Of its latest order; empty if there was none."""
+        """The progress of its latest order, as text; empty if there was none."""
         return self._latest[drone][2] if drone in self._latest else ""
 
     def forget(self) -> None:
-        """A new run has begun."""
+        """Forget all orders: a new run has begun."""
         self._latest.clear()

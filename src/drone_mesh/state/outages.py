@@ -1,4 +1,4 @@
-"""Outages: when each node lost its gateway, and how each loss was repaired, from the events."""
+"""Outages: when each node lost its gateway and how each loss was repaired, from the events."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ CAUSE_WITHIN_S = 60.0  # our choice; noticed within 30 s (docs/protocol.md, "Req
 
 @dataclass(frozen=True)
 class Outage:
-    """One node's time without a gateway, in simulated seconds. None: it has not happened."""
+    """One node's time without a gateway, in simulated seconds. None: that has not happened."""
 
     node: int
-    lost_s: float  # it noticed that its gateway does not answer
+    lost_s: float  # it noticed that its gateway no longer answers
     cause_s: float | None = None  # the last power-off of another node before that
     cause_node: int | None = None
     emergency_s: float | None = None  # its time without a gateway ran out
     decided_s: float | None = None  # it decided to fly
     fallback: int | None = None  # the node whose position it flew to
-    landed_s: float | None = None  # it noticed the landing; may be after connected_s
+    landed_s: float | None = None  # it noticed the landing; can be later than connected_s
     connected_s: float | None = None
     switched_off: bool = False  # the node itself was switched off: nothing to repair
 
     @property
     def seconds(self) -> float | None:
-        """How long it lasted, or None while it lasts."""
+        """Its duration, or None if it has not ended."""
         return None if self.connected_s is None else self.connected_s - self.lost_s
 
 
 def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
-    """Each time that a node was without a gateway, in order of loss.
+    """All periods in which a node was without a gateway, in order of loss.
 
-    An ordered flight counts as well: the node is without a gateway until it has landed.
+    A flight on orders counts as well: the node is without a gateway until it has landed.
     """
     done: list[Outage] = []
     open_of: dict[int, Outage] = {}
@@ -79,7 +79,7 @@ def _new_outage(event: EventRecord, power_offs: Sequence[tuple[float, int]]) -> 
 
 
 def _land_afterwards(done: list[Outage], event: EventRecord) -> None:
-    """A drone checks once a second whether it has landed, and may be connected before that."""
+    """Record a landing after the outage: a drone may be connected before it notices its landing."""
     for index in range(len(done) - 1, -1, -1):
         outage = done[index]
         if outage.node == event.node:
@@ -117,7 +117,7 @@ class MeshSample:
 
 
 def take_sample(mesh: MeshStatus) -> MeshSample:
-    """The numbers that charts show over time."""
+    """The numbers for charts over time."""
     routers = [node for node in mesh.nodes if node.role == Role.ROUTER and node.on]
     hops = [node.hops for node in routers if node.connected]
     return MeshSample(

@@ -1,4 +1,4 @@
-"""Packets of the air, for people who watch: what kind each one is, and a sample of bounded size."""
+"""Packets on the air, for display: the kind of each packet, and a sample of bounded size."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_SAMPLED = 120  # our choice, for a fifth of a second: more dots cannot be f
 
 
 class PacketKind(enum.Enum):
-    """What a packet is about, as a legend shows it."""
+    """The subject of a packet, as a legend shows it."""
 
     HEARTBEAT = "heartbeat"
     INTRODUCTION = "introduction"
@@ -48,7 +48,7 @@ _KINDS: Mapping[int, PacketKind] = {
 
 
 def kind_of(packet_type: int) -> PacketKind:
-    """The kind of a packet with this byte 2."""
+    """The kind of a packet whose byte 2 is `packet_type`."""
     if packet_type in DATA_TYPES:
         return PacketKind.DATA
     return _KINDS.get(packet_type, PacketKind.OTHER)
@@ -60,11 +60,11 @@ class SampledPacket(NamedTuple):
     sender: int  # of this hop
     receiver: int
     type: int
-    at_s: float  # when, by the clock of whoever notes it
+    at_s: float  # by the clock of the recording process
 
 
 class PacketSampler:
-    """A sample of the packets since it was last taken, each as likely as any other."""
+    """A uniform sample of the packets since the last call of `take`."""
 
     def __init__(self, rng: random.Random, most: int = MOST_SAMPLED) -> None:
         self._rng, self._most = rng, most
@@ -72,7 +72,7 @@ class PacketSampler:
         self._sample: list[SampledPacket] = []
 
     def note(self, packet: bytes, at_s: float) -> None:
-        """A packet arrived."""
+        """Record a packet that arrived."""
         self._carried += 1
         place = len(self._sample)
         if place >= self._most:  # Vitter's algorithm R
@@ -83,7 +83,7 @@ class PacketSampler:
         self._sample[place : place + 1] = [sampled]
 
     def take(self) -> tuple[int, Sequence[SampledPacket]]:
-        """How many packets arrived, and those of the sample, oldest first."""
+        """The number of packets that arrived, and the sample of them, oldest first."""
         carried, sample = self._carried, self._sample
         self._carried, self._sample = 0, []
         return carried, sorted(sample, key=lambda packet: packet.at_s)

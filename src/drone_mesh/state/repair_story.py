@@ -1,6 +1,6 @@
 """RepairStory: a repair in sentences, from one state of the mesh to the next.
 
-It reads nothing but states, so what it says holds for a live mesh and for a recording.
+It reads only states, so it works for a live mesh and for a recording.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from drone_mesh.communication.router_states import Repair
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus
 
-# Strategy -> what a bid is, what its unit is, and what makes the highest one. Others only bid.
+# Strategy -> meaning of a bid, its unit, and why the highest one wins. Other strategies only bid.
 _BIDS = {
     "thesis": ("its distance to the gateway", " m", "is farthest"),
     "nearest": ("how near it is to that place", "", "is nearest"),
@@ -32,7 +32,7 @@ class StoryStep:
 
 
 class RepairStory:
-    """Adds a step when something new happens, and rewrites the last one while it lasts.
+    """Adds a step for each new development, and rewrites the last step while it continues.
 
     Belongs to one thread.
     """
@@ -41,35 +41,35 @@ class RepairStory:
         self.steps: list[StoryStep] = []
         self._key: tuple[object, ...] | None = None  # of the step that lasts
         self._before: dict[int, NodeStatus] = {}
-        self._lost: set[int] = set()  # since the last time that all were connected
+        self._lost: set[int] = set()  # since all were last connected
         self._lost_at_s = math.inf
         self._fell_silent: dict[int, float] = {}  # node -> when it was switched off
         self._bids: dict[int, float] = {}
-        self._fliers: dict[int, int] = {}  # node -> the node whose place it took
+        self._fliers: dict[int, int] = {}  # node -> the node whose position it took
         self._has_taken_off: set[int] = set()
 
-    def tell(self, text: str, at_s: float, until_s: float = math.inf) -> None:
+    def add(self, text: str, at_s: float, until_s: float = math.inf) -> None:
         """Add a sentence of the caller."""
         self._key = None
         self.steps.append(StoryStep(at_s, text, until_s))
 
     def update(self, mesh: MeshStatus) -> None:
-        """Go on to this state: not older than the last one, and it does not change any more."""
+        """Advance to this state, which is newer than the last one and no longer changes."""
         nodes = {node.id: node for node in mesh.nodes}
-        self._tell_power(nodes, mesh.stamp_s)
+        self._describe_power(nodes, mesh.stamp_s)
         routers = [node for node in nodes.values() if node.on and node.role == Role.ROUTER]
         by_state = {
             state: [node for node in routers if REPAIR_STATES[node.repair_state] is state]
             for state in Repair
         }
         if by_state[Repair.FLYING]:
-            self._tell_flights(by_state[Repair.FLYING], mesh)
+            self._describe_flights(by_state[Repair.FLYING], mesh)
         elif any(by_state[state] for state in _ELECTION):
-            self._tell_bids([n for state in _ELECTION for n in by_state[state]], mesh)
+            self._describe_bids([n for state in _ELECTION for n in by_state[state]], mesh)
         elif by_state[Repair.LOST]:
-            self._tell_loss(by_state[Repair.LOST], mesh)
+            self._describe_loss(by_state[Repair.LOST], mesh)
         elif self._lost and all(node.connected for node in routers if node.id in self._lost):
-            self._tell_end(mesh)
+            self._describe_end(mesh)
         self._before = nodes
 
     @property
@@ -77,16 +77,16 @@ class RepairStory:
         """Whether no repair is under way."""
         return not self._lost
 
-    def _tell_power(self, nodes: dict[int, NodeStatus], now_s: float) -> None:
+    def _describe_power(self, nodes: dict[int, NodeStatus], now_s: float) -> None:
         off = [n for n, node in nodes.items() if not node.on and self._was(n).on]
         for node_id in off:
             self._fell_silent[node_id] = now_s
             behind = [n.id for n in self._before.values() if node_id in list(n.route)[1:-1]]
-            way = f" It was on the way of {and_(behind)} to the gateway." if behind else ""
-            self.tell(f"{self._name(node_id)} is switched off.{way}", now_s)
+            way = f" It was on the route of {and_(behind)} to the gateway." if behind else ""
+            self.add(f"{self._name(node_id)} is switched off.{way}", now_s)
 
-    def _tell_loss(self, waiting: Sequence[NodeStatus], mesh: MeshStatus) -> None:
-        """They wait for another way to a gateway."""
+    def _describe_loss(self, waiting: Sequence[NodeStatus], mesh: MeshStatus) -> None:
+        """Describe nodes that wait for another route to a gateway."""
         now_s, ids = mesh.stamp_s, [node.id for node in waiting]
         if not self._lost:
             self._lost_at_s = now_s
@@ -103,8 +103,8 @@ class RepairStory:
         text += f". {waits} for another route before it negotiates"
         self._last(("lost", len(self._fliers)), text, now_s, until_s)
 
-    def _tell_bids(self, group: Sequence[NodeStatus], mesh: MeshStatus) -> None:
-        """They negotiate."""
+    def _describe_bids(self, group: Sequence[NodeStatus], mesh: MeshStatus) -> None:
+        """Describe a negotiation."""
         now_s = mesh.stamp_s
         if self._key is None or self._key[0] not in ("asking", "bids"):
             self._bids.clear()
@@ -115,7 +115,7 @@ class RepairStory:
         bidding = [n for n in group if REPAIR_STATES[n.repair_state] is not Repair.ASKING]
         if not bidding:
             asks = _each(ids, "it asks", "each asks")
-            self._last(("asking",), f"{lost}; {asks} where its neighbours stand", now_s)
+            self._last(("asking",), f"{lost}; {asks} its neighbours for their positions", now_s)
             return
         for node in bidding:
             self._bids[node.id] = node.bid
@@ -123,9 +123,11 @@ class RepairStory:
         what, unit, _why = _BIDS.get(mesh.repair_strategy, ("", "", ""))
         parts = [lost]
         if bids:
-            who = ", ".join(f"{n.id} bids {_bid(n.bid, unit)}" for n in bids)
+            bids_text = ", ".join(f"{n.id} bids {_bid(n.bid, unit)}" for n in bids)
             meaning = f" (a bid is {what})" if what else ""
-            parts.append(f"to take the place of {and_({n.place_of for n in bids})}, {who}{meaning}")
+            parts.append(
+                f"to take the place of {and_({n.place_of for n in bids})}, {bids_text}{meaning}"
+            )
         abstain: dict[str, list[int]] = {}
         for node in bidding:
             if node.bid < 0:
@@ -134,19 +136,19 @@ class RepairStory:
             parts.append(f"{and_(ids)} {_each(ids, 'does', 'do')} not bid{why}")
         self._last(("bids", len(self._fliers)), "; ".join(parts), now_s)
 
-    def _tell_flights(self, fliers: Sequence[NodeStatus], mesh: MeshStatus) -> None:
+    def _describe_flights(self, fliers: Sequence[NodeStatus], mesh: MeshStatus) -> None:
         for node in fliers:
             self._lost.add(node.id)
             self._fliers[node.id] = node.place_of
-            self._tell_flight(node, mesh)
+            self._describe_flight(node, mesh)
 
-    def _tell_flight(self, node: NodeStatus, mesh: MeshStatus) -> None:
+    def _describe_flight(self, node: NodeStatus, mesh: MeshStatus) -> None:
         now_s, place = mesh.stamp_s, self._place(node.place_of)
         if len(node.path):
             self._has_taken_off.add(node.id)
         elif node.id in self._has_taken_off:
             text = (
-                f"{node.id} has landed at {place}; it checks whether another drone stands there, "
+                f"{node.id} has landed at {place}; it checks whether another drone is there, "
                 "and introduces itself"
             )
             self._last(("landed", node.id), text, now_s)
@@ -164,7 +166,7 @@ class RepairStory:
             why = f"{node.id} {is_best}{bid} and flies"
         self._last(("flies", node.id, node.place_of), f"{why} to {place}{rest}", now_s)
 
-    def _tell_end(self, mesh: MeshStatus) -> None:
+    def _describe_end(self, mesh: MeshStatus) -> None:
         now_s = mesh.stamp_s
         text = f"{and_(sorted(self._lost))} {_each(self._lost, 'is', 'are')} connected again"
         silent = [(at_s, node_id) for node_id, at_s in self._fell_silent.items()]
@@ -172,7 +174,7 @@ class RepairStory:
             at_s, node_id = max(silent)
             text += f", {now_s - at_s:.0f} s after node {node_id} fell silent"
         for flier, place_of in self._fliers.items():
-            text += f"; {flier} stands at {self._place(place_of)}"
+            text += f"; {flier} is at {self._place(place_of)}"
         self._last(("over",), text, now_s)
         self._lost.clear()
         self._bids.clear()
@@ -188,7 +190,7 @@ class RepairStory:
         if key == self._key:
             self.steps[-1] = replace(self.steps[-1], text=text, until_s=until_s)
         else:
-            self.tell(text, now_s, until_s)
+            self.add(text, now_s, until_s)
             self._key = key
 
     def _was(self, node_id: int) -> NodeStatus:

@@ -1,4 +1,4 @@
-"""MeshRoster: merges what the hosts report with what the world knows about the drones."""
+"""MeshRoster: merges the reports of the hosts with the world's data on the drones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drone_mesh.state.routes import route_to_gateway
 
 @dataclass(frozen=True)
 class DroneView:
-    """What the world knows about one drone."""
+    """The world's data on one drone."""
 
     id: int
     role: int
@@ -20,14 +20,14 @@ class DroneView:
     path: Sequence[float] = ()  # (3 * waypoints,) m, the rest of its flight; empty: none
     battery: float = math.nan  # percent; NaN: it has none
     crashed: bool = False
-    why_not_fly: str = ""  # empty: it would fly
+    why_not_fly: str = ""  # empty: it can fly
 
 
 class MeshRoster:
     """All nodes of the mesh, by host. Belongs to one thread; `wall_s` are seconds of wall time.
 
-    A node leaves the roster when its host sends a report without it. When a host falls silent, its
-    nodes stay and their report_age grows.
+    A node leaves the roster when its host sends a report without it. If a host falls silent, its
+    nodes remain and their report_age grows.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class MeshRoster:
         self._ids_of_host: dict[str, set[int]] = {}
 
     def merge_report(self, host: str, nodes: Iterable[NodeStatus], wall_s: float) -> None:
-        """Take over a report of `host`. A node that moved to another host belongs to that one."""
+        """Apply a report of `host`. A node that moved to another host belongs to the new one."""
         reported = {node.id: node for node in nodes}
         for gone in self._ids_of_host.get(host, set()) - reported.keys():
             del self._nodes[gone]
@@ -50,7 +50,7 @@ class MeshRoster:
             self._heard_at_s[node] = wall_s
 
     def forget(self, node_id: int) -> None:
-        """This node was removed. Not known: nothing changes."""
+        """Drop this removed node; an unknown one is ignored."""
         self._nodes.pop(node_id, None)
         self._heard_at_s.pop(node_id, None)
         for ids in self._ids_of_host.values():
@@ -60,7 +60,7 @@ class MeshRoster:
         """All nodes by id, with positions, paths, routes and report ages filled in.
 
         A drone that no host has reported yet, or whose battery is empty, is listed as switched off.
-        The objects are the merged ones: the next call changes them.
+        The returned objects are not copies: the next call changes them.
         """
         views = {drone.id: drone for drone in drones}
         for node in self._nodes.values():

@@ -13,7 +13,7 @@ def route_to_gateway(start: int, nodes: Mapping[int, NodeStatus]) -> bytes:
     """Ids from `start` to a gateway, both included; empty when `start` is off or has no next hop.
 
     A route that loops, or leads to a node that is off or unknown, ends with the last id that could
-    be followed: it shows where packets get stuck.
+    be followed, which shows where packets get stuck.
     """
     route = bytearray()
     here = start

@@ -1,4 +1,4 @@
-"""What is wrong with a mesh, in words: for diagnostics, exit codes and highlighted rows."""
+"""Problems of a mesh, as text: for diagnostics, exit codes and highlighted rows."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
 
 
 def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summary:
-    """How many routers that are on have a gateway, and the worst severity among the troubles."""
+    """The number of routers with a gateway among those that are on, and the worst severity."""
     if not nodes:
         return Summary(Severity.STALE, "no nodes")
     conditions = {node.id: condition_of(node) for node in nodes}
@@ -94,5 +94,5 @@ def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summa
 
 
 def all_connected(troubles: Sequence[Trouble]) -> bool:
-    """Whether each node that is on is connected. A node that is switched off need not be."""
+    """Whether every node that is on is connected; nodes that are switched off do not count."""
     return all(trouble.severity <= Severity.WARN for trouble in troubles)

@@ -1,8 +1,8 @@
 """Access rules of the web servers.
 
 Without a token a server listens on the loopback interface only and answers only requests to
-loopback names, which defeats DNS rebinding. With a token, any client that has it may connect. In
-both cases a WebSocket is opened only for the page that this server sent.
+loopback names, which defeats DNS rebinding. With a token, any client that presents it may connect.
+In both cases a WebSocket is accepted only from the page that this server sent.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ class AccessDenied(MeshError):
 
 @dataclass(frozen=True)
 class Access:
-    """The rules of one server. Without a token only loopback names are answered.
+    """The rules of one server. Without a token it answers only loopback names.
 
-    With a token: these names, if any are given, and all addresses in numbers, which cannot be
-    rebound; without any names, all.
+    With a token it answers `names`, if there are any, and all numeric addresses, which cannot be
+    rebound; without names, any name.
     """
 
     token: str | None = None
     names: frozenset[str] = frozenset()
 
     def check_host(self, host: str) -> None:
-        """`host` is the Host header."""
+        """Check the Host header. Raises AccessDenied."""
         name = _host_name(f"//{host}")
         if self.token is None:
             if not is_loopback(name):
@@ -44,14 +44,14 @@ class Access:
             raise AccessDenied(f"{host!r} is not a name of this machine; --name adds one")
 
     def check_origin(self, origin: str | None, host: str) -> None:
-        """`origin` is the Origin header; the requesting page must be ours."""
+        """Check the Origin header: the requesting page must be ours. Raises AccessDenied."""
         if origin is None or _authority(origin) != host.lower():
             raise AccessDenied(
                 f"the page {origin or 'without an origin'} was not sent by this server"
             )
 
     def check_token(self, token: str | None) -> None:
-        """`token` is that of the request, from its address or its cookie."""
+        """Check the token from the request's address or cookie. Raises AccessDenied."""
         if self.token is None:
             return
         if token is None or not hmac.compare_digest(token.encode(), self.token.encode()):
@@ -61,9 +61,9 @@ class Access:
 
 
 def access_for(bind_address: str, token: str, names: Iterable[str] = ()) -> Access:
-    """The rules for a server that listens at this address; an empty token means none.
+    """The rules for a server that listens on this address; an empty token means none.
 
-    `names` are those that it is asked by, beside addresses in numbers; none: any, with a token.
+    `names`: host names that it answers besides numeric addresses; none: any name, with a token.
     """
     if token and len(token) < SHORTEST_TOKEN:
         raise ConfigurationError(f"token: must have at least {SHORTEST_TOKEN} characters")
@@ -75,7 +75,7 @@ def access_for(bind_address: str, token: str, names: Iterable[str] = ()) -> Acce
 
 
 def own_names(*more: str) -> frozenset[str]:
-    """What this machine is called, and these."""
+    """The names of this machine, and `more`."""
     name = socket.gethostname().lower()
     return frozenset({"localhost", name, f"{name}.local", *(other.lower() for other in more)})
 

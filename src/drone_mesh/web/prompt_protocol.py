@@ -1,4 +1,4 @@
-"""PromptProtocol: uvicorn's HTTP/1.1 without endless patience for silent or slow clients."""
+"""PromptProtocol: uvicorn's HTTP/1.1 with time limits for silent or slow clients."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ MOST_SILENT = 32  # our choice: connections without a request; the oldest makes 
 
 
 class PromptProtocol(H11Protocol):
-    """Closes a connection whose request does not arrive; one that is being answered stays.
+    """Closes a connection whose request does not arrive in time; others are left alone.
 
-    Silent connections cannot take the places of others: there are always fewer of them than
-    uvicorn's `limit_concurrency` allows. Lives in the server's event loop.
+    Silent connections cannot use up the places of others: there are always fewer of them than
+    uvicorn's `limit_concurrency` allows. Belongs to the server's event loop.
     """
 
     def __init__(self, *args: Any, **settings: Any) -> None:
@@ -44,11 +44,11 @@ class PromptProtocol(H11Protocol):
 
     @property
     def is_waiting(self) -> bool:
-        """Whether no request has arrived that would have to be answered."""
+        """Whether no request has arrived that still needs an answer."""
         return self._head_timer is not None
 
     def due_s(self) -> float:
-        """When its patience ends, in the loop's time."""
+        """When its time runs out, in the loop's time."""
         return self._head_timer.when() if self._head_timer is not None else 0.0
 
     def give_up(self) -> None:

@@ -23,7 +23,7 @@ LAST_ANSWERS_WITHIN_S = 1  # our choice: for requests that are in progress when 
 class ServerThread:
     """Serves one ASGI application from start to stop; it cannot be started again.
 
-    The event loop belongs to the thread: use `in_loop` to reach from elsewhere what lives there.
+    The event loop belongs to the thread; use `in_loop` to access its objects from other threads.
     `start` and `stop` are for the thread that owns this object.
     """
 
@@ -36,9 +36,9 @@ class ServerThread:
         certificate: Certificate | None = None,
         **settings: Any,
     ) -> None:
-        """Take the port (0: any free one). `name` is the thread's, `settings` are uvicorn's.
+        """Open the port (0: any free one). `name` is the thread's, `settings` are uvicorn's.
 
-        With a certificate it speaks HTTPS and nothing else.
+        With a certificate it serves HTTPS only.
 
         Raises ConfigurationError if the port is not available.
         """
@@ -75,7 +75,7 @@ class ServerThread:
         return f"{self._scheme}://{name}:{self.port}"
 
     def start(self) -> None:
-        """Begin to serve; returns when `in_loop` can be used."""
+        """Start serving; returns when `in_loop` can be used."""
         self._thread.start()
         self._running.wait()
 
@@ -87,7 +87,7 @@ class ServerThread:
         self._socket.close()
 
     def in_loop(self, function: Callable[[], None]) -> None:
-        """Have the loop call this soon. Does nothing before the start and after the stop."""
+        """Have the loop call this soon. Does nothing before the start or after the stop."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(function)
 
@@ -95,7 +95,7 @@ class ServerThread:
         try:
             asyncio.run(self._serve())
         finally:
-            self._running.set()  # no loop could be made: `start` must not wait for it
+            self._running.set()  # if creating the loop failed, `start` must not wait for it
 
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()

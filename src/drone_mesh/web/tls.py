@@ -1,4 +1,4 @@
-"""The certificate of a server that speaks HTTPS."""
+"""The certificate of an HTTPS server."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Certificate:
     key: Path
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError unless both can be read and belong together."""
+        """Raise ConfigurationError unless both files can be read and match."""
         try:
             ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.cert, self.key)
         except (OSError, ssl.SSLError) as error:

@@ -1,4 +1,4 @@
-"""Boxes on the way of radio and drones."""
+"""Boxes on the route of radio and drones."""
 
 from __future__ import annotations
 

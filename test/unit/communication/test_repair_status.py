@@ -53,7 +53,7 @@ OCCUPIED = "the place of 2 is occupied by 3"
         (RepairStatus(Repair.FLYING, "a gateway answers"), "lands: a gateway answers"),
         (
             RepairStatus(Repair.FLYING, place_of=2, landed=True),
-            "has landed, checks that no other drone stands there",
+            "has landed, checks that no other drone is there",
         ),
     ],
 )

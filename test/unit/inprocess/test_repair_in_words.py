@@ -35,7 +35,7 @@ def test_the_drone_that_flies_first_shows_each_phase_of_its_repair(sentences):
         "waits for a gateway",
         "negotiating, bids 12.0 m for the place of 1",
         "flies to the place of 1",
-        "has landed, checks that no other drone stands there",
+        "has landed, checks that no other drone is there",
         "",
     ]
 
@@ -49,7 +49,7 @@ def test_the_one_behind_it_shows_why_it_does_not_fly_and_then_flies_as_well(sent
         "waits for a gateway; does not fly: 2 flies instead",
         "negotiating, bids 18.0 m for the place of 2",
         "flies to the place of 2",
-        "has landed, checks that no other drone stands there",
+        "has landed, checks that no other drone is there",
         "",
     ]
 

@@ -21,7 +21,7 @@ def group_behind_a_chain(repair: str = "thesis") -> Network:
     return network
 
 
-def tell(network: Network, off: int, seconds: float) -> RepairStory:
+def story_of(network: Network, off: int, seconds: float) -> RepairStory:
     story = RepairStory()
     story.update(network.status())
     network.power(off, False)
@@ -31,10 +31,10 @@ def tell(network: Network, off: int, seconds: float) -> RepairStory:
     return story
 
 
-def test_a_repair_by_the_farthest_drone_is_told_from_the_loss_to_the_reconnection():
-    story = tell(group_behind_a_chain(), off=2, seconds=60.0)
+def test_a_repair_by_the_farthest_drone_is_described_from_the_loss_to_the_reconnection():
+    story = story_of(group_behind_a_chain(), off=2, seconds=60.0)
     texts = [step.text for step in story.steps]
-    assert texts[0] == "Router 2 is switched off. It was on the way of 3, 4 and 5 to the gateway."
+    assert texts[0] == "Router 2 is switched off. It was on the route of 3, 4 and 5 to the gateway."
     assert texts[1].startswith("3, 4 and 5 lost the gateway: no heartbeat is answered.")
     assert "3 bids 18.0 m, 4 bids 15.5 m, 5 bids 15.3 m" in texts[2]
     assert "(a bid is its distance to the gateway)" in texts[2]
@@ -49,7 +49,7 @@ def test_a_repair_by_the_farthest_drone_is_told_from_the_loss_to_the_reconnectio
 def test_while_the_mesh_waits_the_step_says_until_when():
     network = group_behind_a_chain()
     off_s = network.now_s()
-    story = tell(network, off=2, seconds=25.0)
+    story = story_of(network, off=2, seconds=25.0)
     waiting = story.steps[-1]
     assert off_s + 30.0 < waiting.until_s < off_s + 50.0
     network.run_until(lambda: network.status().nodes[3].repair_state > 1, within_s=30.0)
@@ -58,8 +58,8 @@ def test_while_the_mesh_waits_the_step_says_until_when():
     assert story.steps[-1].until_s == math.inf
 
 
-def test_who_does_not_bid_is_told_with_its_reason():
-    story = tell(group_behind_a_chain(), off=1, seconds=60.0)
+def test_a_node_that_does_not_bid_is_listed_with_its_reason():
+    story = story_of(group_behind_a_chain(), off=1, seconds=60.0)
     texts = [step.text for step in story.steps]
     bids = next(text for text in texts if "bids" in text)
     assert "2 bids 12.0 m" in bids
@@ -67,13 +67,13 @@ def test_who_does_not_bid_is_told_with_its_reason():
     assert "only 2 bids, so it flies to node 1's place; 3, 4 and 5 wait for it" in texts
 
 
-def test_another_strategy_is_told_in_its_own_terms():
-    story = tell(group_behind_a_chain("nearest"), off=2, seconds=60.0)
+def test_another_strategy_is_described_in_its_own_terms():
+    story = story_of(group_behind_a_chain("nearest"), off=2, seconds=60.0)
     assert any("5 is nearest (1.19) and flies" in step.text for step in story.steps)
 
 
 def test_a_mesh_that_waits_for_ever_stays_at_its_step():
-    story = tell(group_behind_a_chain("stay"), off=2, seconds=120.0)
+    story = story_of(group_behind_a_chain("stay"), off=2, seconds=120.0)
     assert len(story.steps) == 2
     assert not story.is_over
 
@@ -85,7 +85,7 @@ def test_a_drone_without_neighbours_flies_without_a_negotiation():
         network.add_router(node_id, 6.0 * node_id, 0.0)
     assert network.run_until(network.all_connected, within_s=15.0)
     network.run_for(25.0)
-    story = tell(network, off=1, seconds=70.0)
+    story = story_of(network, off=1, seconds=70.0)
     assert "2 has no neighbours left and flies to node 1's place" in [s.text for s in story.steps]
     assert story.steps[-1].text.startswith("2 is connected again")
 
