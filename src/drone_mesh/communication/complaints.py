@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 
 COMPLAINT_PERIOD_S = 30.0  # our choice: one line per reason and node in this time
+FOREIGN_FOR_S = 60.0  # our choice: a neighbour speaks several times in this time
 
 _log = logging.getLogger(__name__)
 
@@ -16,6 +18,7 @@ class Complaints:
     def __init__(self, node_id: int) -> None:
         self._node_id = node_id
         self._logged_s: dict[str, float] = {}
+        self._foreign = ("", -math.inf)
         self.counts: Counter[str] = Counter()
 
     def add(self, reason: str, detail: str, now_s: float) -> None:
@@ -28,6 +31,16 @@ class Complaints:
         _log.warning(
             "node %d: %s: %s (%d so far)", self._node_id, reason, detail, self.counts[reason]
         )
+
+    def foreign(self, reason: str, payload: bytes, now_s: float) -> None:
+        """A neighbour has another key than this node, or only one of the two has a key."""
+        self._foreign = (reason, now_s)
+        self.add(reason, payload.hex(), now_s)
+
+    def foreign_neighbour(self, now_s: float) -> str:
+        """The latest reason of this kind; empty if it is a while ago."""
+        reason, at_s = self._foreign
+        return reason if now_s - at_s <= FOREIGN_FOR_S else ""
 
     def dropped(self, reason: str, payload: bytes, now_s: float) -> None:
         """A packet was dropped."""

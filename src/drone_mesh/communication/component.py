@@ -116,7 +116,12 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._routing.can_communicate_with_node(from_)
         elif not self._routing.learn(creator, from_, kind, payload):
             return
-        if kind == _PRESENT and creator == from_ and not self._frame.heard(creator, payload):
+        if (
+            kind == _PRESENT
+            and creator == from_
+            and not self._frame.heard(creator, payload)
+            and not self.complaints.foreign_neighbour(now_s)  # its digest is part of a seal
+        ):
             self.complaints.add("another origin", f"that of node {creator}", now_s)
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node whose origin is another, or not known yet", payload)
@@ -251,6 +256,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._orders.on_query(creator, OrderQuery.number_in(payload))
         elif kind == MessageType.NODE_SEARCH:
             self._search.on_packet(creator, payload)
+        elif kind == MessageType.SEAL_CHALLENGE:
+            reason = f"a neighbour, node {creator}, has a mesh key and this node has none"
+            self.complaints.foreign(reason, payload, self._deadlines.now_s)
         else:
             self._drop("a type that is not processed", payload)
 

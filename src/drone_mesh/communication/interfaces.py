@@ -142,6 +142,10 @@ class IWirelessCommunication(abc.ABC):
         """Whether to believe a packet on its way to another node that `node` is a gateway."""
         return True
 
+    def foreign_neighbour(self) -> str:
+        """What shows that a neighbour has another key or none; empty: nothing does."""
+        return ""
+
     def patience(self) -> float:
         """For how many check periods the mesh should not probe again what is known to work.
 

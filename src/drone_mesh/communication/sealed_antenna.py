@@ -97,6 +97,9 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def may_be_gateway(self, node: int) -> bool:
         return self._end_to_end.is_gateway(node)
 
+    def foreign_neighbour(self) -> str:
+        return self.complaints.foreign_neighbour(self._clock())
+
     def channel_use(self) -> ChannelUse:
         return self._antenna.channel_use()
 
@@ -249,11 +252,13 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
             return
         if self._seal.knows(from_, now_s):
             reason = f"packets that node {from_} did not send now: replayed or forged"
+            self.complaints.add(reason, payload.hex(), now_s)
         elif payload[SEAL_AT:] == _NO_SEAL:
             reason = f"a neighbour, node {from_}, sends packets without a seal: it has no key"
+            self.complaints.foreign(reason, payload, now_s)
         else:
             reason = (
                 f"a neighbour, node {from_}, sends packets that this key does not open: "
                 "other mesh or other key?"
             )
-        self.complaints.add(reason, payload.hex(), now_s)
+            self.complaints.foreign(reason, payload, now_s)

@@ -144,7 +144,7 @@ class Network:
         links: LinkModel | None = None,
         repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
         repair_options: RepairOptions | None = None,
-        key: Keys | Callable[[int], Keys] | None = None,
+        key: Keys | Callable[[int], Keys | None] | None = None,
     ) -> None:
         """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique.
@@ -156,7 +156,7 @@ class Network:
         disc). `loss`, `delay_s` and `jitter_s` are for the disc. Raises ConfigurationError.
 
         `key`: the key of the mesh, which every node then has, or a function that says what each
-        node has; without one nothing is sealed.
+        node has; None: that node, or every node, seals nothing.
         """
         self._seed = seed
         self._rng = random.Random(seed)
@@ -242,8 +242,9 @@ class Network:
     def _install(self, node: Node, node_id: int, gateway: bool) -> None:
         """The mesh software of one node."""
         antenna: InProcessAntenna | SharedAntenna | SealedAntenna = node.antenna
-        if self._key is not None:
-            antenna = self._sealed(node.antenna, node_id, self._key)
+        keys = self._key(node_id) if callable(self._key) else self._key
+        if keys is not None:
+            antenna = self._sealed(node.antenna, node_id, keys)
         node.component = assemble_component(
             node_id,
             antenna,
@@ -259,13 +260,7 @@ class Network:
         node.component.data.on_received(functools.partial(self._receive, node_id))
         node.receiver = antenna if isinstance(antenna, SealedAntenna) else node.component
 
-    def _sealed(
-        self,
-        antenna: IWirelessCommunication,
-        node_id: int,
-        key: Keys | Callable[[int], Keys],
-    ) -> SealedAntenna:
-        keys = key if isinstance(key, Keys) else key(node_id)
+    def _sealed(self, antenna: IWirelessCommunication, node_id: int, keys: Keys) -> SealedAntenna:
         rng = random.Random(f"{self._seed} seal {node_id} {self.now_s()}")  # new at each start
         return SealedAntenna(antenna, node_id, keys, rng, self.now_s, self._timing)
 

@@ -79,7 +79,7 @@ def add_data_requests(
         if ticket.state is TicketState.GIVEN_UP:
             raise HTTPException(503, str(ticket))
         if wait > 0 and not ticket.final:
-            raise HTTPException(504, f"{ticket}; not delivered within {wait:g} s")
+            raise HTTPException(504, sending.in_words(wait))
         return DataSent(ticket=ticket.number, state=ticket.state)
 
     @app.get(

@@ -49,6 +49,13 @@ class Sending:
             return False
         return ticket.state is not TicketState.GIVEN_UP
 
+    def in_words(self, waited_s: float) -> str:
+        """The ticket in words, and that the message is still on its way."""
+        ticket = self.ticket()
+        if waited_s > 0 and not ticket.final:
+            return f"{ticket}; not delivered within {waited_s:g} s, the node keeps trying"
+        return str(ticket)
+
     @property
     def is_taken(self) -> bool:
         """Whether the node has looked at it."""
@@ -180,7 +187,7 @@ class UsersDesk:
         def ask(now_s: float) -> None:
             try:
                 if transport.echo(to, answers.put, now_s) is None:
-                    answers.put(f"no route to node {to}")
+                    answers.put(transport.unreachable(to))
             except MessageRefused as error:
                 answers.put(str(error))
 

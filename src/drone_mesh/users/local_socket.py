@@ -129,8 +129,9 @@ class _Client(socketserver.StreamRequestHandler):
                 int(request.get("port", 0)),
                 bool(request.get("reliable", True)),
             )
-            arrived = self._wait(sending.wait, float(request.get("wait", 0.0)))
-            self._say({"arrived": arrived, "ticket": str(sending.ticket())})
+            wait_s = float(request.get("wait", 0.0))
+            arrived = self._wait(sending.wait, wait_s)
+            self._say({"arrived": arrived, "ticket": sending.in_words(wait_s)})
         elif what == "echo":
             answer = desk.echo(int(request["to"]), float(request.get("wait", 5.0)))
             if answer is None:

@@ -45,9 +45,14 @@ class Lane:
         room: int,
         ended: Callable[[TicketState], None],
         seal: Seal = leave_plain,
+        hint: Callable[[], str] = str,
     ) -> None:
-        """`room`: bytes of a body; `ended` is called with the last state of each message."""
+        """`room`: bytes of a body; `ended` is called with the last state of each message.
+
+        `hint` says what may be the reason if a message does not arrive.
+        """
         self._seal = seal
+        self._hint = hint
         self.to = to
         self._ended = ended
         self._session = session
@@ -141,6 +146,7 @@ class Lane:
             message.asked_s, message.asks = now_s, message.asks + 1
             return
         self._latest = message
+        message.ticket.reason = ""
         if self._train is not None:
             self._train.left += 1
         index = message.to_send.popleft()
@@ -212,20 +218,23 @@ class Lane:
 
     def expire(self, now_s: float, has_route: bool) -> None:
         """Give up what waited for too long."""
-        where = destination_in_words(self.to)
-        reason = f"no acknowledgement from {where}" if has_route else f"no route to {where}"
         for message in list(self):
             if now_s >= message.expires_s:
-                self.give_up(message, f"{reason} for {LIFETIME_S:.0f} s")
+                what = "no route to" if not has_route else "no acknowledgement from"
+                where = destination_in_words(self.to)
+                self.give_up(message, f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}")
 
     def give_up(self, message: Outgoing, reason: str) -> None:
         """The message will not be sent any more."""
         self._close(message, TicketState.GIVEN_UP, reason)
 
-    def give_up_unreliable(self, reason: str) -> None:
-        """Messages that are sent now or never."""
-        for message in [message for message in self if not message.ticket.reliable]:
-            self.give_up(message, reason)
+    def hindered(self, reason: str) -> None:
+        """Nothing can be sent now: reliable messages wait, the others are given up."""
+        for message in list(self):
+            if message.ticket.reliable:
+                message.ticket.reason = reason
+            else:
+                self.give_up(message, reason)
 
     def take(self, to: int) -> list[Outgoing]:
         """The messages that were addressed to `to`, as they were before anything was sent."""
@@ -294,6 +303,7 @@ class Lane:
     def _poll(self, message: Outgoing) -> DataPacket:
         if message.asks >= 2:
             self._window, self._slow_start = float(LEAST_WINDOW), True
+            message.ticket.reason = f"no acknowledgement yet{self._hint()}"
         return self._asking(message)
 
     def _end_of_train(self) -> DataPacket:
@@ -317,6 +327,7 @@ class Lane:
         message.known = ack.has
         message.sent &= ack.has
         message.asked_s, message.asks = math.inf, 0
+        message.ticket.reason = ""
         if lost:
             self._slow_start = False
             self._window = max(float(LEAST_WINDOW), self._window / 2)

@@ -32,7 +32,7 @@ class Ticket:
         self.size = size  # bytes
         self.reliable = reliable
         self.state = TicketState.QUEUED
-        self.reason = ""  # why it was given up
+        self.reason = ""  # why it was given up, or what it waits for
         # Called with the ticket when its state changes, in the component's thread; it must not
         # call back into the component.
         self.changed: Callable[[Ticket], None] | None = None

@@ -147,6 +147,17 @@ class Transport:
             raise MessageRefused(f"invalid node {to}: must be another node, 0..{MAX_NODE_ID}")
         return self._echoes.send(to, on_answer, now_s)
 
+    def unreachable(self, to: int) -> str:
+        """Why nothing can be sent to `to` now, in words."""
+        if to == TO_GATEWAY:
+            return f"this node knows no gateway{self._hint()}"
+        return f"no route to {destination_in_words(to)}{self._hint()}"
+
+    def _hint(self) -> str:
+        foreign = self._parts.antenna.foreign_neighbour()
+        foreign = foreign or self._complaints.foreign_neighbour(self._parts.now_s)
+        return f"; {foreign}" if foreign else ""
+
     def figures(self) -> DataFigures:
         """What was sent and received so far. Any thread."""
         return self._figures
@@ -249,7 +260,7 @@ class Transport:
         if self._parts.antenna.on() and self._direction(lane.to) != NO_ROUTE:
             return True
         lane.not_before_s = now_s + ROUTE_PERIOD_S
-        lane.give_up_unreliable(f"no route to {destination_in_words(lane.to)}")
+        lane.hindered(self.unreachable(lane.to))
         return False
 
     def _direction(self, to: int) -> int:
@@ -279,10 +290,12 @@ class Transport:
 
     def _give_up_without_gateway(self) -> None:
         now_s = self._parts.now_s
+        reason = self.unreachable(TO_GATEWAY)
         for message in list(self._for_gateway):
+            message.ticket.reason = reason
             if now_s >= message.expires_s or not message.ticket.reliable:
                 self._for_gateway.remove(message)
-                message.ticket.becomes(TicketState.GIVEN_UP, "this node knows no gateway")
+                message.ticket.becomes(TicketState.GIVEN_UP, reason)
                 self._ended(TicketState.GIVEN_UP)
 
     def _lane(self, to: int) -> Lane:
@@ -291,7 +304,8 @@ class Transport:
         lane = self._lanes.get(to)
         if lane is None:
             seal = functools.partial(self._parts.antenna.seal_message, self._parts.node_id, to)
-            lane = self._lanes[to] = Lane(to, self._session, self._room, self._ended, seal)
+            lane = Lane(to, self._session, self._room, self._ended, seal, self._hint)
+            self._lanes[to] = lane
         return lane
 
     def _ended(self, state: TicketState) -> None:

@@ -66,4 +66,5 @@ class UsersOfNode:
         except MessageRefused as error:
             return SendDataResponse(success=False, message=str(error))
         arrived = sending.wait(request.wait)
-        return SendDataResponse(success=arrived, message=str(ticket), ticket=ticket.number)
+        words = sending.in_words(request.wait)
+        return SendDataResponse(success=arrived, message=words, ticket=ticket.number)
