@@ -60,6 +60,11 @@ class Simulation:
             configuration.routers,
             configuration.spacing,
         )
+        if parameters.settings.key is None:
+            _log.warning(
+                "no key: packets that any program on this ROS network sends as a node are obeyed, "
+                "orders to fly too; raspberry_key new makes a key, key:=FILE uses it"
+            )
 
     def run(self, stop: OrderlyStop) -> None:
         """Offer the engines, start the nodes, and step the world until `stop` is requested."""
