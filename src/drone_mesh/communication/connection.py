@@ -5,6 +5,7 @@ docs/protocol.md, "Connection" and "Places to step back to".
 
 from __future__ import annotations
 
+import logging
 import math
 from typing import Callable, NamedTuple
 
@@ -14,6 +15,9 @@ from drone_mesh.communication.messages import Message, MessageType
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.router_states import Link, RouterEvent, RouterStates
+from drone_mesh.communication.swallowing import Detours, Swallowing
+
+_log = logging.getLogger(__name__)
 
 _HOPS_UNTIL_KNOWN = 10  # our choice: for how many hops to wait for the first answer
 
@@ -22,6 +26,7 @@ MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gatewa
 
 
 AVOIDED_S = 60.0  # our choice: a neighbour whose shortcut brought no answer
+SWALLOWER_AVOIDED_S = 600.0  # our choice: one that may carry heartbeats only
 
 
 class Shortcut(NamedTuple):
@@ -51,7 +56,9 @@ class GatewayConnection:
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
         self._tried = NO_ROUTE  # the neighbour over which the latest heartbeat took a shortcut
-        self._swallowed_s: dict[int, float] = {}  # neighbours whose shortcut brought no answer
+        self._detours = Detours(parts.neighbours)
+        self._swallowing = Swallowing(parts.timing.check_period_s)
+        self._detour = NO_ROUTE  # the neighbour over which the next heartbeat goes
         self._unanswered = 0  # heartbeats in a row
         self._asked_neighbour_s = -math.inf  # for its gateway
 
@@ -79,7 +86,7 @@ class GatewayConnection:
         self._states.happened(RouterEvent.HEARTBEAT_SENT)
         self._parts.deadlines.set(Due.ANSWER, now_s + window_s)
         self._heartbeat_sent_s = now_s
-        if self._sent_over_shortcut(was_connected):
+        if self._sent_over_detour(was_connected) or self._sent_over_shortcut(was_connected):
             return True
         heartbeat = self._parts.heartbeat(gateway, gateway, was_connected, gateway)
         if self._parts.delivery.send_own(heartbeat):
@@ -110,15 +117,27 @@ class GatewayConnection:
         self._tried = to
         return True
 
+    def _sent_over_detour(self, connected: bool) -> bool:
+        """Send the heartbeat past a next hop that swallows; the answer changes the route."""
+        to, self._detour = self._detour, NO_ROUTE
+        if to == NO_ROUTE:
+            return False
+        packet = self._parts.heartbeat(to, self.gateway, connected, self.gateway)
+        if not self._parts.delivery.send(packet, to):
+            return False
+        self._tried = to
+        return True
+
     def answer_missed(self) -> None:
         """The time for the gateway's answer is over.
 
-        It is asked again if the medium is lossy, or if the heartbeat took a shortcut: a neighbour
-        over which no answer comes is avoided for a while, and the route in use still works.
+        It is asked again if the medium is lossy, or if the heartbeat took a shortcut or a detour: a
+        neighbour over which no answer comes is avoided for a while, and the route in use still
+        works.
         """
         tried, self._tried = self._tried, NO_ROUTE
         if tried != NO_ROUTE:
-            self._swallowed_s[tried] = self._parts.now_s
+            self._detours.avoid(tried, self._parts.now_s + AVOIDED_S)
             if self._states.connected:
                 self._heartbeat_sent_s = -math.inf
                 self.send_heartbeat()
@@ -157,7 +176,7 @@ class GatewayConnection:
             and self._parts.routing.TAKES_SHORTCUTS
             and hops + 1 < self.hops
             and (self._shortcut is None or hops < self._shortcut.hops)
-            and self._parts.now_s - self._swallowed_s.get(neighbour, -math.inf) >= AVOIDED_S
+            and not self._detours.avoids(neighbour, self._parts.now_s)
             and self._parts.routing.get_direction_to_node(neighbour) == neighbour
         ):
             self._shortcut = Shortcut(neighbour, hops)
@@ -187,6 +206,8 @@ class GatewayConnection:
         """Try the gateway of a neighbour; other routes to it did not work."""
         if gateway > MAX_NODE_ID or gateway == self._parts.node_id:
             return
+        if self._detours.passes_by(neighbour, self._parts.now_s):
+            return
         self._prefer(gateway)
         self._parts.delivery.gateway_taken(neighbour, gateway)
         self.send_heartbeat()
@@ -198,18 +219,59 @@ class GatewayConnection:
 
     def look_after(self, patience: float) -> None:
         """The part of a periodic check that is about a connection."""
+        asked = self._look_for_swallowing()
         if self.proven(patience):
             return
-        self.ask_for_places()
+        self.ask_for_places(besides=asked)
         self.send_heartbeat()
 
-    def ask_for_places(self) -> None:
-        """Ask the next hop where it is, and the gateway if that is unknown or may have moved."""
+    def gateway_told_place(self) -> None:
+        """The preferred gateway itself answered where it is."""
+        self._swallowing.answered()
+
+    def _look_for_swallowing(self) -> bool:
+        """In a mesh with a key: see whether the way carries more than heartbeats.
+
+        True: the gateway was asked for its place. If that remains without an answer, the next
+        heartbeat goes over another neighbour.
+        """
+        parts, now_s, next_hop = self._parts, self._parts.now_s, self.next_hop()
+        sealed = parts.antenna.reserved_bytes(MessageType.LOCATION) > 0
+        relayed = next_hop not in (self.gateway, NO_ROUTE)
+        if not (sealed and relayed and parts.routing.TAKES_SHORTCUTS):
+            return False
+        if self._swallowing.noticed(self.hops):
+            self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
+            _log.warning(
+                "node %d: node %d carries heartbeats to gateway %d, but no other packets",
+                parts.node_id,
+                next_hop,
+                self.gateway,
+            )
+        if self._detours.avoids(next_hop, now_s):  # since now, or the route went back to it
+            self._detour = self._detours.nearest(next_hop, self.hops, now_s)
+            if self._detour == NO_ROUTE:
+                self._swallowing.give_up()
+                self._detours.avoid_none()
+            else:
+                self._swallowing.another_next_hop(self.hops)
+            return False
+        if not self._swallowing.must_ask(now_s):
+            return False
+        self._swallowing.asked(now_s)
+        self.ask_for_place(self.gateway)
+        return True
+
+    def ask_for_places(self, besides: bool = False) -> None:
+        """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
+
+        `besides`: the gateway was asked a moment ago.
+        """
         next_hop = self.next_hop()
         places = self._parts.places
         age_s = self._parts.now_s - places.gateway_seen_s
         too_old = age_s >= (MAX_AGE_PERIODS - 1) * self._parts.timing.check_period_s
-        if places.gateway is None or next_hop == self.gateway or too_old:
+        if not besides and (places.gateway is None or next_hop == self.gateway or too_old):
             self.ask_for_place(self.gateway)
         if next_hop not in (self.gateway, NO_ROUTE):
             self.ask_for_place(next_hop)
@@ -255,6 +317,7 @@ class GatewayConnection:
                 self._parts.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self.gateway = gateway
             self._parts.places.forget_gateway()
+            self._swallowing.give_up()  # it may not know its place
 
     def _show(self) -> None:
         """Report a change of the connection; wait for an answer no longer than is needed."""

@@ -269,6 +269,11 @@ class Network:
             return ShortestPath(self._link_map, node_id)
         return self._routing
 
+    @property
+    def sealed(self) -> bool:
+        """Whether the mesh has a key."""
+        return self._key is not None
+
     # Acting ----------------------------------------------------------------------------------
 
     def restart(self, node_id: int) -> None:

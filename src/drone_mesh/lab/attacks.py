@@ -24,6 +24,7 @@ from drone_mesh.lab.stranger import Stranger
 ATTACK_S = 60.0
 OUTAGE_S = 90.0
 BIDDING_S = 300.0
+SWALLOWING_S = 180.0
 FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
 HERE, THERE = Location(-5.0, 2.0, 0.0), Location(-2.0, -4.0, 0.0)  # of two orders of the owner
 LARGEST_BID, PLAUSIBLE_BID = 1e9, 100.0
@@ -70,6 +71,17 @@ def black_hole(stranger: Stranger) -> dict[int, Location]:
     for _ in stranger.every(1.0, ATTACK_S):
         for node in stranger.in_range():
             stranger.say(MessageType.PRESENT, me, node, BROADCAST, bytes((0, 1)))
+    return {}
+
+
+def swallowing_relay(stranger: Stranger) -> dict[int, Location]:
+    """A relay that answers and forwards heartbeats, and drops all other packets of others.
+
+    In a mesh without a key, and among captured nodes, it is the router on most routes; otherwise it
+    runs the mesh software without the key.
+    """
+    stranger.swallow_as_relay()
+    stranger.network.run_for(SWALLOWING_S)
     return {}
 
 
@@ -159,6 +171,7 @@ ATTACKS: Mapping[str, Attack] = {
     "bids of 1e9": highest_bid,
     "bids of 100 m": plausible_bid,
     "black hole": black_hole,
+    "relay that swallows": swallowing_relay,
     "heartbeats of invented ids": invented_ids,
 }
 RECORDING = (replayed_order, replay_after_restart, replay_on_another_path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 import statistics
-from typing import Iterator, NamedTuple, Sequence
+from typing import AbstractSet, Iterator, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.keys import Keys, MeshKey
@@ -13,7 +13,7 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network
 from drone_mesh.lab.attacks import ATTACKS, RECORDING, highest_bid, invented_ids, plausible_bid
-from drone_mesh.lab.stranger import Stranger
+from drone_mesh.lab.stranger import BESIDE, Stranger
 
 NODES, SHARED_NODES = 25, 9
 SPACING_M = 6.0
@@ -72,20 +72,25 @@ def trial(name: str, case: Case, seed: int) -> Damage:
     stranger.switch_on()
     if case is Case.CAPTURED:
         _get_acquainted(stranger)
-    shares = _Sampler(network)
+    shares = _Sampler(network, stranger.swallows)
     ordered = attack(stranger)
     cut_off = shares.mean()
     lured = _away(network, places, ordered)
     stranger.antenna.stop_antenna()
     network.run_for(RECOVERY_S)
-    return Damage(cut_off, share_cut_off(network), len(lured), max(lured, default=0.0))
+    return Damage(
+        cut_off, share_cut_off(network, stranger.swallows), len(lured), max(lured, default=0.0)
+    )
 
 
-def share_cut_off(network: Network) -> float:
-    """The share of the powered routers from which no packet would arrive at a gateway."""
-    routers = [n for n, node in network.nodes.items() if not node.is_gateway]
+def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> float:
+    """The share of the powered routers from which no packet would arrive at a gateway.
+
+    `swallow`: nodes that drop what they should forward; they do not count.
+    """
+    routers = [n for n, node in network.nodes.items() if not node.is_gateway and n not in swallow]
     powered = [n for n in routers if network.nodes[n].antenna.powered]
-    return sum(not _arrives(network, n) for n in powered) / len(powered)
+    return sum(not _arrives(network, n, swallow) for n in powered) / len(powered)
 
 
 def table(names: Sequence[str], runs: int) -> Iterator[str]:
@@ -111,7 +116,9 @@ def _in_words(damage: Sequence[Damage]) -> str:
     return text
 
 
-def _keys_of(node_id: int) -> Keys:
+def _keys_of(node_id: int) -> Keys | None:
+    if node_id == BESIDE:
+        return None
     return KEY if node_id == 0 else KEY.for_node(node_id)
 
 
@@ -122,7 +129,7 @@ def _get_acquainted(stranger: Stranger) -> None:
     stranger.network.run_for(12.0)
 
 
-def _arrives(network: Network, node: int) -> bool:
+def _arrives(network: Network, node: int, swallow: AbstractSet[int]) -> bool:
     """Whether a packet for the node's gateway would get there, over living links."""
     component = network.nodes[node].component
     gateway = component.get_preferred_gateway()
@@ -133,7 +140,7 @@ def _arrives(network: Network, node: int) -> bool:
         step = network.nodes[path[-1]].component.get_direction_to(gateway)
         if step == NO_ROUTE or step in path or step not in network.links(path[-1]):
             return False
-        if step not in network.nodes:
+        if step not in network.nodes or step in swallow:
             return False  # the stranger
         path.append(step)
     return True
@@ -157,8 +164,9 @@ def _away(
 class _Sampler:
     """Looks at the mesh once a second."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: Network, swallow: AbstractSet[int]) -> None:
         self._network = network
+        self._swallow = swallow
         self._shares: list[float] | None = []
         self._look()
 
@@ -169,5 +177,5 @@ class _Sampler:
 
     def _look(self, _: object = None) -> None:
         if self._shares is not None:
-            self._shares.append(share_cut_off(self._network))
+            self._shares.append(share_cut_off(self._network, self._swallow))
             self._network.clock.call_at(self._network.now_s() + 1.0, self._look, None)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 from typing import Callable, Iterator, NamedTuple
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
+from drone_mesh.communication.interfaces import BROADCAST, IMeshNetwork, IWirelessCommunication
 from drone_mesh.communication.keys import Keys
+from drone_mesh.communication.messages import MessageType, header
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
+
+BESIDE = 201  # a router of the stranger, without a key
 
 
 class Recorded(NamedTuple):
@@ -53,16 +57,27 @@ class Tap(IMeshNetwork):
         self.tapped.on_antenna_registered(now_s)
 
 
+class Hole(Tap):
+    """A node of the mesh that forwards heartbeats and drops what else is for other nodes."""
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        _creator, _from, kind, _to, forward = header(payload)
+        if kind == MessageType.HEARTBEAT or forward in (self.get_node_id(), BROADCAST):
+            self.tapped.on_msg(payload, now_s)
+
+
 class Stranger(IMeshNetwork):
     """Records and invents packets from one place, over a radio that answers as `node_id`."""
 
     def __init__(self, network: Network, node_id: int, x: float, y: float) -> None:
         """At (x, y) metres on the ground, with a radio like those of the network."""
         self.node_id = node_id
+        self._x, self._y = x, y
         self.network = network
         self.mute = False  # True: it does nothing at all
         self.record: list[Recorded] = []
         self.heard: list[bytes] = []  # on its own address
+        self.swallows: set[int] = set()  # nodes that drop what they should forward
         self.on_packet: Callable[[bytes], None] = self.heard.append
         drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda _started: None, "")
         self._receiver: IMeshNetwork = self
@@ -91,6 +106,26 @@ class Stranger(IMeshNetwork):
         """Record what the nodes in its range hear, from now on."""
         for node_id in self.in_range():
             self.network.nodes[node_id].receiver = Tap(self.network, node_id, self.record)
+
+    def swallow_as_relay(self) -> None:
+        """Run the mesh software in a relay, or beside the mesh if it has a key that this has not.
+
+        A relay that was captured is the router on most of the routes to a gateway.
+        """
+        if self.mute:
+            return
+        network = self.network
+        if self._is_inside or not network.sealed:
+            paths = map(network.path_to_gateway, network.nodes)
+            relays = Counter(node for path in paths for node in (path or [])[1:-1])
+            relay = max(sorted(relays), key=relays.__getitem__)
+        else:
+            relay = BESIDE
+            network.add_router(relay, self._x, self._y, network.now_s())
+            network.run_for(0.0)
+        node = network.nodes[relay]
+        node.receiver = Hole(network, relay, [])
+        self.swallows.add(relay)
 
     def in_range(self) -> list[int]:
         """The nodes that hear it."""

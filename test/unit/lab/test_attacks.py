@@ -60,6 +60,14 @@ def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):
     assert attacked.cut_off <= quiet.cut_off + SLACK
 
 
+def test_a_relay_that_forwards_heartbeats_only_is_avoided_in_a_mesh_with_a_key():
+    name = "relay that swallows"
+    assert trial(name, Case.WITHOUT_KEY, seed=0).later > 0.3
+    captured = trial(name, Case.CAPTURED, seed=0)
+    assert captured.cut_off < 0.15
+    assert captured.later == 0.0
+
+
 @pytest.mark.parametrize("name", ["bids of 1e9", "bids of 100 m"])
 def test_the_bids_of_a_captured_node_delay_a_repair_and_do_not_prevent_it(name):
     attacked = trial(name, Case.CAPTURED, seed=0)

@@ -1,0 +1,96 @@
+"""Swallowing: notices that the way to the gateway carries heartbeats and nothing else.
+
+docs/security.md, "A relay that swallows". A captured relay can forward heartbeats, so that the
+nodes behind it stay connected, and drop all other packets. With a key, the place of a gateway is
+an answer that only the gateway can give: if the heartbeats are answered and this question is not,
+again and again, the way to the gateway swallows packets.
+"""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.neighbours import Neighbours
+
+ASK_PERIODS = 3.0  # our choice, in check periods: one packet and its answer in half a minute
+LEAST_UNANSWERED = 2  # our choice: of a next hop that was chosen because another one swallowed
+
+
+class Swallowing:
+    """Counts the questions to one gateway that no answer followed."""
+
+    def __init__(self, check_period_s: float) -> None:
+        self._ask_period_s = ASK_PERIODS * check_period_s
+        self._answers = False  # whether this gateway knows its place and answers at all
+        self._unanswered = 0
+        self._asked_s = -math.inf
+
+    def must_ask(self, now_s: float) -> bool:
+        """Whether the gateway has to be asked in this check; more often without an answer."""
+        return self._unanswered > 0 or now_s - self._asked_s >= self._ask_period_s
+
+    def asked(self, now_s: float) -> None:
+        """The gateway was asked for its place."""
+        self._asked_s = now_s
+        self._unanswered += 1
+
+    def answered(self) -> None:
+        """It answered."""
+        self._answers = True
+        self._unanswered = 0
+
+    def noticed(self, hops: int) -> bool:
+        """Whether packets are swallowed on the way of so many hops.
+
+        Nodes with fewer hops come to this conclusion sooner. So the node next to the relay takes
+        another next hop first, and the nodes behind it need not.
+        """
+        return self._answers and self._unanswered >= max(LEAST_UNANSWERED, hops)
+
+    def another_next_hop(self, hops: int) -> None:
+        """The way is another one now, and has to prove itself soon."""
+        self._unanswered = max(0, hops - LEAST_UNANSWERED)
+
+    def give_up(self) -> None:
+        """Another gateway, or no next hop does better, so it is the gateway that is silent."""
+        self._answers = False
+        self._unanswered = 0
+
+
+class Detours:
+    """Which neighbours a router avoids on its way to the gateway, and which others there are."""
+
+    def __init__(self, neighbours: Neighbours) -> None:
+        self._neighbours = neighbours
+        self._until_s: dict[int, float] = {}  # by neighbour
+
+    def avoid(self, neighbour: int, until_s: float) -> None:
+        """No answer came over this neighbour."""
+        self._until_s[neighbour] = until_s
+
+    def avoid_none(self) -> None:
+        """All are as good as each other."""
+        self._until_s.clear()
+
+    def avoids(self, neighbour: int, now_s: float) -> bool:
+        """Whether to avoid this neighbour now."""
+        return now_s < self._until_s.get(neighbour, -math.inf)
+
+    def passes_by(self, neighbour: int, now_s: float) -> bool:
+        """Whether to avoid it, as another neighbour has a gateway, too."""
+        return self.avoids(neighbour, now_s) and bool(self._others(neighbour, now_s))
+
+    def nearest(self, but: int, hops: int, now_s: float) -> int:
+        """Another neighbour, with at most so many hops to the gateway; or NO_ROUTE.
+
+        One with more of them may use this node to reach the gateway.
+        """
+        nearest_hops, node = min(self._others(but, now_s), default=(NO_ROUTE, NO_ROUTE))
+        return node if nearest_hops <= hops else NO_ROUTE
+
+    def _others(self, but: int, now_s: float) -> list[tuple[int, int]]:
+        """Hops and id of the neighbours that have a gateway and are not avoided."""
+        hops_of = self._neighbours.hops_of
+        nodes = [node for node in self._neighbours.ids() if not self.avoids(node, now_s)]
+        return [(hops_of(node), node) for node in nodes if node != but and hops_of(node) < NO_ROUTE]

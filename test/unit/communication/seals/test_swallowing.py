@@ -1,0 +1,102 @@
+"""A relay that forwards heartbeats and drops the rest (docs/security.md)."""
+
+from __future__ import annotations
+
+import pytest
+from seal_rig import KEY
+
+from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
+from drone_mesh.communication.swallowing import Swallowing
+from drone_mesh.inprocess import Network
+from drone_mesh.lab.stranger import Hole
+
+NOTICED_WITHIN_S = 120.0
+
+
+def own_keys(node_id):
+    return KEY if node_id == 0 else KEY.for_node(node_id)
+
+
+def swallow(network, node_id):
+    network.nodes[node_id].receiver = Hole(network, node_id, [])
+
+
+def delivered(network, ticket, within_s):
+    return network.run_until(lambda: ticket.state is TicketState.DELIVERED, within_s)
+
+
+@pytest.fixture
+def grid():
+    """A gateway and eight routers, and node 8 in the corner uses the relay that swallows."""
+    network = Network(seed=1, key=own_keys)
+    network.add_fleet(1, 8, 3, 6.0)
+    assert network.run_until(network.all_connected, within_s=30.0)
+    network.run_for(30.0)
+    relay = network.path_to_gateway(8)[1]
+    assert relay != 0
+    swallow(network, relay)
+    return network, relay
+
+
+def test_the_nodes_behind_it_take_another_way_and_their_messages_and_orders_arrive(grid):
+    network, relay = grid
+    lost = network.send(8, TO_GATEWAY, b"swallowed")
+    assert not delivered(network, lost, within_s=10.0)
+    assert network.connected(8)
+    away = lambda: relay not in network.path_to_gateway(8)  # noqa: E731
+    assert network.run_until(away, NOTICED_WITHIN_S)
+    assert delivered(network, lost, within_s=10.0)
+    assert delivered(network, network.send(0, 8, b"down"), within_s=10.0)
+    here = network.location(8)
+    network.order(8, here.longitude, here.latitude + 3.0)
+    assert network.run_until(lambda: network.location(8).latitude == here.latitude + 3.0, 30.0)
+
+
+def test_they_do_not_come_back_to_it(grid):
+    network, relay = grid
+    network.run_for(NOTICED_WITHIN_S)
+    for _ in range(30):
+        network.run_for(10.0)
+        assert relay not in network.path_to_gateway(8)
+        assert network.all_connected()
+
+
+def test_where_there_is_no_other_way_a_node_stays_connected_as_it_is():
+    network = Network(seed=1, key=own_keys)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.add_router(2, 12.0, 0.0)
+    network.run_for(60.0)
+    swallow(network, 1)
+    for _ in range(30):
+        network.run_for(10.0)
+        assert network.connected(2)
+
+
+def test_a_gateway_that_never_said_where_it_is_accuses_no_relay():
+    swallowing = Swallowing(check_period_s=10.0)
+    for check in range(20):
+        swallowing.asked(10.0 * check)
+    assert not swallowing.noticed(hops=2)
+
+
+def test_nodes_farther_from_the_gateway_wait_longer():
+    near, far = Swallowing(10.0), Swallowing(10.0)
+    for swallowing in (near, far):
+        swallowing.answered()
+        for at_s in (10.0, 20.0):
+            swallowing.asked(at_s)
+    assert near.noticed(hops=2)
+    assert not far.noticed(hops=3)
+    far.asked(30.0)
+    assert far.noticed(hops=3)
+
+
+def test_a_gateway_that_answers_is_asked_three_times_less_often():
+    swallowing = Swallowing(check_period_s=10.0)
+    assert swallowing.must_ask(0.0)
+    swallowing.asked(0.0)
+    assert swallowing.must_ask(10.0)
+    swallowing.answered()
+    assert not swallowing.must_ask(20.0)
+    assert swallowing.must_ask(30.0)
