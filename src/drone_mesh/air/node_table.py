@@ -20,7 +20,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
 
 Sees = Optional[Callable[[Position, np.ndarray], np.ndarray]]
-"""(3,) a position and (n, 3) others within range, metres -> (n,) bool: those that it has a link to."""
+"""(3,) position, (n, 3) others within range, metres -> (n,) bool: which of them have a link to it."""
 
 
 class NodeTable:

@@ -1,1 +1,1 @@
-"""Views of the mesh: palette, table, window and snapshots of the world. No ROS."""
+"""Views of the mesh: palette, table, window and snapshots of the world. Without ROS."""

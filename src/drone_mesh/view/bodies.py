@@ -1,4 +1,4 @@
-"""Drones and obstacles as bodies of a pybullet client, and a picture of them without a screen."""
+"""Drones and obstacles as bodies of a pybullet client, and an off-screen picture of them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from drone_mesh.view.solids import normal
 
 LIGHT_FROM = (-3.0, -6.0, 12.0)
 OBSTACLE_OPACITY = 0.7
-NOTHING = -1  # pybullet's body number of a pixel that shows no body
+NOTHING = -1  # pybullet's body number for pixels without a body
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 BASE = -1  # pybullet's number for a body without its links
 
@@ -38,18 +38,18 @@ class _Link(NamedTuple):
 
 
 class Bodies:
-    """Makes bodies in one pybullet client; belongs to the thread of that client.
+    """Creates bodies in one pybullet client; belongs to that client's thread.
 
-    A quadrocopter is one body: the frame is its base, and each part with another colour a link.
+    A quadrocopter is one body: its frame is the base, and each part of another colour is a link.
     """
 
     def __init__(self, client: int, shape: Shape) -> None:
         self._client = client
         self._shape = shape
-        self._shapes: dict[object, int] = {}  # drones that look the same share theirs
+        self._shapes: dict[object, int] = {}  # shared by drones that look the same
 
     def add_drone(self, drone: DronePicture, scale: float) -> int:
-        """A drone, `scale` times as large as life; returns its body."""
+        """Add a drone, drawn `scale` times its size; returns its body."""
         if self._shape is Shape.BOX:
             box = self._box_shape(drone.size_m(scale), drone.colour)
             return self._add(box, (), drone.centre(scale))
@@ -77,12 +77,12 @@ class Bodies:
             )
 
     def move_drone(self, body: int, drone: DronePicture, scale: float) -> None:
-        """Put a drone where it is now."""
+        """Move a drone's body to its current position."""
         place = drone.centre(scale) if self._shape is Shape.BOX else drone.underside(scale)
         pybullet.resetBasePositionAndOrientation(body, place, UPRIGHT, physicsClientId=self._client)
 
     def colour_drone(self, body: int, drone: DronePicture) -> None:
-        """Give a drone the colour that it has now."""
+        """Give a drone's body its current colour."""
         pybullet.changeVisualShape(
             body,
             BASE if self._shape is Shape.BOX else 0,
@@ -91,7 +91,7 @@ class Bodies:
         )
 
     def add_obstacle(self, box: ObstacleStatus) -> int:
-        """An obstacle; returns its body."""
+        """Add an obstacle; returns its body."""
         shape = self._box_shape(box.size, LIGHT.obstacle, OBSTACLE_OPACITY)
         turned = pybullet.getQuaternionFromEuler((0.0, 0.0, box.yaw))
         return self._add(shape, (), box.center, turned)
@@ -165,9 +165,9 @@ def _triangles(role: Role, part: Part) -> _Triangles:
 
 
 def paste_bodies(image: Image.Image, camera: Camera, scene: Scene, scale: float) -> None:
-    """Draw a scene's drones, `scale` times as large as life, over what is in the image.
+    """Draw a scene's drones over the image, `scale` times their size.
 
-    Obstacles dim what is behind them.
+    Obstacles shade what is behind them.
     """
     client = pybullet.connect(pybullet.DIRECT)
     try:
@@ -185,7 +185,7 @@ def paste_bodies(image: Image.Image, camera: Camera, scene: Scene, scale: float)
 
 
 def _shoot(client: int, camera: Camera) -> tuple[Image.Image, np.ndarray]:
-    """What the camera sees of this pybullet client, and (height, width) which body is where."""
+    """The image that this camera takes, and (height, width) the body number of each pixel."""
     width, height, pixels, _, bodies = pybullet.getCameraImage(
         *camera.size,
         camera.view_matrix(),

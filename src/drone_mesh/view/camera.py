@@ -12,8 +12,8 @@ import pybullet
 from drone_mesh.drone.flight_path import Vector
 
 NEAR_M = 0.1
-FAR_M = 50_000.0  # the goals that are allowed lie within +-5000 m
-CLOSEST_M = 6.0  # how close it gets: a single drone is shown with a few metres around it
+FAR_M = 50_000.0  # valid goals are within +-5000 m
+CLOSEST_M = 6.0  # least distance: a single drone is shown with a few metres around it
 UP_AXIS_Z = 2  # pybullet's number for "z is up"
 
 
@@ -29,15 +29,15 @@ class Camera:
     field_of_view_deg: float = 40.0  # vertical
 
     def view_matrix(self) -> Sequence[float]:
-        """World to camera, 4 x 4, column by column, as pybullet wants it."""
+        """World to camera, 4 x 4 in column-major order, as pybullet expects it."""
         matrix: Sequence[float] = pybullet.computeViewMatrixFromYawPitchRoll(
             self.target, self.distance_m, self.yaw_deg, self.pitch_deg, 0.0, UP_AXIS_Z
         )
         return matrix
 
     def projection_matrix(self) -> Sequence[float]:
-        """Camera to picture, 4 x 4, column by column, as pybullet wants it."""
-        near_m = max(NEAR_M, self.distance_m / 100)  # near and far share the depth's few bits
+        """Camera to picture, 4 x 4 in column-major order, as pybullet expects it."""
+        near_m = max(NEAR_M, self.distance_m / 100)  # near and far share the depth buffer
         matrix: Sequence[float] = pybullet.computeProjectionMatrixFOV(
             self.field_of_view_deg, self.size[0] / self.size[1], near_m, FAR_M
         )
@@ -54,7 +54,7 @@ class Camera:
         return pixels
 
     def pixels_per_metre(self) -> float:
-        """How large one metre at the target is."""
+        """The size of one metre at the target, in pixels."""
         return self.size[1] / 2 / (self.distance_m * self.half_height_slope())
 
     def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -63,11 +63,11 @@ class Camera:
         return view[0, :3], view[1, :3], -view[2, :3]
 
     def half_height_slope(self) -> float:
-        """How far up the view reaches per metre of depth."""
+        """How far up the view extends per metre of depth."""
         return math.tan(math.radians(self.field_of_view_deg / 2))
 
     def on_ground(self, pixel: tuple[float, float]) -> Vector | None:
-        """The point of the ground (z = 0) at this pixel; None: the pixel shows sky."""
+        """The point on the ground (z = 0) at this pixel; None if the pixel shows the sky."""
         (x, y, z), (far_x, far_y, far_z) = self.before(pixel, 0.0), self.before(pixel, 1.0)
         if far_z >= z:
             return None
@@ -101,7 +101,7 @@ class Camera:
 
 
 class Margins(NamedTuple):
-    """How much stays free at each side of a picture, in pixels."""
+    """The space to leave free at each side of a picture, in pixels."""
 
     left: float
     top: float
@@ -112,7 +112,7 @@ class Margins(NamedTuple):
 def frame(camera: Camera, points: Sequence[Vector], margins: Margins) -> Camera:
     """`camera`, moved (not turned) as close as possible with all points between the margins.
 
-    Margins that would take more than half of the picture shrink. Without points nothing moves.
+    Margins larger than half of the picture shrink. Without points the camera does not move.
     """
     if not points:
         return camera

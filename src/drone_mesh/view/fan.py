@@ -1,4 +1,4 @@
-"""Nodes at one position, fanned out so that each can be seen and chosen."""
+"""Nodes at one position, fanned out so that each can be seen and selected."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Slot = Tuple[int, int]  # number of the node in its group, from 0; size of the g
 
 
 def fan_out(nodes: Sequence[NodeStatus]) -> dict[int, Slot]:
-    """The slot of each node that shares its position, seen from above, with others."""
+    """The slot of each node that shares its position, as seen from above, with others."""
     groups: dict[tuple[int, int], list[NodeStatus]] = {}
     for node in nodes:
         if position_is_known(node):
@@ -27,7 +27,7 @@ def fan_out(nodes: Sequence[NodeStatus]) -> dict[int, Slot]:
 
 
 def fan_offset(slot: Slot, radius: float) -> tuple[float, float]:
-    """How far right and up to move a disc of this radius so that the group's discs do not touch."""
+    """The offset, right and up, at which discs of this radius in one group do not touch."""
     number, size = slot
     angle = math.pi / 2 - 2 * math.pi * number / size
     distance = 1.15 * radius / math.sin(math.pi / size)

@@ -11,7 +11,7 @@ from drone_mesh.view.sketch import OVERSAMPLING, Sketch
 from drone_mesh.view.solids import polygon
 
 SHADOW_SHARE = 0.42  # radius of a round shadow, as a share of the width
-GRID_LINES = 12  # about as many as should be visible across
+GRID_LINES = 12  # approximate number of lines across the picture
 
 
 def draw_ground(sketch: Sketch, scene: Scene, scale: float) -> None:

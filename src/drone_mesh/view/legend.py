@@ -1,4 +1,4 @@
-"""The legend of a picture: a row for each colour that occurs in it."""
+"""The legend of a picture: one row for each colour in it."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ DARK = Palette(
     ink="#e4e9f0", muted="#97a2b2", accent="#6b9bff", accent_ink="#0d1116",
 )  # fmt: skip
 
-# Of pictures of the world, which are always in daylight.
+# For pictures of the world, which always show daylight.
 GROUND: Colour = "#f4f5f1"
 GRID: Colour = "#d6dbd6"
 AXIS: Colour = "#a8b2ad"
@@ -89,7 +89,8 @@ _LINK_COLOUR_NAMES: Mapping[LinkUse, str] = {
     LinkUse.KNOWN: "known",
     LinkUse.LOST: "disconnected",
 }
-# Of dots, which have an edge in the colour of the card: they also run along lines of their colour.
+# For dots, whose edge has the colour of the card, because they also move along lines of their
+# colour.
 _PACKET_COLOUR_NAMES: Mapping[PacketKind, str] = {
     PacketKind.HEARTBEAT: "accent",
     PacketKind.INTRODUCTION: "connected",
@@ -141,7 +142,7 @@ def css_variables(palette: Palette) -> str:
 
 def variable_names(palette: Palette) -> dict[Colour, str]:
     """The CSS variable, without its dashes, that has each colour of a palette."""
-    # Of two names for one colour the first is meant: the second is a colour on another one.
+    # If two names share a colour the first is used; the second is for text on another colour.
     return {palette.named(f.name): _variable(f.name) for f in reversed(fields(palette))}
 
 
@@ -150,6 +151,6 @@ def _variable(name: str) -> str:
 
 
 def ansi(text: str, what: Severity | Condition) -> str:
-    """`text` in a colour for terminals; a connected node has none."""
+    """`text` in a colour for terminals; uncoloured for a connected node."""
     code = _ANSI_OF_SEVERITY[what] if isinstance(what, Severity) else _ANSI_OF_CONDITION.get(what)
     return text if code is None else f"\x1b[{code}m{text}\x1b[0m"

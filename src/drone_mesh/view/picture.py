@@ -1,4 +1,4 @@
-"""What a picture of the world shows: drones, links and flight paths."""
+"""The contents of a picture of the world: drones, links and flight paths."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from drone_mesh.view.palette import LIGHT, Colour
 
 DRONE_WIDTH_M = max(Role.ROUTER.size_m)
 HALF_DIAGONAL_M = DRONE_WIDTH_M / math.sqrt(2)
-WIDEST_OF_CROWDING = 0.3  # a drone is drawn at most so wide, as a share of the drones' distance
+WIDEST_OF_CROWDING = 0.3  # greatest drawn width of a drone, as a share of the drones' distance
 
 
 class Shape(enum.Enum):
-    """What drones look like. The value is the word of launch arguments and options."""
+    """The appearance of drones. The value is used in launch arguments and options."""
 
     QUADROCOPTER = "quadrocopter"
     BOX = "box"
 
 
 def shape_named(word: str) -> Shape:
-    """The shape with this value; the default for any other word."""
+    """The shape with this value; the default for an unknown word."""
     return Shape.BOX if word == Shape.BOX.value else Shape.QUADROCOPTER
 
 
@@ -42,8 +42,8 @@ class DronePicture:
     role: Role
     position: Vector  # of the underside, metres, world frame; finite
     condition: Condition = Condition.CONNECTED
-    path: Sequence[Vector] = ()  # what is left of its flight, the goal last; empty: not flying
-    slot: Slot | None = None  # among the drones at its position; None: it is alone there
+    path: Sequence[Vector] = ()  # remaining waypoints, the goal last; empty: not flying
+    slot: Slot | None = None  # among the drones at its position; None: it is the only one
 
     @property
     def colour(self) -> Colour:
@@ -61,12 +61,12 @@ class DronePicture:
         return bool(self.path)
 
     def underside(self, scale: float = 1.0) -> Vector:
-        """As `centre`, of the middle of its underside."""
+        """Like `centre`, for the middle of its underside."""
         x, y, z = self.centre(scale)
         return (x, y, z - self.size_m(scale)[2] / 2)
 
     def centre(self, scale: float = 1.0) -> Vector:
-        """Where the centre of its box is drawn, `scale` times as large and on the same ground.
+        """Where to draw the centre of its box, `scale` times as large and on the same ground.
 
         Drones at one position are fanned out around it.
         """
@@ -77,7 +77,7 @@ class DronePicture:
 
 @dataclass(frozen=True)
 class LinkPicture:
-    """One link between two node ids; it is left out where one of them is not shown."""
+    """A link between two node ids; not drawn if one of them is not shown."""
 
     start: int
     end: int
@@ -95,16 +95,16 @@ class Scene:
     shape: Shape = Shape.QUADROCOPTER
 
     def points(self) -> list[Vector]:
-        """Every point that has to be inside the picture."""
+        """Every point that must be inside the picture."""
         return [drone.position for drone in self.drones] + [
             waypoint for drone in self.drones for waypoint in drone.path
         ]
 
 
 def crowding_m(drones: Sequence[DronePicture]) -> float:
-    """How close together drones stand: the median distance to the nearest other one, in metres.
+    """How closely drones are spaced: the median distance to the nearest other one, in metres.
 
-    Infinite for fewer than two drones. A single pair that stands closer hardly counts.
+    Infinite for fewer than two drones. A single close pair hardly affects it.
     """
     positions = np.array([drone.position for drone in drones], dtype=float).reshape(-1, 3)
     if len(positions) < 2:
@@ -115,7 +115,7 @@ def crowding_m(drones: Sequence[DronePicture]) -> float:
 
 
 def drawing_scale(drones: Sequence[DronePicture], wanted: float) -> float:
-    """How many times larger than life to draw drones: 1..`wanted`, less where they are crowded.
+    """How much to enlarge drones: 1..`wanted`, less where they are crowded.
 
     At its true size a drone of 0.2 m is a dot in a fleet that spans 100 m.
     """

@@ -1,4 +1,4 @@
-"""What a drone looks like: a small quadrocopter, in parts that have colours of their own.
+"""The shape of a drone: a small quadrocopter, in parts of different colours.
 
 Metres, at the true size; the origin is the middle of the underside. A router's parts fit into its
 box; a gateway's are as high as its box, and 0.2 m wide.
@@ -24,12 +24,12 @@ _Place = Tuple[float, float]
 
 
 class Part(enum.Enum):
-    """What has a colour of its own."""
+    """A part with its own colour."""
 
     FRAME = "frame"  # hull, arms, motors and legs
     LAMP = "lamp"  # in the colour of the drone's condition
     BLADES = "blades"  # of the rotors, at rest
-    DISCS = "discs"  # the rotors as one sees them in flight
+    DISCS = "discs"  # the rotors as they look in flight
     ROTOR = "rotor"  # the blades of one rotor, around the origin
 
 
@@ -97,7 +97,7 @@ def obj(solid: Solid) -> str:
 
 
 def mesh_files() -> dict[str, str]:
-    """The files of meshes/: what has one colour in rviz, by name."""
+    """The files of meshes/: one for each part that has its own colour in rviz, by name."""
     frame = solid_of(Role.ROUTER, Part.FRAME)
     solids = {
         "standing": frame + solid_of(Role.ROUTER, Part.BLADES),

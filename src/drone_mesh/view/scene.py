@@ -14,13 +14,13 @@ from drone_mesh.state.trouble import find_trouble, summarise
 from drone_mesh.view.fan import Slot, fan_out
 from drone_mesh.view.picture import DronePicture, LinkPicture, Scene, shape_named
 
-MOST_LINKS = 600  # our choice, per use: more are one blot
+MOST_LINKS = 600  # our choice, per use: more cannot be told apart
 
 
 def scene_of(mesh: MeshStatus, lost: Iterable[Link] = (), views: Iterable[DroneView] = ()) -> Scene:
     """All nodes whose position is known, and the links between them.
 
-    `lost` are the links that were just lost; `views` have newer positions than `mesh`.
+    `lost` are the recently lost links; `views` have newer positions than `mesh`.
     """
     newer = {view.id: view for view in views}
     shown = [node for node in mesh.nodes if position_is_known(node)]

@@ -11,7 +11,7 @@ REACT_PERIOD_S = 0.03  # wall; between two checks of keys and mouse
 
 
 def show_scenes(scenes: Connection) -> None:
-    """Show what comes through the pipe, until the pipe ends or the window is closed."""
+    """Show the scenes from the pipe until it ends or the window is closed."""
     window = WorldWindow()
     try:
         while window.is_open():

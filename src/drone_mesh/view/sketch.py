@@ -11,7 +11,7 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.view.camera import Camera
 from drone_mesh.view.palette import Colour
 
-OVERSAMPLING = 2  # the image is drawn that much larger than the finished picture, for smooth edges
+OVERSAMPLING = 2  # how much larger the image is drawn than the picture, for smooth edges
 EDGE = 20  # pixels: text closer to the left or right edge is left out
 RIM: Colour = "#ffffff"  # around text
 

@@ -1,4 +1,4 @@
-"""A picture of a world, drawn without a screen.
+"""Off-screen pictures of a world.
 
 pybullet's software renderer draws drones and obstacles; Pillow draws lines, dashes and text.
 """
@@ -28,7 +28,7 @@ from drone_mesh.view.sketch import OVERSAMPLING, Sketch
 DEFAULT_SIZE = (1280, 800)  # pixels
 LEGEND_WIDTH = 168  # pixels
 NARROWEST_WITH_LEGEND = 500  # pixels; a narrower picture is all map
-DRONE_PIXELS = 36  # about as wide as a drone should be
+DRONE_PIXELS = 36  # approximate width of a drone
 SMALLEST_ID, LARGEST_ID = 9.0, 15.0  # pixels: height of the text
 MARGINS = Margins(left=64, top=56, right=24, bottom=56)  # pixels
 
@@ -36,8 +36,7 @@ MARGINS = Margins(left=64, top=56, right=24, bottom=56)  # pixels
 def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE) -> None:
     """Write a PNG of `size` (width, height) pixels that shows all drones with their ids.
 
-    Drones are drawn larger than life where there is room. Raises OSError when `path` cannot be
-    written.
+    Drones are enlarged where there is room. Raises OSError if `path` cannot be written.
     """
     canvas_size = (size[0] * OVERSAMPLING, size[1] * OVERSAMPLING)
     margins = Margins(*(side * OVERSAMPLING for side in margins_of(size)))
@@ -59,7 +58,7 @@ def render(scene: Scene, path: str | Path, size: tuple[int, int] = DEFAULT_SIZE)
 
 
 def margins_of(size: tuple[int, int]) -> Margins:
-    """The part of a picture of that size that is kept free of drones, for numbers and legend."""
+    """The space to keep free of drones in a picture of this size, for numbers and legend."""
     return MARGINS._replace(right=MARGINS.right + LEGEND_WIDTH) if _has_legend(size) else MARGINS
 
 

@@ -1,4 +1,4 @@
-"""The state of the mesh as text, for a terminal or a pipe."""
+"""The state of the mesh as text for a terminal or pipe."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _CHANNEL_HEADINGS = ("airtime", "tries", "queue", "given up")  # of a shared cha
 
 
 def mesh_table(mesh: MeshStatus, colours: bool) -> str:
-    """A summary line and a table with one row per node; no line end. `colours`: for a terminal."""
+    """A summary line and a table, one row per node, without a final newline. `colours`: ANSI."""
     troubles = {trouble.node: trouble for trouble in find_trouble(mesh.nodes)}
     summary = summarise(mesh.nodes, list(troubles.values()))
     speed = "paused" if mesh.paused else f"speed {mesh.achieved_real_time_factor:.2g}x"
@@ -62,7 +62,7 @@ def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:
 
 
 def _names(mesh: MeshStatus) -> str:
-    """The algorithms in use; an old recording does not name them."""
+    """The algorithms in use; old recordings do not contain them."""
     named = {"routing": mesh.routing, "repair": mesh.repair_strategy}
     return "".join(f"; {what} {name}" for what, name in named.items() if name)
 

@@ -1,4 +1,4 @@
-"""WorldWindow: shows scenes on a screen, in pybullet's own window."""
+"""WorldWindow: shows scenes on a screen, in pybullet's window."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ HELP = (
 )
 LINK_PIXELS = {LinkUse.KNOWN: 1.0, LinkUse.LOST: 1.0, LinkUse.ROUTE: 3.0}
 PATH_PIXELS = 2.0
-DRONE_PIXELS = 30  # about as wide as a drone should be
+DRONE_PIXELS = 30  # approximate width of a drone
 RESCALE_AT = 1.25  # drones get a new size when theirs is wrong by this factor
 TURN_DEG = 2.0  # per check of the keys
 ZOOM = 1.03  # per check of the keys
 
 
 class WorldWindow:
-    """One window of pybullet. It only shows; the simulation needs nothing that it holds.
+    """One pybullet window. It only displays; the simulation does not depend on it.
 
     All functions belong to one thread. Drawing waits for the screen, and pybullet holds the
-    interpreter meanwhile: use a process of its own. Without a screen pybullet ends the process.
+    interpreter lock meanwhile, so use a separate process. Without a screen pybullet ends the
+    process.
     """
 
     def __init__(self) -> None:
@@ -44,7 +45,7 @@ class WorldWindow:
         )
         for feature in (
             pybullet.COV_ENABLE_GUI,
-            pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS,  # ours would mean something else there
+            pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS,  # they conflict with ours
             pybullet.COV_ENABLE_MOUSE_PICKING,
         ):
             pybullet.configureDebugVisualizer(feature, 0, physicsClientId=self.client)
@@ -77,18 +78,18 @@ class WorldWindow:
         return self.client >= 0 and bool(pybullet.isConnected(physicsClientId=self.client))
 
     def close(self) -> None:
-        """Closing twice changes nothing."""
+        """Close the window. A second call changes nothing."""
         if self.is_open():
             pybullet.disconnect(physicsClientId=self.client)
         self.client = -1
 
     def show(self, scene: Scene) -> None:
-        """Replace what the window shows."""
+        """Display this scene instead of the current one."""
         self._scene = scene
         self._draw()
 
     def react(self) -> None:
-        """Do what keys and mouse ask for; to be called many times a second."""
+        """Handle keys and mouse; to be called many times a second."""
         if self._camera.take_over():
             self._draw()
         events = pybullet.getKeyboardEvents(physicsClientId=self.client)
@@ -96,7 +97,7 @@ class WorldWindow:
             if key in self._held_keys and state & pybullet.KEY_IS_DOWN:
                 self._held_keys[key]()
             elif key in self._keys and state & pybullet.KEY_WAS_RELEASED:
-                # A key that was pressed and released between two checks shows only as released.
+                # A key pressed and released between two checks is reported only as released.
                 self._keys[key]()
             if not self.is_open():
                 return

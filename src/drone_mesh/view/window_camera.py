@@ -1,4 +1,4 @@
-"""The camera of the world's window: it follows the fleet until a person moves it."""
+"""The camera of the world's window: it follows the fleet until the user moves it."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class WindowCamera:
         self.now = Camera(size, pitch_deg=SLANTED_DEG)
 
     def keep_in_view(self, points: Sequence[Vector]) -> None:
-        """Show all of these points, unless a person has moved the camera."""
+        """Show all these points unless the user has moved the camera."""
         if self._follows:
             self._aim(frame(self.now, points, MARGINS))
 
     def take_over(self) -> bool:
-        """Take over the window's size and the view set with the mouse. True if anything changed."""
+        """Adopt the window's size and the view set with the mouse; whether anything changed."""
         seen = pybullet.getDebugVisualizerCamera(physicsClientId=self._client)
         (width, height), projection = seen[:2], seen[3]
         yaw_deg, pitch_deg, distance_m, target = seen[8:12]
@@ -54,7 +54,7 @@ class WindowCamera:
         self._follows = True
 
     def look_from_above(self) -> None:
-        """Straight down, or slanted again if it looks down already; follow the fleet."""
+        """Look straight down, or slanted again if it already does; follow the fleet."""
         steep = self.now.pitch_deg <= FROM_ABOVE_DEG
         self._aim(replace(self.now, pitch_deg=SLANTED_DEG if steep else FROM_ABOVE_DEG))
         self._follows = True
@@ -65,7 +65,7 @@ class WindowCamera:
         self._aim(replace(self.now, yaw_deg=self.now.yaw_deg + yaw_deg, pitch_deg=pitch))
 
     def zoom(self, factor: float) -> None:
-        """Move to `factor` times the distance, and stay there."""
+        """Move to `factor` times the distance and stop following the fleet's size."""
         self._follows = False
         self._aim(replace(self.now, distance_m=self.now.distance_m * factor))
 

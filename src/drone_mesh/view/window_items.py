@@ -1,4 +1,4 @@
-"""What stands in the world's window: drones, ids, lines and text, changed as little as possible."""
+"""The items in the world's window: drones, ids, lines and text, changed as little as possible."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drone_mesh.view.palette import LIGHT, Colour, rgb
 from drone_mesh.view.picture import DronePicture, Shape
 
 LINE_HEIGHT = 22  # pixels
-TEXT_DEPTH_M = 1.0  # how far in front of the camera text hangs
+TEXT_DEPTH_M = 1.0  # distance of the text from the camera
 ID_ABOVE = 1.6  # heights of a drone, above its underside
 TEXT_SIZE = 1.2  # in units of pybullet
 INK = rgb(LIGHT.ink)
@@ -27,7 +27,7 @@ _Item = int  # pybullet's number of a line or text
 class WindowItems:
     """The items of one pybullet window. Belongs to the window's thread.
 
-    pybullet draws a frame for each new item, so an item that still fits is kept or replaced.
+    pybullet renders a frame for each new item, so items are kept or replaced where possible.
     """
 
     def __init__(self, client: int) -> None:
@@ -42,7 +42,7 @@ class WindowItems:
         self._written: object = None
 
     def use_shape(self, shape: Shape) -> None:
-        """What drones look like that are shown from now on; to be called before the first ones."""
+        """The shape of all drones shown from now on; call this before the first ones."""
         if shape is not self._shape:
             self._shape, self._bodies = shape, Bodies(self._client, shape)
 
@@ -50,10 +50,10 @@ class WindowItems:
         self, drones: Sequence[DronePicture], lines: set[Line], scale: float, rescaled: bool,
         with_ids: bool,
     ) -> None:  # fmt: skip
-        """Show these drones and lines and nothing else; `rescaled`: `scale` is a new one."""
+        """Show exactly these drones and lines; `rescaled`: `scale` has changed."""
         busy = rescaled or self._looks_changed(drones) or lines != set(self._lines)
         if busy:
-            self._render(False)  # or each new item waits for a frame
+            self._render(False)  # otherwise each new item waits for a frame
         self._show_drones(drones, scale, rescaled)
         self._show_ids(scale, with_ids)
         self._show_lines(lines)
@@ -67,7 +67,7 @@ class WindowItems:
         }
 
     def show_obstacles(self, boxes: Sequence[ObstacleStatus]) -> None:
-        """Show these boxes and no others."""
+        """Show exactly these boxes."""
         if [box for _, box in self._obstacles] == list(boxes):
             return
         self._render(False)
@@ -77,7 +77,7 @@ class WindowItems:
         self._render(True)
 
     def write(self, words: Sequence[str], camera: Camera) -> None:
-        """Lines of text in the upper left corner; they hang before the camera and move with it."""
+        """Lines of text in the upper left corner, in front of the camera; they move with it."""
         if self._written == (words, camera):
             return
         self._written = (words, camera)

@@ -1,4 +1,4 @@
-"""Runs a WorldWindow in a process of its own, so that nothing in the simulation waits for it."""
+"""Runs a WorldWindow in a separate process, so that the simulation never waits for it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.view.picture import Scene
 
 LOOK_PERIOD_S = 0.05  # wall; at most 20 scenes a second
-END_TIMEOUT_S = 3.0  # wall; from the end of the pipe to that of the process
+END_TIMEOUT_S = 3.0  # wall; between the end of the pipe and the end of the process
 
 _log = logging.getLogger(__name__)
 
@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 def require_screen() -> None:
     """Raise ConfigurationError unless an X server accepts a connection.
 
-    pybullet would end the whole process without a word.
+    pybullet would end the whole process without a message.
     """
     display = os.environ.get("DISPLAY", "")
     hint = "use gui:=false, or set DISPLAY to a screen"
@@ -72,9 +72,9 @@ class WindowProcess:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)},
             pass_fds=[theirs.fileno()],
             stdout=subprocess.DEVNULL,  # pybullet prints a lot
-            start_new_session=True,  # Ctrl-C is for us; the window ends with the pipe
+            start_new_session=True,  # Ctrl-C must not reach the window, which ends with the pipe
         )
-        theirs.close()  # so that our end sees when the window is gone
+        theirs.close()  # so that our end notices when the window is gone
         self._thread = threading.Thread(
             target=self._run, args=(ours, self._process), name="world window", daemon=True
         )
@@ -85,7 +85,7 @@ class WindowProcess:
         self._stopped.set()
         if self._thread is None or self._process is None:
             return
-        self._process.terminate()  # it has nothing to save, and an orderly close takes a second
+        self._process.terminate()  # it has nothing to save, and closing it properly takes a second
         self._thread.join()
 
     def _run(self, scenes: Connection, process: subprocess.Popen[bytes]) -> None:
@@ -118,5 +118,5 @@ class WindowProcess:
             if scene != shown:
                 scenes.send(scene)
                 shown = scene
-            elif scenes.poll():  # it never sends anything: this is its end
+            elif scenes.poll():  # it never sends anything, so this is the end of the pipe
                 return

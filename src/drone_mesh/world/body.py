@@ -1,4 +1,4 @@
-"""A quadrotor's body in physics: the forces of its motors, of the air, and of its battery's end."""
+"""The body of a quadrotor in physics: forces of motors and air, and limits of the battery."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ GRAVITY_M_S2 = 9.81
 
 @dataclass(frozen=True)
 class BodyLimits:
-    """What the body can do. Our choices, of a drone of 1 kg with a 5 inch frame."""
+    """The limits of the body. Our choices, for a drone of 1 kg with a 5 inch frame."""
 
     mass_kg: float = 1.0
     drag_n_per_m_s: float = 0.25  # linear: 0.5 N at 2 m/s
-    max_acceleration_m_s2: float = 4.0  # beside holding its weight; 4 m/s2 is a tilt of 22 degrees
+    max_acceleration_m_s2: float = 4.0  # in addition to gravity; 4 m/s2 is a tilt of 22 degrees
     max_speed_m_s: float = 5.0  # horizontally
     max_climb_m_s: float = 3.0
     max_sink_m_s: float = 1.5
-    hover_s: float = 1200.0  # how long a full battery holds it in the air
-    standby_s: float = 36_000.0  # how long it feeds the node on the ground
-    crash_m_s: float = 1.0  # a change of speed within one step, which no motor makes
+    hover_s: float = 1200.0  # hovering time with a full battery
+    standby_s: float = 36_000.0  # time for which a full battery powers the node on the ground
+    crash_m_s: float = 1.0  # a change of speed within one step that no motor could cause
     # Rotors do not survive this: held by something, a smaller change in every step, for so long.
     held_m_s: float = 0.01
     held_s: float = 0.5
@@ -30,7 +30,7 @@ class BodyLimits:
 
 POSITION_GAIN_PER_S = 1.2  # m/s of wanted speed per metre of distance
 TRIM_GAIN = 1.0  # m/s2 per metre and second
-TRIM_WITHIN_M = 0.7  # farther off, it is under way
+TRIM_WITHIN_M = 0.7  # farther away, it is in flight
 MOST_TRIM_M_S2 = 2.0
 SPEED_GAIN_PER_S = 4.0  # m/s2 of wanted acceleration per m/s of difference
 
@@ -42,9 +42,9 @@ def controller_force(
     target: Vector,
     trim: Vector = (0.0, 0.0, 0.0),
 ) -> Vector:
-    """Newtons of the motors, for a target: a position loop around a speed loop, both limited.
+    """The motors' force in newtons towards a target: a speed loop inside a position loop, limited.
 
-    `trim` is the acceleration (m/s2) that it has learnt to need against a steady wind.
+    `trim` is the acceleration (m/s2) learnt to compensate for a steady wind.
     """
     wanted = [POSITION_GAIN_PER_S * (goal - here) for here, goal in zip(position, target)]
     horizontal = math.hypot(wanted[0], wanted[1])
@@ -64,7 +64,7 @@ def controller_force(
 
 
 def learnt_trim(trim: Vector, position: Vector, target: Vector, passed_s: float) -> Vector:
-    """The trim after another moment, from what the position is off; only near the target."""
+    """The trim after `passed_s`, learnt from the position error; only near the target."""
     if math.dist(position, target) > TRIM_WITHIN_M:
         return trim
     x, y, z = (
@@ -75,6 +75,6 @@ def learnt_trim(trim: Vector, position: Vector, target: Vector, passed_s: float)
 
 
 def drag(limits: BodyLimits, velocity: Vector, wind: Vector) -> Vector:
-    """Newtons of the air."""
+    """The drag of the air, in newtons."""
     x, y, z = (-limits.drag_n_per_m_s * (now - air) for now, air in zip(velocity, wind))
     return (x, y, z)

@@ -12,13 +12,13 @@ from drone_mesh.world.static_box import add_static_box
 
 GRAVITY_M_S2 = -9.81  # along z
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
-KINEMATIC = 0.0  # a body of mass 0 is moved by us and never pushed by physics
+KINEMATIC = 0.0  # physics never moves a body of mass 0
 
 
 class BulletWorld(World):
-    """A pybullet world of its own; any number of them can live in one process.
+    """A separate pybullet world; one process can have several.
 
-    Nothing is drawn. Ground plane at z = 0. Each pybullet call names this world's client.
+    Nothing is drawn. The ground plane is at z = 0. Each pybullet call names this world's client.
     """
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class BulletWorld(World):
         pybullet.removeBody(box, physicsClientId=self.client)
 
     def add_body(self, size: Vector, centre: Vector, mass_kg: float) -> int:
-        """A box that physics moves; it stays upright, as a drone's controller keeps it."""
+        """A box that physics moves; it stays upright, as a drone's controller would keep it."""
         body = int(
             pybullet.createMultiBody(
                 mass_kg,
@@ -67,7 +67,7 @@ class BulletWorld(World):
             body,
             -1,
             localInertiaDiagonal=(0.0, 0.0, 0.0),  # nothing turns it
-            linearDamping=0.0,  # the drag of the air is ours
+            linearDamping=0.0,  # our controller computes the drag
             angularDamping=0.0,
             restitution=0.1,
             physicsClientId=self.client,
@@ -95,7 +95,7 @@ class BulletWorld(World):
         pybullet.stepSimulation(physicsClientId=self.client)
 
     def _shape(self, size: Vector) -> int:
-        """The collision shape of such a box; boxes of one size share theirs."""
+        """The collision shape of a box; boxes of equal size share it."""
         if size not in self._shapes:
             self._shapes[size] = pybullet.createCollisionShape(
                 pybullet.GEOM_BOX,

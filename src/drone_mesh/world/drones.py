@@ -1,4 +1,4 @@
-"""VirtualDrone, its two kinds: a body and its engine (docs/protocol.md, "World and flights")."""
+"""VirtualDrone and its two kinds: body and engine (docs/protocol.md, "World and flights")."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class VirtualDrone:
         wind: Vector | None = None,
         plan_flight: PlanFlight = FlightPath,
     ) -> None:
-        """Stands on the ground at this place (metres, world frame). Call in the world's thread.
+        """Create a drone on the ground at this position (metres, world frame). World's thread.
 
-        With a `wind` (m/s) physics moves it, in a BulletWorld; without one it follows its path.
-        Its flights are those of `plan_flight`.
+        With a `wind` (m/s) physics moves it, in a BulletWorld; without, it follows its path.
+        `plan_flight` plans its flights.
         """
         half_height_m = self.ROLE.size_m[2] / 2
         centre = (longitude, latitude, half_height_m)

@@ -1,4 +1,4 @@
-"""DynamicEngine: a drone that physics moves: mass, drag, wind, battery, collisions."""
+"""DynamicEngine: a drone moved by physics: mass, drag, wind, battery, collisions."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from drone_mesh.world.engine import DroneEngine
 ARRIVED_M = 0.15
 STANDS_M_S = 0.1
 ON_GROUND_M = 0.02  # of its underside
-LAND_AT_PERCENT = 20.0  # our choice: it comes down while it still can
+LAND_AT_PERCENT = 20.0  # our choice: it lands while it still can
 MOVED_M = 1e-4  # a smaller movement is not reported
-SETTLED_S = 0.1  # so long after the last movement its place is reported once more
+SETTLED_S = 0.1  # time after the last movement until its position is reported once more
 
 _log = logging.getLogger(__name__)
 
 
 class DynamicEngine(DroneEngine):
-    """As DroneEngine; but the body has a mass, and the flight ends where physics lets it.
+    """Like DroneEngine, but the body has mass, and physics decides where the flight ends.
 
-    A hard hit ends its flights for good; an empty battery as well, after it has come down.
+    A hard hit ends its flights for good; so does an empty battery, once it has come down.
     """
 
     def __init__(
@@ -45,16 +45,16 @@ class DynamicEngine(DroneEngine):
         self._physics = world
         self._wind = wind
         self._limits = limits
-        self._route: Route | None = None  # it flies
-        self._hover: Location | None = None  # it holds this place
+        self._route: Route | None = None  # the current flight
+        self._hover: Location | None = None  # the position that it holds
         self._velocity: Vector = (0.0, 0.0, 0.0)
-        self._pushed: Vector | None = None  # speed that the last forces alone would have given
+        self._pushed: Vector | None = None  # speed that the last forces alone would have caused
         self._trim: Vector = (0.0, 0.0, 0.0)
         self._stepped_s = world.now_s
         self._battery_percent = 100.0
         self._was_flat = False
         self._settled = True
-        self._held_s = 0.0  # how long something has held it in the air
+        self._held_s = 0.0  # how long an obstacle has held it in the air
         self._crashed = False
         world.wake(self)
 
@@ -85,14 +85,14 @@ class DynamicEngine(DroneEngine):
         return self._route is not None or bool(self._goals)
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """As DroneEngine. Raises GoalRefused too if it cannot fly."""
+        """Like DroneEngine.set_goal. Also raises GoalRefused if the drone cannot fly."""
         why_not = self.why_not_fly()
         if why_not:
             raise GoalRefused(f"the drone cannot fly: {why_not}")
         super().set_goal(latitude, longitude, height)
 
     def _take_turn(self, now_s: float) -> bool:
-        """One step of physics has passed: look where it is, and push. Wants every turn."""
+        """After a step of physics: read position and speed, apply forces. Always continues."""
         passed_s, self._stepped_s = now_s - self._stepped_s, now_s
         position, velocity = self._physics.body_state(self._box)
         if self._pushed is not None:
@@ -114,7 +114,7 @@ class DynamicEngine(DroneEngine):
             self._settled = self._settled and not has_moved
             self._tell(position, path, now_s)
         elif not self._settled and now_s - self._state.now_s >= SETTLED_S:
-            self._settled = True  # a listener that thins the reports out gets the last one too
+            self._settled = True  # listeners that skip reports still get the last one
             self._tell(position, path, now_s)
         return True
 
@@ -126,7 +126,7 @@ class DynamicEngine(DroneEngine):
         if path is None:
             _log.warning("box %d stays: obstacles leave no way to %s", self._box, goal.in_words())
             return
-        # As high as the flight that a kinematic drone would make.
+        # As high as a kinematic drone would fly.
         across_m = max(path.above_start[2], path.above_goal[2])
         self._route = Route(
             here, goal, across_m, lands=False, speed_m_s=SPEED_M_S, around=path.around

@@ -20,10 +20,10 @@ _log = logging.getLogger(__name__)
 
 
 class DroneState(NamedTuple):
-    """Where a drone was at the end of one step. Never changes, so any thread may keep it."""
+    """The drone at the end of one step. Immutable, so any thread may keep it."""
 
     position: Vector  # of the box's centre, metres, world frame: what DroneInfo carries
-    path: FlightPath | None  # the flight it is on; None: it stands (or hovers) still
+    path: FlightPath | None  # the current flight; None: it is at rest or hovers
     now_s: float  # simulated time of the last change
 
     @property
@@ -32,18 +32,18 @@ class DroneState(NamedTuple):
 
 
 StateListener = Callable[[DroneState], None]
-"""Is called in the world's thread, inside a step: be quick and do not step the world."""
+"""Called in the world's thread, inside a step: must be quick and must not step the world."""
 
 EngineObserver = Callable[[MeshEventKind, float, str], None]
-"""Is called like a StateListener, with what happened, the simulated time, and a few words."""
+"""Called like a StateListener with event, simulated time (s), and a short text."""
 
 
 class DroneEngine(IDroneEngine):
     """Flight path and pose of one drone.
 
-    The pose belongs to the world's thread. `set_goal`, `state` and `get_location` may be used by
-    any thread: a goal is queued and takes effect in the next step; the other two read the snapshot
-    of the last one.
+    The pose belongs to the world's thread. Any thread may use `set_goal`, `state` and
+    `get_location`: a goal is queued and takes effect in the next step; the other two read the
+    snapshot of the last step.
     """
 
     def __init__(
@@ -54,20 +54,20 @@ class DroneEngine(IDroneEngine):
         half_height_m: float,
         plan_flight: PlanFlight = FlightPath,
     ) -> None:
-        """`box` is the drone's body in `world`, `centre` where that is now.
+        """`box` is the drone's body in `world`, `centre` its current position.
 
-        `plan_flight` is asked for every flight, of the body's centre.
+        `plan_flight` plans each flight of the body's centre.
         """
         self._world = world
         self._box = box
         self._half_height_m = half_height_m
         self._plan_flight = plan_flight
         self._goals: deque[Vector] = deque()  # filled by any thread, emptied by the world's
-        self._followed: Vector | None = None  # set by any thread, taken by the world's
+        self._followed: Vector | None = None  # set by any thread, used by the world's
         self._listeners: list[StateListener] = []
         self._observers: list[EngineObserver] = []
         self._state = DroneState(centre, None, world.now_s)
-        self._has_left = False  # its body is not in the world any more
+        self._has_left = False  # its body has been removed from the world
 
     @property
     def state(self) -> DroneState:
@@ -80,7 +80,7 @@ class DroneEngine(IDroneEngine):
         return False
 
     def observe(self, observer: EngineObserver) -> None:
-        """Call `observer` when something happens to the drone. World's thread."""
+        """Call `observer` at each event of the drone. World's thread."""
         self._observers.append(observer)
 
     def _note(self, kind: MeshEventKind, detail: str = "") -> None:
@@ -89,29 +89,29 @@ class DroneEngine(IDroneEngine):
 
     @property
     def is_flat(self) -> bool:
-        """Whether its battery feeds nothing any more, so that its node is off too."""
+        """Whether the battery is empty, so that its node is off as well."""
         return False
 
     def add_listener(self, listener: StateListener) -> None:
         """Call `listener` with the new state in each step that moves the drone.
 
-        The last call of a flight has no path any more. World's thread.
+        The last call of a flight has no path. World's thread.
         """
         self._listeners.append(listener)
 
     def leave(self) -> None:
-        """Take the body out of the world; goals change nothing any more. World's thread."""
+        """Remove the body from the world; later goals have no effect. World's thread."""
         self._has_left = True
         self._listeners.clear()
         self._observers.clear()
         self._world.remove_box(self._box)
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly to this place (metres, world frame, height of the underside). Returns at once.
+        """Fly to this position (metres, world frame, height of the underside). Returns at once.
 
-        The goal it already flies to, or already stands on, changes nothing; any other one replans
-        the flight from where the drone is. Raises GoalRefused for NaN, infinity, places out of
-        bounds, and where obstacles leave no way.
+        A goal equal to the current goal or position changes nothing; any other goal replans the
+        flight from the current position. Raises GoalRefused for NaN, infinity, positions out of
+        bounds, and goals that obstacles make unreachable.
         """
         check_goal(latitude, longitude, height)
         goal = Location(latitude, longitude, height + self._half_height_m).to_vector()
@@ -121,17 +121,17 @@ class DroneEngine(IDroneEngine):
         self._world.wake(self)
 
     def follow(self, centre: Vector) -> None:
-        """Stand at this place from the next step on: another node flies the drone. Any thread."""
+        """From the next step on, be at this position: another node flies the drone. Any thread."""
         self._followed = centre
         self._world.wake(self)
 
     def get_location(self) -> Location:
-        """Where the underside is, in metres, after the last step. Never raises LocationUnknown."""
+        """The underside's position after the last step, in metres. Never raises LocationUnknown."""
         x, y, z = self._state.position
         return Location.from_vector((x, y, z - self._half_height_m))
 
     def step(self, now_s: float) -> bool:
-        """Take the goals that wait, fly on to `now_s`; True while in flight. For the world."""
+        """Apply waiting goals, fly on to `now_s`; returns whether it flies. For the world."""
         return not self._has_left and self._take_turn(now_s)
 
     def _take_turn(self, now_s: float) -> bool:
@@ -144,7 +144,7 @@ class DroneEngine(IDroneEngine):
         if path is None:
             return False
         position = path.position_at(now_s)
-        # Only a drone that comes down can arrive: a flight straight up passes its goal on the way.
+        # A drone has arrived only once it descends: a vertical ascent passes its goal on the way.
         if path.is_descending(now_s) and _is_close(position, path.goal):
             position, path = path.goal, None
         self._move(position, path, now_s)
@@ -152,9 +152,9 @@ class DroneEngine(IDroneEngine):
 
     def _move(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
         self._world.move_box(self._box, position)
-        self._tell(position, path, now_s)
+        self._notify(position, path, now_s)
 
-    def _tell(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
+    def _notify(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
         self._state = DroneState(position, path, now_s)
         for listener in self._listeners:
             listener(self._state)

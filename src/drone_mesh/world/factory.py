@@ -1,4 +1,4 @@
-"""DroneFactory: puts a fleet into a world, and changes it (docs/protocol.md, "Fleet")."""
+"""DroneFactory: creates a fleet in a world and changes it (docs/protocol.md, "Fleet")."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from drone_mesh.errors import ConfigurationError, FleetRefused, GoalRefused
 from drone_mesh.world.drones import GatewayDrone, RouterDrone, VirtualDrone
 from drone_mesh.world.interfaces import World
 
-HALF_WIDTH_M = 0.15  # from the middle of a drone's box to its corner, and a little
+HALF_WIDTH_M = 0.15  # from the centre of a drone's box to its corner, plus a margin
 _KINDS = {Role.GATEWAY: GatewayDrone, Role.ROUTER: RouterDrone}
 
 
 class DroneFactory:
-    """Puts a fleet into a world, adds drones to it and removes them.
+    """Creates a fleet in a world, adds drones to it and removes them.
 
-    `drones` holds them by id. It is replaced as a whole: any thread may read it; everything else
+    `drones` holds them by id. It is replaced as a whole, so any thread may read it; everything else
     is for the world's thread.
     """
 
@@ -38,9 +38,9 @@ class DroneFactory:
     ) -> None:
         """Parameters and errors as for `plan_fleet`.
 
-        `debug`: whether the nodes of the drones publish debug information; `wind`: as VirtualDrone.
-        The `obstacles` are put into the world too. Raises ConfigurationError if a drone would start
-        in or against one.
+        `debug`: whether the nodes of the drones publish debug information; `wind`: as for
+        VirtualDrone. The `obstacles` are added to the world too. Raises ConfigurationError if a
+        drone would start in or against one.
         """
         self.debug = debug
         self._world = world
@@ -59,10 +59,10 @@ class DroneFactory:
     def add(
         self, role: Role, longitude: float, latitude: float, node_id: int | None = None
     ) -> VirtualDrone:
-        """Put one more drone on the ground at this place (metres, world frame).
+        """Add a drone on the ground at this position (metres, world frame).
 
-        None: it gets the lowest free id. Raises FleetRefused for an id that is taken or invalid, a
-        full fleet, and a place that is out of bounds, blocked by an obstacle or taken.
+        `node_id` None: the lowest free id. Raises FleetRefused for an id that is taken or invalid,
+        a full fleet, and a position that is out of bounds, blocked by an obstacle or taken.
         """
         drones = {drone.node_id: drone for drone in self.drones}
         if len(drones) == MAX_DRONES:
@@ -83,10 +83,10 @@ class DroneFactory:
         return drones[node_id]
 
     def check_removal(self, node_id: int) -> VirtualDrone:
-        """The drone with this id. Raises FleetRefused if there is none, or it has to stay.
+        """The drone with this id. Raises FleetRefused if there is none or it must stay.
 
-        The last gateway stays while there are routers, which nothing could order any more. Any
-        thread.
+        The last gateway must stay while there are routers, because nothing else could send them
+        orders. Any thread.
         """
         drones = {drone.node_id: drone for drone in self.drones}
         if node_id not in drones:
@@ -100,7 +100,7 @@ class DroneFactory:
         return drones[node_id]
 
     def remove(self, node_id: int) -> None:
-        """Take a drone out of the world. Raises FleetRefused as `check_removal`."""
+        """Remove a drone from the world. Raises FleetRefused as `check_removal` does."""
         drone = self.check_removal(node_id)
         self.drones = tuple(other for other in self.drones if other is not drone)
         drone.engine.leave()

@@ -1,4 +1,4 @@
-"""World: what BulletWorld and StillWorld have in common, and what moves in them."""
+"""World: the interface of BulletWorld and StillWorld, and of what moves in them."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ TICKS_PER_S = 100  # steps and /clock per second of simulated time
 
 
 class Mover(Protocol):
-    """Something that needs a turn in each step for as long as it moves."""
+    """Something that is called in each step while it moves."""
 
     def step(self, now_s: float) -> bool:
-        """Move on to `now_s`, in the world's thread; True while it wants another turn."""
+        """Move on to `now_s`, in the world's thread; returns whether to call it again."""
 
 
 class World(abc.ABC):
@@ -34,15 +34,15 @@ class World(abc.ABC):
     def __init__(self) -> None:
         self._ticks = 0
         self._woken: deque[Mover] = deque()  # filled by any thread, emptied by the world's
-        self._moving: dict[Mover, None] = {}  # an ordered set: runs can be repeated
+        self._moving: dict[Mover, None] = {}  # an ordered set, so that runs are repeatable
 
     @property
     def now_s(self) -> float:
-        """Simulated seconds since the start: ticks counted and not summed, so there is no drift."""
+        """Simulated seconds since the start: counted in ticks, not summed, so there is no drift."""
         return self._ticks / TICKS_PER_S
 
     def step(self) -> float:
-        """Advance one tick and whatever moves; return the simulated seconds since the start."""
+        """Advance one tick and all movers; returns the simulated seconds since the start."""
         self._ticks += 1
         now_s = self.now_s
         while self._woken:
@@ -54,28 +54,28 @@ class World(abc.ABC):
         return now_s
 
     def wake(self, mover: Mover) -> None:
-        """Give `mover` a turn in each step from the next one on, until it returns False."""
+        """Call `mover` in each step from the next one on, until it returns False."""
         self._woken.append(mover)
 
     @abc.abstractmethod
     def add_box(self, size: Vector, centre: Vector) -> int:
-        """A box (full edge lengths in metres) that stays where it is put; returns its handle."""
+        """Add a box (full edge lengths, metres) that only `move_box` moves; returns its handle."""
 
     @abc.abstractmethod
     def add_obstacle(self, box: Box) -> None:
-        """A box that stands where it is, turned about its vertical axis, and that bodies hit."""
+        """Add a fixed box that bodies collide with, turned about its vertical axis."""
 
     @abc.abstractmethod
     def move_box(self, box: int, centre: Vector) -> None:
-        """Put a box's centre at this place; it stays upright."""
+        """Move a box's centre to this position; it stays upright."""
 
     @abc.abstractmethod
     def remove_box(self, box: int) -> None:
-        """Take a body away. Its handle may be given to a later body: do not use it again."""
+        """Remove a body. Its handle may be reused for a later body, so do not use it again."""
 
     @abc.abstractmethod
     def close(self) -> None:
-        """Free what the world holds. Closing twice changes nothing; a closed world cannot step."""
+        """Release the world's resources; a second call changes nothing. No steps after this."""
 
     @abc.abstractmethod
     def _advance(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-CATCH_UP_S = 0.5  # our choice: lost wall time up to this is caught up, more is lost
+CATCH_UP_S = 0.5  # our choice: a delay up to this is caught up; the rest of a longer one is lost
 
 
 class Pace:
@@ -20,12 +20,12 @@ class Pace:
         return self._factor
 
     def restart(self, factor: float) -> None:
-        """Continue at this factor from now; time that passed meanwhile is not caught up."""
+        """Continue at this factor from now on; earlier delays are not caught up."""
         self._factor = factor
         self._started = False
 
     def wait_s(self, simulated_s: float, wall_s: float) -> float:
-        """Wall seconds until the step from `simulated_s` on is due; 0: now."""
+        """Wall seconds until the step after `simulated_s` is due; 0: now."""
         if self._factor == 0.0:
             return 0.0
         if self._started:

@@ -1,4 +1,4 @@
-"""RayLinks: which places have a radio link past the obstacles, by rays through a pybullet world."""
+"""RayLinks: which positions have a radio link past the obstacles, by rays in pybullet."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.static_box import add_static_box
 
-MISSED = -1  # pybullet's body number of a ray that hits nothing more
+MISSED = -1  # pybullet's body number for a ray that hits nothing
 
 
 class RayLinks:
-    """The boxes of `obstacles` in a pybullet world of their own, and rays between places.
+    """The boxes of `obstacles` in a separate pybullet world, and rays between positions.
 
-    Gives the links that Obstacles.margin_db gives. Each pair is cast in both directions: one ray
-    enters a box where the other leaves it. Places inside a box are only known by the surface that
-    is missing; two of them in the same box have a link, but no drone can be there.
-    Not thread-safe.
+    Finds the same links as Obstacles.margin_db. Each pair is cast in both directions, because one
+    ray enters a box where the other leaves it. A position inside a box is recognised only by the
+    missing surface; two positions in one box have a link, but no drone can be there. Not
+    thread-safe.
     """
 
     def __init__(self, obstacles: Obstacles, range_m: float) -> None:
@@ -37,13 +37,13 @@ class RayLinks:
         }
 
     def close(self) -> None:
-        """Free the pybullet world. Closing twice changes nothing."""
+        """Release the pybullet world. A second call changes nothing."""
         if self._client >= 0:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = -1
 
     def sees(self, here: Vector, others: np.ndarray) -> np.ndarray:
-        """(n,) bool: which of these (n, 3) places, all within range, have a link to `here`."""
+        """(n,) bool: which of these (n, 3) positions, all within range, have a link to `here`."""
         distances_m = np.maximum(np.linalg.norm(others - np.array(here), axis=1), 1e-3)
         margins_db = 10 * self._obstacles.exponent * np.log10(self._range_m / distances_m)
         linked: np.ndarray = margins_db > self._losses_db(here, others, distances_m)
@@ -59,7 +59,7 @@ class RayLinks:
     def _loss_db(
         self, entered: dict[int, float], left: dict[int, float], distance_m: float
     ) -> float:
-        """From the shares of the way at which a ray meets each body, from either end."""
+        """From the fractions of the ray at which it enters each body, cast from either end."""
         crossed = sorted({*entered, *left})
         if self._obstacles.blocks:
             return math.inf if crossed else 0.0
@@ -73,7 +73,7 @@ class RayLinks:
     def _hits(
         self, starts: Sequence[Sequence[float]], ends: Sequence[Sequence[float]]
     ) -> list[dict[int, float]]:
-        """For each ray, the bodies that it enters, and at which share of its way."""
+        """For each ray, the bodies that it enters, and the fraction of the ray at which it does."""
         found: list[dict[int, float]] = [{} for _ in starts]
         for number in range(len(self._cut_db)):
             hits = pybullet.rayTestBatch(

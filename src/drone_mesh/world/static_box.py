@@ -1,4 +1,4 @@
-"""A box of pybullet that nothing moves."""
+"""A fixed box in pybullet."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drone_mesh.drone.flight_path import Vector
 
 
 def add_static_box(client: int, centre: Vector, size: Vector, yaw_rad: float) -> int:
-    """A box that nothing moves in this pybullet client; returns its body number."""
+    """Add a fixed box to this pybullet client; returns its body number."""
     shape = pybullet.createCollisionShape(
         pybullet.GEOM_BOX, halfExtents=[edge_m / 2 for edge_m in size], physicsClientId=client
     )

@@ -10,7 +10,7 @@ from drone_mesh.world.interfaces import World
 
 
 class StillWorld(World):
-    """Time passes and drones fly, as in BulletWorld; a body is only the place of its centre."""
+    """Time passes and drones fly as in BulletWorld; a body is only the position of its centre."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -23,7 +23,7 @@ class StillWorld(World):
         return handle
 
     def add_obstacle(self, box: Box) -> None:
-        """Nothing can hit it."""
+        """Does nothing: nothing collides here."""
 
     def move_box(self, box: int, centre: Vector) -> None:
         self.centres[box] = centre
@@ -32,7 +32,7 @@ class StillWorld(World):
         del self.centres[box]
 
     def close(self) -> None:
-        """There is nothing to free."""
+        """Does nothing: there are no resources."""
 
     def _advance(self) -> None:
-        """There is no physics."""
+        """Does nothing: there is no physics."""

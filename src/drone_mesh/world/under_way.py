@@ -1,23 +1,23 @@
-"""UnderWay: packets that were handed over, and that no node has worked off yet."""
+"""UnderWay: packets that were handed over and that no node has processed yet."""
 
 from __future__ import annotations
 
 import logging
 
 PATIENCE_S = 1.0  # our choice, wall; a packet on a busy machine is under way for a fraction of it
-_HASTE = 0.5  # our choice: how much less patience there is after each loss
+_HASTE = 0.5  # our choice: factor on the patience after each loss
 _SHORTEST_S = 0.01  # wall
 
 _log = logging.getLogger(__name__)
 
 
 class UnderWay:
-    """Tells packets that will still arrive from those that never will.
+    """Distinguishes packets that will still arrive from lost ones.
 
-    A packet gets lost when its receiver ends while it is under way, or when a simulator accepts
-    packets that it does not deliver. Then the number of packets under way does not return to what
-    it was; if it does not change for a while either, it is the number to be expected from now on.
-    The wait is shorter from one loss to the next, and as long as at first after none was lost.
+    A packet is lost when its receiver ends before it arrives, or when a simulator accepts packets
+    that it does not deliver. The number of packets under way then never returns to its old value;
+    once it has been constant for a while, it becomes the expected number. This wait gets shorter
+    with each loss in a row, and is reset when nothing was lost.
 
     Belongs to the thread that steps the world.
     """
@@ -25,15 +25,14 @@ class UnderWay:
     def __init__(self) -> None:
         self._lost = 0
         self._count = 0
-        self._since_s = 0.0  # wall; since when the count is the same, and the nodes do nothing
+        self._since_s = 0.0  # wall; since when the count is constant and the nodes are idle
         self._patience_s = PATIENCE_S
 
     def is_none(self, count: int, idle: bool, wall_s: float) -> bool:
-        """Whether nothing is under way, if `count` packets are not worked off at `wall_s`.
+        """Whether nothing is under way, given `count` unprocessed packets at `wall_s`.
 
-        `idle`: the nodes have nothing to do but to wait for packets. The count may be too low for
-        a moment, as a process reports a packet that it received before another reports that it
-        sent it.
+        `idle`: the nodes only wait for packets. The count may briefly be too low, because the
+        receiving process may report a packet before the sending one does.
         """
         if count != self._count or not idle:
             self._count, self._since_s = count, wall_s
