@@ -20,7 +20,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 _UNKNOWN: Position = (0.0, 0.0, 0.0)
 
 Sees = Optional[Callable[[Position, np.ndarray], np.ndarray]]
-"""(3,) position, (n, 3) others within range, metres -> (n,) bool: which of them have a link to it."""
+"""(3,) position, (n, 3) others in range, metres -> (n,) bool: which of them have a link to it."""
 
 
 class NodeTable:

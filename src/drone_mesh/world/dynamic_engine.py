@@ -112,10 +112,10 @@ class DynamicEngine(DroneEngine):
         has_moved = math.dist(position, self._state.position) > MOVED_M
         if is_news or has_moved:
             self._settled = self._settled and not has_moved
-            self._tell(position, path, now_s)
+            self._notify(position, path, now_s)
         elif not self._settled and now_s - self._state.now_s >= SETTLED_S:
             self._settled = True  # listeners that skip reports still get the last one
-            self._tell(position, path, now_s)
+            self._notify(position, path, now_s)
         return True
 
     def _begin(self, goal: Location, position: Vector, now_s: float) -> None:
@@ -132,7 +132,7 @@ class DynamicEngine(DroneEngine):
             here, goal, across_m, lands=False, speed_m_s=SPEED_M_S, around=path.around
         )
         self._hover = None
-        self._tell(position, path, now_s)
+        self._notify(position, path, now_s)
 
     def _fly(self, position: Vector, passed_s: float) -> None:
         self._use_battery(position, passed_s)
