@@ -84,7 +84,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="fleets to measure; +fly: physics moves the drones, and all of them fly; default: "
         + " ".join(map(_in_short, cases.FULL)),
     )
-    parser.add_argument("--only", choices=(ROS, INPROCESS), help="measure only this half")
+    parser.add_argument("--only", choices=(ROS, INPROCESS), help="measure only this part")
     parser.add_argument(
         "--seconds",
         type=_positive,
@@ -105,7 +105,7 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="LOOPS",
         help="instead of the tables: run one size (default: "
         f"{_in_short(cases.OVERLOAD)}) for {overload.SIMULATED_S:g} simulated seconds beside each "
-        "of these numbers of programs that never wait, and report how many connections are lost",
+        "of these numbers of busy loops, and report how many connections are lost",
     )
     parser.add_argument(
         "--launch",

@@ -139,7 +139,7 @@ class System:
         for name, process in parts:
             if process is not None and process.poll() is not None:
                 raise BenchmarkError(
-                    f"{name} ended by itself, with code {process.returncode}:\n{self._log_of(name)}"
+                    f"{name} exited with code {process.returncode}:\n{self._log_of(name)}"
                 )
 
     def wait_for(

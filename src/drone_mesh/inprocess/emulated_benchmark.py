@@ -107,7 +107,7 @@ def main(argv: list[str] | None = None) -> int:
                 shown = time.perf_counter()
                 print(f"{mesh.now_s() - begin_s:.0f} of {arguments.seconds:g} s", file=sys.stderr)
     except KeyboardInterrupt:
-        print("broken off", file=sys.stderr)
+        print("interrupted", file=sys.stderr)
     simulated_s = mesh.now_s() - begin_s
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
     _report(mesh, simulated_s, wall_s, cpu_s, connected_s)

@@ -190,7 +190,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         row for row in rows if not arguments.row or any(part in row.name for part in arguments.row)
     )
     if not rows:
-        print("no row has such a name; the rows are:", file=sys.stderr)
+        print("no row has that name; the rows are:", file=sys.stderr)
         print("\n".join(f"  {row.name}" for row in ROWS), file=sys.stderr)
         return 2
     seeds = arguments.seeds or (1 if arguments.quick else SEEDS)

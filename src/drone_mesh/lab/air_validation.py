@@ -78,8 +78,12 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         f"{100 * CONNECTED_PART:g} %, frames or collided share by {100 * FRAMES_PART:g} %.",
     )
     parser.add_argument("--nodes", type=int, nargs="+", default=SIZES, help="sizes of the meshes")
-    parser.add_argument("--rates", nargs="+", choices=RATES, default=RATES)
-    parser.add_argument("--links", nargs="+", choices=LINKS, default=LINKS)
+    parser.add_argument(
+        "--rates", nargs="+", choices=RATES, default=RATES, help="data rates (default: all)"
+    )
+    parser.add_argument(
+        "--links", nargs="+", choices=LINKS, default=LINKS, help="models of loss (default: both)"
+    )
     seeds = ", ".join(f"{count} for {nodes} nodes" for nodes, count in SEEDS.items())
     parser.add_argument(
         "--seeds",

@@ -25,6 +25,7 @@ from drone_mesh.lab.template import write_template
 
 PROGRAM = "lab"
 CELLS_SHOWN = 30  # by `lab plan`
+_RESULTS = "results folder of the experiment"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -63,7 +64,7 @@ def _parser() -> argparse.ArgumentParser:
     new.add_argument("name", help="name of the experiment and of its file")
     new.set_defaults(run=_new)
 
-    plan = commands.add_parser("plan", help="show cells, runs and estimated time; store nothing")
+    plan = commands.add_parser("plan", help="show cells, runs and estimated time; writes nothing")
     _add_experiment(plan)
     plan.add_argument("--no-estimate", action="store_true", help="skip the trial runs")
     _add_workers(plan)
@@ -79,11 +80,11 @@ def _parser() -> argparse.ArgumentParser:
         "--shard", type=_shard, metavar="I/N", help="execute every N-th run, starting with the I-th"
     )
     run.add_argument("--out", type=Path, help="results folder (default: results/NAME)")
-    run.add_argument("--retry-failed", action="store_true", help="run failed runs again")
+    run.add_argument("--retry-failed", action="store_true", help="repeat failed runs")
     run.set_defaults(run=_run)
 
     status = commands.add_parser("status", help="show the progress of a results folder")
-    status.add_argument("results", type=Path)
+    status.add_argument("results", type=Path, help=_RESULTS)
     status.set_defaults(run=_status)
 
     merging = commands.add_parser("merge", help="merge shards into one results folder")
@@ -97,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     report = commands.add_parser("report", help="write tables and figures as one HTML file")
-    report.add_argument("results", type=Path)
+    report.add_argument("results", type=Path, help=_RESULTS)
     report.add_argument("--out", type=Path, help="the page (default: RESULTS/report.html)")
     report.add_argument(
         "--export", metavar="FORMAT", action="append", default=[],
@@ -107,7 +108,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     report.set_defaults(run=_report)
 
     show = commands.add_parser("show", help="repeat one run, with all its events")
-    show.add_argument("results", type=Path)
+    show.add_argument("results", type=Path, help=_RESULTS)
     show.add_argument("run_id", metavar="RUN", help="id of the run, or the beginning of it")
     how = show.add_mutually_exclusive_group()
     how.add_argument("--page", type=Path, metavar="FILE", help="write a report page about the run")
@@ -116,10 +117,8 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     show.add_argument("--port", type=int, default=9081, help="port for --console (default 9081)")
     show.set_defaults(run=_show)
 
-    compare = commands.add_parser(
-        "compare", help="show the paired differences of two cells, seed by seed"
-    )
-    compare.add_argument("results", type=Path)
+    compare = commands.add_parser("compare", help="compare two cells: differences paired by seed")
+    compare.add_argument("results", type=Path, help=_RESULTS)
     compare.add_argument("a", metavar="A", help="a cell: axis=value[,axis=value...]")
     compare.add_argument("b", metavar="B", help="the other cell")
     compare.add_argument(
@@ -134,7 +133,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         "attack", help="attack meshes without and with a key, and print the damage as a table"
     )
     attack.add_argument(
-        "attacks", nargs="*", metavar="ATTACK", help=f"of: {', '.join(ATTACKS)} (default: all)"
+        "attacks", nargs="*", metavar="ATTACK", help=f"any of: {', '.join(ATTACKS)} (default: all)"
     )
     attack.add_argument(
         "--runs", type=_count, default=12, metavar="N", help="number of seeds (default: 12)"
@@ -151,7 +150,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         metavar="N",
         help="number of packets (default: %(default)s)",
     )
-    fuzzing.add_argument("--seed", type=int, default=1, help="(default: %(default)s)")
+    fuzzing.add_argument("--seed", type=int, default=1, help="random seed (default: %(default)s)")
     fuzzing.set_defaults(run=_fuzz)
 
     metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
@@ -159,16 +158,16 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
 
 
 def _add_experiment(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="the experiment")
+    parser.add_argument("file", type=Path, help="experiment file")
     parser.add_argument(
-        "overrides", nargs="*", metavar="a.b=c", help="override a value of the file"
+        "overrides", nargs="*", metavar="a.b=c", help="override a value of the file, as in seeds=50"
     )
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=_count, default=len(os.sched_getaffinity(0)), metavar="N",
-        help="number of processes; 0: run in this one, for a debugger (default: one per core, "
+        help="number of processes; 0: run in this process, for a debugger (default: one per core, "
         "%(default)s)",
     )  # fmt: skip
 
@@ -232,7 +231,7 @@ def _plan(options: argparse.Namespace) -> int:
     print(f"{cells} cell{'s' * (cells != 1)} x {plan.seeds} seeds = {len(plan)} runs")
     stop = loaded.experiment.stop
     if stop is not None:
-        print(f"more seeds, up to {stop.max_seeds}, until {stop.metric} is known closely enough")
+        print(f"more seeds, up to {stop.max_seeds}, until {stop.metric} is precise enough")
     if not options.no_estimate:
         guess = estimate(plan, options.workers)
         workers = max(1, options.workers)

@@ -56,11 +56,15 @@ def main(argv: list[str] | None = None) -> int:
         "For comparison it prints the same for ideal information, if all drones may move, and if "
         "only the drones cut off from the gateway move, as they do here.",
     )
-    parser.add_argument("--drones", type=int, nargs="+", default=[20, 50, 100], choices=LAYOUTS)
+    parser.add_argument("--drones", type=int, nargs="+", default=[20, 50, 100], choices=LAYOUTS,
+        help="sizes of the meshes (default: all)",
+    )  # fmt: skip
     parser.add_argument(
         "--layouts", type=int, help="number of layouts per number of drones (default: 40, 20 and 8)"
     )
-    parser.add_argument("--repair", nargs="+", default=list(IDEAL), choices=IDEAL)
+    parser.add_argument(
+        "--repair", nargs="+", default=list(IDEAL), choices=IDEAL, help="strategies (default: both)"
+    )
     options = parser.parse_args(argv)
     print("| drones | cut vertices | repair | ideal, all move | ideal, cut-off drones move | runs "
           "| healed | runs / ideal |")  # fmt: skip

@@ -123,7 +123,7 @@ def _connected_points(
         if layout.require == "nothing" or _graph(points, range_m, obstacles).is_connected():
             return points
     raise ConfigurationError(
-        f"layout {layout.kind}: none of {MOST_DRAWS} draws was connected; use fewer metres, a "
+        f"layout {layout.kind}: none of {MOST_DRAWS} draws was connected; use a smaller area, a "
         "higher mean_degree or require: nothing"
     )
 

@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             keys = read_key_file(parsed.mesh_key)
             if not isinstance(keys, MeshKey):
-                raise ConfigurationError(f"key file {parsed.mesh_key}: holds no mesh key")
+                raise ConfigurationError(f"key file {parsed.mesh_key}: not a mesh key")
             write_key_file(parsed.file, keys.for_node(parsed.id))
             print(f"raspberry_key: keys of node {parsed.id} in {parsed.file}")
     except ConfigurationError as error:

@@ -175,7 +175,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         type=float,
         default=MeshTiming.connection_lost_after_s,
         metavar="SECONDS",
-        help="time without a gateway until the node repairs the mesh (default: %(default)g)",
+        help="time without a gateway before the node starts a repair (default: %(default)g)",
     )
     mesh.add_argument(
         "--report-period",
@@ -321,7 +321,7 @@ def _keys(parsed: argparse.Namespace) -> MeshKey | NodeKeys | None:
     if parsed.emulated or parsed.gateway:
         what = "emulated nodes need" if parsed.emulated else "a gateway needs"
         raise ConfigurationError(
-            f"--key-file {parsed.key_file}: {what} the mesh key, not that of a node"
+            f"--key-file {parsed.key_file}: {what} the mesh key, not the keys of one node"
         )
     if keys.node != parsed.id:
         raise ConfigurationError(

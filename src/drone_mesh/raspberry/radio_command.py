@@ -170,7 +170,12 @@ def _parser() -> argparse.ArgumentParser:
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
     tools.add_parser("check", help="test wiring, SPI, CE, supply and IRQ")
     scan = tools.add_parser("scan", help="show the 126 channels as bars; suggest channel and rate")
-    scan.add_argument("--rounds", type=whole(1, 10_000), default=100, help="(default: %(default)s)")
+    scan.add_argument(
+        "--rounds",
+        type=whole(1, 10_000),
+        default=100,
+        help="number of scans (default: %(default)s)",
+    )
     scan.add_argument(
         "--nodes",
         type=whole(1, MAX_NODE_ID + 1),
@@ -178,24 +183,26 @@ def _parser() -> argparse.ArgumentParser:
         help="size of the mesh, which decides the suggested rate (default: %(default)s)",
     )
     reach = tools.add_parser("range", help="measure the loss to a node at each power, as CSV")
-    reach.add_argument("--to", type=whole(0, MAX_NODE_ID), required=True, help="id of that node")
     reach.add_argument(
-        "--packets", type=whole(1, 100_000), default=1000, help="(default: %(default)s)"
+        "--to", type=whole(0, MAX_NODE_ID), required=True, help="id of the other node"
     )
-    reach.add_argument("--distance", type=float, help="metres, to compare with the figures of 2019")
+    reach.add_argument(
+        "--packets", type=whole(1, 100_000), default=1000, help="per power (default: %(default)s)"
+    )
+    reach.add_argument("--distance", type=float, help="metres, for a comparison with 2019")
     reach.add_argument(
         "--all-rates",
         action="store_true",
-        help="at each rate too; 'answer' must run at that node, with the same --rate as here",
+        help="measure at every data rate; the other node must run 'answer', with the same --rate",
     )
     tools.add_parser(
-        "answer", help="be the far end of 'range --all-rates': acknowledge, and follow its rates"
+        "answer", help="acknowledge the packets of 'range --all-rates', at each of its rates"
     )
     ear = tools.add_parser("listen", help="print packets to all nodes and to --id, decoded")
     ear.add_argument("--seconds", type=float, default=float("inf"), help="(default: until Ctrl-C)")
     ear.add_argument(
         "--pcapng", type=Path, metavar="FILE", help="also write what arrives to FILE, for Wireshark"
     )
-    report = tools.add_parser("report", help="write check and scan to one file, to send to us")
-    report.add_argument("file", type=Path)
+    report = tools.add_parser("report", help="save check and scan in one file, to send to us")
+    report.add_argument("file", type=Path, help="text file to write")
     return parser

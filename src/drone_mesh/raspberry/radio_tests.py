@@ -35,7 +35,7 @@ def check(radio: BenchRadio, irq: IrqPin | None) -> Lines:
     wrong = sum(not _holds(radio, PATTERNS[n % len(PATTERNS)]) for n in range(SPI_ROUNDS))
     if wrong:
         raise RadioError(
-            f"SPI: {wrong} of {SPI_ROUNDS} addresses read back wrong: shorter wires, or a lower "
+            f"SPI: {wrong} of {SPI_ROUNDS} addresses read back wrong: use shorter wires or a lower "
             "--spi-hz"
         )
     yield f"ok   SPI: {SPI_ROUNDS} addresses written and read back"

@@ -79,7 +79,9 @@ def local_socket(desk: UsersDesk) -> LocalSocket | None:
         return LocalSocket(desk, socket_path(desk.node_id))
     except ConfigurationError as error:
         _log.warning(
-            "node %d: mesh_ping, mesh_send and the like cannot reach it: %s", desk.node_id, error
+            "node %d: mesh_ping, mesh_send and the other commands cannot reach it: %s",
+            desk.node_id,
+            error,
         )
         return None
 
@@ -201,7 +203,7 @@ def _prepare(path: Path) -> None:
     if not path.exists():
         return
     if not stat.S_ISSOCK(path.stat().st_mode):
-        raise ConfigurationError(f"socket {path}: a file of that name is in the way")
+        raise ConfigurationError(f"socket {path}: a file with this name already exists")
     if is_served(path):
-        raise ConfigurationError(f"socket {path}: another program runs a node of this id")
+        raise ConfigurationError(f"socket {path}: another program already runs a node with this id")
     path.unlink()

@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 1
         for number, hop in enumerate([*answer["route"], parsed.id], start=1):
             print(f"{number:3}  node {hop}")
-        print(f"there and back in {1e3 * answer['round_trip_s']:.1f} ms")
+        print(f"round trip: {1e3 * answer['round_trip_s']:.1f} ms")
         return 0
 
     return command_line.run("mesh_trace", work)

@@ -54,7 +54,7 @@ def test_ping_of_a_node_without_a_route_says_so(rig, capsys):
 
 def test_trace_names_the_nodes_on_the_way(rig, capsys):
     assert trace_command.main(["--node", "0", "2"]) == 0
-    assert capsys.readouterr().out == ("  1  node 1\n  2  node 2\nthere and back in 8.0 ms\n")
+    assert capsys.readouterr().out == ("  1  node 1\n  2  node 2\nround trip: 8.0 ms\n")
 
 
 @pytest.mark.parametrize("to", ["gateway", "0"])
@@ -163,10 +163,12 @@ def test_only_the_user_of_the_node_may_open_its_socket(rig):
 
 
 def test_two_programs_cannot_serve_the_same_node_and_the_second_goes_on_without(rig, caplog):
-    with pytest.raises(ConfigurationError, match="another program runs a node of this id"):
+    with pytest.raises(
+        ConfigurationError, match="another program already runs a node with this id"
+    ):
         LocalSocket(rig.desks[0], socket_path(0))
     assert local_socket(rig.desks[0]) is None
-    assert "node 0: mesh_ping, mesh_send and the like cannot reach it" in caplog.text
+    assert "node 0: mesh_ping, mesh_send and the other commands cannot reach it" in caplog.text
 
 
 def test_a_socket_that_a_dead_program_left_is_replaced(rig, tmp_path):

@@ -25,7 +25,7 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh lab_run",
-        description="Repeat a run of the lab and play it in rviz, one state per sample. Starts a "
+        description="Repeats a run of the lab and plays it in rviz, one state per sample. Starts a "
         "master if none is running; needs a screen.",
         epilog="Ctrl-C ends it. Exit code: that of roslaunch; 2: no such run.",
     )

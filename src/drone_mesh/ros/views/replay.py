@@ -38,8 +38,8 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh replay",
-        description="Play a recorded run as if it ran now, for rviz, the console and your own "
-        "nodes. The recorded clock is skipped, because rosbag publishes its own: with both, time "
+        description="Plays a recorded run as if it ran now, for rviz, the console and your own "
+        "nodes. Skips the recorded clock, because rosbag publishes its own: with both, time "
         "would jump backwards.",
         epilog="The space bar pauses. Exit code: 2 unusable bag or no free master, otherwise that "
         "of rosbag play.",
@@ -57,14 +57,14 @@ def _parser() -> argparse.ArgumentParser:
 def _rate(text: str) -> float:
     rate = float(text)
     if not 0.001 <= rate <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{text}: want 0.001..1000")
+        raise argparse.ArgumentTypeError(f"{text}: must be 0.001..1000")
     return rate
 
 
 def _seconds(text: str) -> float:
     seconds = float(text)
     if not 0.0 <= seconds < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text}: want 0 or more")
+        raise argparse.ArgumentTypeError(f"{text}: must be 0 or more")
     return seconds
 
 

@@ -29,7 +29,7 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh report",
-        description="Write an HTML report of a run that launch/record.launch recorded: the "
+        description="Writes an HTML report of a run that launch/record.launch recorded: the "
         "connected share over time, the outages and their repairs, messages "
         "per node, the map before and after. Needs no running simulation.",
         epilog="Exit code: 0 written, 2 failed.",

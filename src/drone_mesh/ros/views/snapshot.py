@@ -28,7 +28,7 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh snapshot",
-        description="Draw the world with its drones, links and flights. Needs no screen.",
+        description="Writes a picture of drones, links and flights. Needs no screen.",
         epilog="Exit code: 0 written, 2 failed.",
     )
     parser.add_argument("picture", type=_png, help="the PNG file to write")

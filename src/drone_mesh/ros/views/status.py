@@ -35,7 +35,7 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh status",
-        description="Print the state of the mesh as a table.",
+        description="Prints the state of the mesh as a table.",
         epilog="Exit code: 0 all nodes that are on are connected, 1 some are not, "
         "2 unknown (no master, no mesh, no such bag).",
     )

@@ -106,12 +106,12 @@ class FleetChanges:
     def _remove(self, node_id: int) -> RemoveDroneResponse:
         drone = self._factory.check_removal(node_id)
         if node_id in self._needed:
-            raise FleetRefused(f"drone {node_id} has to stay: {self._needed[node_id]}")
+            raise FleetRefused(f"drone {node_id} cannot be removed: {self._needed[node_id]}")
         self._hosts.pop(node_id, None)
         self._publish(without=node_id)
         self._spawner.end_node(node_id)
         if not _comes_true(lambda: not node_runs(node_id)):
-            _log.warning("the process of node %d does not end it", node_id)
+            _log.warning("the process that hosts node %d has not ended it", node_id)
         self._spawner.despawn(drone)
         message = f"removed {drone.ROLE.word} {node_id}"
         _log.info("%s", message)

@@ -110,7 +110,7 @@ def test_two_new_keys_differ(tmp_path):
 def test_the_keys_of_a_node_make_no_keys_for_others(tmp_path, capsys):
     write_key_file(tmp_path / "node", KEY.for_node(3))
     assert main(["node", str(tmp_path / "node"), "4", str(tmp_path / "other")]) == 1
-    assert "holds no mesh key" in capsys.readouterr().err
+    assert "not a mesh key" in capsys.readouterr().err
 
 
 def test_a_key_file_that_is_not_there_is_one_line(tmp_path, capsys):
