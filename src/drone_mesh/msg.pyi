@@ -123,6 +123,9 @@ class MeshEvent(Message):
     ORDER_REFUSED: Final = 22
     ORDER_ARRIVED: Final = 23
     ORDER_GIVEN_UP: Final = 24
+    TOOK_OFF: Final = 25
+    CANNOT_FLY: Final = 26
+    CAN_FLY: Final = 27
     stamp: rospy.Time
     node: int
     code: int

@@ -40,6 +40,10 @@ class MeshEventKind(enum.Enum):
     ORDER_REFUSED = "order refused"
     ORDER_ARRIVED = "order arrived"
     ORDER_GIVEN_UP = "order given up"
+    # Of a drone, which a real gateway reads from the reports of its node
+    TOOK_OFF = "took off"
+    CANNOT_FLY = "cannot fly"  # detail: why
+    CAN_FLY = "can fly again"
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
             "--emulated-air-serve",
             metavar="[HOST:]PORT",
             help="without hardware: run this node on an emulated air, and serve that air to other "
-            "processes",
+            f"processes; without a password, so only on this machine by default ({LOCAL})",
         )
 
 

@@ -18,6 +18,7 @@ from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.raspberry.event_history import EventHistory
 from drone_mesh.raspberry.mesh_report import mesh_report
+from drone_mesh.raspberry.node_changes import NodeChanges
 from drone_mesh.raspberry.node_status import node_status
 from drone_mesh.raspberry.options import Options
 from drone_mesh.users.desk import UsersDesk
@@ -47,7 +48,8 @@ class RadioNode:
     ) -> None:
         """Takes ownership of radio and engine. Raises what `make_internet` raises.
 
-        `events` is shared by the nodes of one program.
+        `events` is shared by the nodes of one program, which report their events themselves; a
+        gateway without it derives those of its routers from what it hears of them.
         """
         self.radio = radio
         self.engine = engine
@@ -56,6 +58,10 @@ class RadioNode:
         self._antenna = NRF24HighLevelInterface(radio, self._slot.submit)
         self._origin = options.flight.origin
         self.events = EventHistory() if events is None else events
+        self._changes: NodeChanges | None = None
+        if make_internet is not None and events is None:  # the others run in other programs
+            check_s = options.timing.check_period_s
+            self._changes = NodeChanges(radio.node_id, check_s, self.events.observe)
         self.users = UsersDesk(radio.node_id, self._slot.submit)
         self._socket = local_socket(self.users)
         self._internet = None if make_internet is None else make_internet(self)
@@ -99,6 +105,17 @@ class RadioNode:
             "uptime_s": round(now_s - self._started_s, 2),
             "events": self.events.since(after, self._started_s),
         }
+
+    def look_at_others(self) -> None:
+        """Have a gateway report what changed at its routers; to be called again and again."""
+        if self._changes is not None:
+            self._slot.submit(self._note_changes)
+
+    def _note_changes(self, now_s: float) -> None:
+        component = self.component
+        assert self._changes is not None
+        assert isinstance(component, MeshnetworkGateway)
+        self._changes.look(component.get_known_nodes(), component.get_node_reports(), now_s)
 
     def status(self) -> dict[str, Any]:
         """What `node_status` says; any thread may call it."""

@@ -111,6 +111,8 @@ def _run(options: Options, request: StopRequest) -> None:
         watch = _Watch(nodes, options, manager)
         while not request.wait(LOOK_PERIOD_S):
             watch.look(time.monotonic())
+            for node in nodes:
+                node.look_at_others()
             move_radios()
         manager.stopping()
         _log.info("stopping")

@@ -15,6 +15,7 @@ from drone_mesh.raspberry.air_options import AirAddress
 from drone_mesh.raspberry.emulated_air import EmulatedAir, column_place
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.options import Options
+from drone_mesh.web.access import is_loopback
 
 _log = logging.getLogger(__name__)
 
@@ -47,6 +48,12 @@ def serving_node(
     """A node on `air`, which other processes may join. Raises ConfigurationError."""
     host, port = air.serve(*address)
     _log.info("emulated air: others join it with --emulated-air %s:%d", host, port)
+    if not is_loopback(host):
+        _log.warning(
+            "emulated air: it has no password, so whoever can reach port %d can join this mesh and "
+            "listen to it",
+            port,
+        )
     place = _place(options)
     radio = air.radio(options.node_id, options.radio, place)
     node = _node(radio, options, place, make_internet)
