@@ -1,1 +1,1 @@
-"""A mesh of drones: the mesh software, its radio, and a world to try both in."""
+"""A mesh of drones: the mesh software, its radio, and a simulated world for both."""

@@ -1,4 +1,4 @@
-"""The configuration of a simulation: config/factory.yaml and the launch arguments over it."""
+"""The configuration of a simulation: config/factory.yaml, overridden by launch arguments."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from drone_mesh.yaml_file import read_mapping
 
 MAX_DRONES = MAX_NODE_ID + 1
 MIN_REAL_TIME_FACTOR = 0.001  # our choice: one step of the world in 10 s
-MAX_REAL_TIME_FACTOR = 1000.0  # our choice: beyond it the clock's steps are no longer seen
+MAX_REAL_TIME_FACTOR = 1000.0  # our choice: above it the clock moves in too large steps
 MAX_SEED = 2**32 - 1
-RANDOM_SEED = "random"  # asks for a new seed where the file has a fixed one
+RANDOM_SEED = "random"  # requests a new seed although the file has a fixed one
 
 _log = logging.getLogger(__name__)
 
@@ -32,11 +32,11 @@ _log = logging.getLogger(__name__)
 class FactoryConfiguration:
     """Every setting of a simulation; config/factory.yaml documents the same defaults.
 
-    Values may be of their own type, or as text ("3", "true"), as launch arguments are. The
-    descriptions are what error messages say of a key.
+    Values may have their own type or be text ("3", "true"), as launch arguments are. Error messages
+    quote the descriptions.
     """
 
-    # Of everything random; load_configuration chooses one where none is given.
+    # Seeds everything random; load_configuration chooses one if none is given.
     seed: int = Field(ge=0, le=MAX_SEED, description="a whole number")
     gateways: int = Field(1, ge=0, le=MAX_DRONES, description="a whole number of drones")
     routers: int = Field(17, ge=0, le=MAX_DRONES, description="a whole number of drones")
@@ -99,8 +99,8 @@ def load_configuration(
 ) -> FactoryConfiguration:
     """The configuration in this file, overridden key by key.
 
-    An override that is an empty string means "as in the file". Where no seed is given, one is
-    chosen; the seed is logged in any case. Raises ConfigurationError (one line: file and line or
+    An override that is an empty string keeps the value of the file. If no seed is given, one is
+    chosen; the seed is always logged. Raises ConfigurationError (one line: file and line or
     argument, key, value, what is allowed).
     """
     file = read_mapping(path)
@@ -138,7 +138,7 @@ def _hint(name: object) -> str:
 
 
 def _allowed(name: str) -> str:
-    """What a key may be, for people."""
+    """The allowed values of a key, as text."""
     field = _FIELDS[name]
     if name in _SWITCHES:
         return "true or false"

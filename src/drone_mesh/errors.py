@@ -1,4 +1,4 @@
-"""The one family of errors of this package."""
+"""The errors of this package, in one family."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ class MeshError(Exception):
 
 
 class PacketError(MeshError):
-    """Bytes are not a packet we know. From the air this is normal: drop it and count it."""
+    """Bytes are not a known packet. From the air this is normal: drop it and count it."""
 
 
 class LocationUnknown(MeshError):
@@ -16,20 +16,20 @@ class LocationUnknown(MeshError):
 
 
 class ConfigurationError(MeshError):
-    """A parameter or a file is wrong. The message names it and what is allowed: show it, stop."""
+    """A parameter or a file is invalid. The message names it and what is allowed: show it, stop."""
 
 
 class FleetRefused(MeshError):
-    """A drone cannot be added or removed. The fleet is as it was; report it to the user."""
+    """A drone cannot be added or removed. The fleet is unchanged; report it to the user."""
 
 
 class MessageRefused(MeshError):
-    """A user's message cannot be sent as it is. Nothing was sent; report it to the user."""
+    """A user's message cannot be sent. Nothing was sent; report it to the user."""
 
 
 class QueueFull(MessageRefused):
-    """Too many messages of users wait in this node. Try again when some of them have left."""
+    """Too many users' messages wait in this node. Try again after some have been sent."""
 
 
 class GoalRefused(MeshError):
-    """A goal is not a number or out of bounds. Nothing moves; report it to the sender."""
+    """A goal is invalid, out of bounds or unreachable. Nothing moves; report it to the sender."""

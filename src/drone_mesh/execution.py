@@ -2,7 +2,7 @@
 
 The core has no threads (docs/protocol.md, "Driven from outside"). Packets, orders and time meet
 here: work from other threads waits in one first-in-first-out queue, timers wait in a heap of
-deadlines, and one worker takes whichever has waited longest.
+deadlines, and one worker runs whatever has waited longest.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Callable, Protocol
 
 FAILURE_PERIOD_S = 30.0  # our choice: one traceback per kind of failure in this time
 RETRY_AFTER_S = 1.0  # our choice: pause before failed work that is still due runs again
-MOST_WAITING = 1000  # our choice: packets for one node; four of each other node
+MOST_WAITING = 1000  # our choice: packets for one node; four from each other node
 _WAKE = None  # in the queue: no function, only check the deadlines again
 
 _log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ Work = Callable[[float], None]
 class Inbox:
     """Packets that wait for one node. When too many do, new ones are dropped, as on the air.
 
-    Any thread may `put`; what is put runs where `submit` has it run.
+    Any thread may call `put`; the function runs where `submit` runs it.
     """
 
     def __init__(self, submit: Callable[[Work], None], most: int = MOST_WAITING) -> None:
@@ -40,7 +40,7 @@ class Inbox:
         self.dropped = 0
 
     def put(self, function: Work) -> bool:
-        """Have `function(now_s)` run. False: too many wait, and it is dropped."""
+        """Queue `function(now_s)`. False: too many wait, and it is dropped."""
         if not self._free.acquire(blocking=False):
             with self._counting:
                 self.dropped += 1
@@ -74,7 +74,7 @@ class _Periodic:
         self.next_tick_s = first_s
 
     def tick(self, now_s: float) -> None:
-        """Call it; periods that have passed meanwhile are skipped."""
+        """Call it; skip periods that have already passed."""
         missed = max(0.0, (now_s - self.next_tick_s) // self._period_s)
         self.next_tick_s += self._period_s * (missed + 1.0)
         self._function(now_s)
@@ -84,7 +84,7 @@ class _Periodic:
 
 
 class ExecutorSlot:
-    """One component's place in an executor. Its antenna needs `submit` before the component exists.
+    """One component's place in an executor; the antenna uses `submit` before the component exists.
 
     `submit` may be called by any thread; everything else is done by the executor's worker.
     """
@@ -152,11 +152,11 @@ class MeshExecutor:
     # Any thread ------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start the worker. Earlier submissions come first."""
+        """Start the worker. Earlier submissions run first."""
         self._thread.start()
 
     def when_idle(self, function: Callable[[], None]) -> None:
-        """Have the worker call this, before `start`, each time when no work is left for now."""
+        """Call `function` on the worker each time no work is left. To be set before `start`."""
         self._on_idle = function
 
     def stop(self) -> None:
@@ -166,7 +166,7 @@ class MeshExecutor:
             self._thread.join()
 
     def slot(self) -> ExecutorSlot:
-        """A place for one more component."""
+        """A slot for one more component."""
         return ExecutorSlot(self)
 
     def submit(self, function: Work, slot: ExecutorSlot | None = None) -> None:
@@ -237,7 +237,7 @@ class MeshExecutor:
         due_s, _, driven = heapq.heappop(self._deadlines)
         if isinstance(driven, ExecutorSlot):
             if due_s != driven.scheduled_s:
-                return  # it was rescheduled meanwhile
+                return  # it has been rescheduled
             driven.scheduled_s = math.inf
         elif due_s != driven.next_tick_s:
             return  # cancelled

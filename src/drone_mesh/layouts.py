@@ -1,4 +1,4 @@
-"""Layouts of the DroneManager: places of drones per case (docs/protocol.md, "Drone manager")."""
+"""Layouts of the DroneManager: positions of drones, by case (docs/protocol.md, "Drone manager")."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ Layout = Dict[int, Location]
 
 
 class UnknownCase(MeshError):
-    """There is no such layout. The message lists the known ones."""
+    """There is no such layout. The message lists those that exist."""
 
 
 class Order(NamedTuple):
-    """Sends this drone to this place."""
+    """Sends a drone to a goal."""
 
     node_id: int
     goal: Location
@@ -63,7 +63,7 @@ class Layouts:
     def __init__(self, cases: Mapping[int, Layout]) -> None:
         """`cases` override the built-in ones: 0, 1..17 and 100.
 
-        1..17 move one drone to its place in case 0, whichever case 0 that is.
+        Cases 1..17 move one drone to its position in case 0, whether built-in or overridden.
         """
         field = cases.get(FIELD_CASE, _field_layout())
         singles = {n: {n: field[n]} for n in _FIELD_PLACES if n in field}
@@ -71,7 +71,7 @@ class Layouts:
 
     @classmethod
     def shipped(cls) -> Layouts:
-        """Those of config/casus.yaml, in a checkout or as the wheel installs it."""
+        """The layouts in config/casus.yaml, from a checkout or an installed wheel."""
         places = (Path(__file__).resolve().parents[2], Path(sys.prefix) / "share" / "drone_mesh")
         files = (place / "config" / "casus.yaml" for place in places)
         return next((cls.load(file) for file in files if file.exists()), cls({}))
@@ -87,10 +87,11 @@ class Layouts:
         return sorted(self._cases)
 
     def orders(self, case: int) -> list[Order]:
-        """The orders of a case from the highest id down: the far end first, so relays leave last.
+        """The orders of a case by descending id: the far end first, so relays leave last.
 
-        It includes drones that do not exist: the manager cannot know which do, and the gateway
-        logs that it has no route for such an order. Raises UnknownCase, which lists the known ones.
+        They include drones that do not exist: the manager cannot know which do, and the
+        gateway logs that it has no route for such an order. Raises UnknownCase, which lists the
+        known ones.
         """
         if case not in self._cases:
             raise UnknownCase(f"unknown case {case}: use one of {_ranges(self.cases)}")
@@ -98,7 +99,7 @@ class Layouts:
 
 
 def read_places(text: str, name: str = "the file") -> list[Order]:
-    """The orders of a layout file with one case, from the highest id down.
+    """The orders of a layout file with one case, by descending id.
 
     Raises ConfigurationError: `name`, line and what is wrong.
     """
@@ -140,7 +141,7 @@ _Cases = Dict[Annotated[int, Field(ge=0, le=MAX_CASE)], Annotated[_Places, Field
 
 
 class _LayoutFile(BaseModel):
-    """The shape of a file like config/casus.yaml; `check_goal` judges the places."""
+    """The schema of a file like config/casus.yaml; `check_goal` checks the positions."""
 
     model_config = ConfigDict(extra="forbid", strict=True)  # "1", 1.0 and true are not ids
 
@@ -148,13 +149,13 @@ class _LayoutFile(BaseModel):
 
 
 def _refusal(file: YamlFile, found: Sequence[Any]) -> ConfigurationError:
-    """The error for the first thing that pydantic found wrong."""
+    """The error for the first problem that pydantic found."""
     unknown = [error["loc"][0] for error in found if error["type"] == "extra_forbidden"]
     if unknown:
         where = file.where(unknown[0])
         return ConfigurationError(f"{where}: unknown key {unknown[0]}: expected only 'cases'")
     loc = found[0]["loc"]
-    is_key = loc[-1] == "[key]"  # the key itself is wrong, and stands before that as text
+    is_key = loc[-1] == "[key]"  # the key itself is wrong; the element before this is its text
     keys = (*loc[:-2], found[0]["input"]) if is_key else loc
     where = file.where(*keys)
     if len(keys) == 1:

@@ -8,11 +8,11 @@ from types import TracebackType
 
 
 class StopRequest:
-    """Made once, by a signal handler or any thread; the threads that wait for it then go on.
+    """Made once, by a signal handler or any thread; wakes all threads that wait for it.
 
     A threading.Event does not suit a signal handler: it has a lock, and the handler may interrupt
-    the very thread that holds it. Here the request is a byte in a pipe that nobody reads, so it is
-    seen by each thread that waits, now or later. Close it when no thread uses it any more.
+    the very thread that holds it. Here the request is a byte in a pipe that is never read, so every
+    thread that waits sees it, now or later. Close it when no thread uses it any more.
     """
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class StopRequest:
         return self._made
 
     def wait(self, timeout_s: float) -> bool:
-        """Return when the request is made (True), or after so many seconds (False). Any thread."""
+        """Wait at most `timeout_s` seconds; returns whether the request was made. Any thread."""
         if not self._made:
             poll = select.poll()  # select() takes no file descriptor above 1023
             poll.register(self._read_end, select.POLLIN)
@@ -49,7 +49,7 @@ class StopRequest:
         return self._made
 
     def close(self) -> None:
-        """Release the pipe; what was asked for stays known."""
+        """Release the pipe; `is_made` keeps its value."""
         self._made = True
         os.close(self._read_end)
         os.close(self._write_end)

@@ -1,4 +1,4 @@
-"""Reads a YAML file that a person wrote, with errors that this person can act on."""
+"""Reads a YAML file written by a user, with errors that the user can act on."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from yaml.constructor import ConstructorError
 
 from drone_mesh.errors import ConfigurationError
 
-# Our choices: far above what a configuration or a layout of 254 drones needs, and low enough that
-# a wrong or hostile file is refused at once.
+# Our choices: far above what a configuration or a layout of 254 drones needs, and low enough to
+# refuse a wrong or hostile file at once.
 MAX_FILE_BYTES = 500_000
 MAX_DEPTH = 10
 MAX_VALUE_CHARACTERS = 250
@@ -23,7 +23,7 @@ KeyPath = Tuple[Hashable, ...]
 
 
 class YamlFile:
-    """The mapping that a file consists of, and the lines of its keys and list entries."""
+    """The mapping in a file, and the lines of its keys and list entries."""
 
     def __init__(
         self, path: str | Path, content: dict[Any, Any], lines: dict[KeyPath, int]
@@ -35,7 +35,7 @@ class YamlFile:
     def where(self, *keys: Hashable) -> str:
         """Path and line of a key, given by the keys and indices that lead to it, for an error.
 
-        For keys that are not in the file: the line of the nearest one around them.
+        For a key that is not in the file: the line of the nearest enclosing one.
         """
         for length in range(len(keys), 0, -1):
             line = self._lines.get(keys[:length])
@@ -45,16 +45,16 @@ class YamlFile:
 
 
 def read_mapping(path: str | Path) -> YamlFile:
-    """Read this file, as read_mapping_text; also raises ConfigurationError if it cannot be read."""
+    """Read this file like read_mapping_text; also raises ConfigurationError if unreadable."""
     return read_mapping_text(_read_text(path), path)
 
 
 def read_mapping_text(text: str, path: str | Path) -> YamlFile:
-    """The mapping that this text of a file consists of; an empty file is an empty mapping.
+    """The mapping in this text of a file; an empty file is an empty mapping.
 
-    `path` is for messages. Raises ConfigurationError (one line: file, line, what is wrong) for what
-    is not YAML, has a duplicate key, exceeds the limits above or contains anything but a mapping.
-    Aliases (*name) are refused: a few lines of them can stand for gigabytes.
+    `path` is for messages. Raises ConfigurationError (one line: file, line, what is wrong) for
+    invalid YAML, duplicate keys, exceeded limits (above) and anything but a mapping. Aliases
+    (*name) are refused, because a few lines of them can expand to gigabytes.
     """
     try:
         loader = _Loader(text)
@@ -93,7 +93,7 @@ def _read_text(path: str | Path) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader with limits, and without duplicate keys: there, the last one would win."""
+    """SafeLoader with limits, which refuses duplicate keys; SafeLoader would use the last one."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -116,7 +116,7 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def note_lines(self, node: yaml.Node, keys: KeyPath, lines: dict[KeyPath, int]) -> None:
-        """Enter the line of each key and list entry; ConstructorError for a duplicate key."""
+        """Record the line of each key and list entry; ConstructorError for a duplicate key."""
         if isinstance(node, yaml.SequenceNode):
             for index, entry in enumerate(node.value):
                 lines[(*keys, index)] = entry.start_mark.line + 1

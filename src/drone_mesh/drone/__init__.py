@@ -1,4 +1,4 @@
-"""What the mesh software knows of the drone that carries it."""
+"""The drone as the mesh software sees it."""
 
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 

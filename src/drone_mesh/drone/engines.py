@@ -1,4 +1,4 @@
-"""Engines by name, so that an option can choose one."""
+"""Creates engines by name, for command-line options."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class FlightOptions:
     permissions: Permissions = field(default_factory=Permissions)
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError for a combination that cannot fly."""
+        """Raise ConfigurationError for a combination that cannot fly."""
         if self.drone.startswith(MAVLINK) and self.origin is None:
             raise ConfigurationError("--drone mavlink: needs --origin LAT,LON,ALT")
 
 
 def create_engine(node_id: int, location: Location | None, options: FlightOptions) -> IDroneEngine:
-    """The engine of one node; `location` is where one on the ground stands, if known.
+    """The engine of one node; `location` is the position of a node on the ground, if known.
 
-    Raises ConfigurationError if the engine cannot be had.
+    Raises ConfigurationError if the engine cannot be created.
     """
     if options.drone == GROUND:
         digest = options.origin.digest if options.origin is not None else 0
@@ -51,7 +51,7 @@ def _mavlink_engine(node_id: int, options: FlightOptions) -> IDroneEngine:
             f"the Python package {error.name} is missing, which --drone mavlink: needs: "
             "pip install 'drone_mesh[raspberry]'"
         ) from error
-    assert options.origin is not None  # FlightOptions sees to that
+    assert options.origin is not None  # checked by FlightOptions
     address = options.drone[len(MAVLINK) :]
     return MavlinkEngine(node_id, address, options.origin, options.limits, options.permissions)
 

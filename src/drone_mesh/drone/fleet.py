@@ -1,4 +1,4 @@
-"""A fleet: ids, roles and start places of its drones (docs/protocol.md, "Identity", "Fleet")."""
+"""A fleet: ids, roles and start positions (docs/protocol.md, "Identity", "Fleet")."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 
 MAX_DRONES = 254  # ids 0..253
-GATEWAY_COLUMN_M = -1.0  # x of all gateways; they stand 1 m apart along y
+GATEWAY_COLUMN_M = -1.0  # x of all gateways; spaced 1 m apart along y
 
 
 class StartPlace(NamedTuple):
-    """Id, role and start place of one drone."""
+    """Id, role and start position of one drone."""
 
     node_id: int
     role: Role
@@ -35,7 +35,7 @@ def ids_in_words(ids: Iterable[int]) -> str:
 def plan_fleet(
     gateways: int, routers: int, gridsize: int, spacing: float
 ) -> tuple[StartPlace, ...]:
-    """Ids, roles and start places of a fleet, by id: gateways first, from 0.
+    """Ids, roles and start positions of a fleet, by id: gateways first, from 0.
 
     `gridsize` is the number of routers in a row along x, `spacing` their distance in metres.
     Raises ConfigurationError, which names the parameter, for an invalid fleet.

@@ -1,4 +1,4 @@
-"""Geometry and time of a flight (docs/protocol.md, "World and flights")."""
+"""Geometry and timing of a flight (docs/protocol.md, "World and flights")."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ def between(start: Vector, end: Vector, share: float) -> Vector:
 class FlightPath:
     """One flight in straight lines: up, across, down.
 
-    A flight over a straight distance d takes d / speed_m_s and climbs d / 2. The way flown is
-    longer than d, so a drone is faster than that for most of it. Climbing higher than d / 2, as
-    `across_m` asks, takes the time of the extra metres; and so does the way round something, over
-    the corners `around`, which are all at the greater height of the two ends.
+    A flight over a straight distance d takes d / speed_m_s and climbs d / 2. The path is longer
+    than d, so the drone flies faster than speed_m_s for most of it. Climbing higher than d / 2, as
+    `across_m` requires, takes the time for the extra metres; so does a detour over the corners
+    `around`, which are all at the greater height of the two ends.
     """
 
     start: Vector
     goal: Vector
     start_s: float  # when it leaves `start`, simulated seconds
     speed_m_s: float = SPEED_M_S
-    across_m: float = -math.inf  # the way across is at least so high, to pass over something
-    around: tuple[Point, ...] = ()  # x, y: corners of the way across
+    across_m: float = -math.inf  # least height of the way across, to pass over obstacles
+    around: tuple[Point, ...] = ()  # x, y: corners of a detour on the way across
     duration_s: float = field(init=False)
     above_start: Vector = field(init=False)  # where it is at 10 %
     above_goal: Vector = field(init=False)  # where it is at 90 %
@@ -75,15 +75,15 @@ class FlightPath:
 
     @property
     def ground_m(self) -> float:
-        """Its length over ground."""
+        """Its horizontal length."""
         return _length([corner[:2] for corner in self.across])
 
     def ground_flown_m(self, now_s: float) -> float:
-        """Metres over ground until this time."""
+        """The horizontal distance flown until this time, in metres."""
         return self.ground_m * self._share_across(self.share_flown(now_s))
 
     def ahead(self, now_s: float) -> list[Vector]:
-        """The corners that it has not passed at this time, the goal last."""
+        """The corners still ahead at this time, the goal last."""
         share = self.share_flown(now_s)
         if share >= DESCENT_STARTS_AT:
             return [self.goal]
@@ -91,24 +91,24 @@ class FlightPath:
         return [*left, self.goal]
 
     def _left(self, share: float) -> tuple[Vector, ...]:
-        """The corners of the way across that are behind this share of it."""
+        """The corners of the way across that lie before this share of it."""
         flown_m = share * _length(self.across)
         passed = (_length(self.across[:count]) <= flown_m for count in range(1, len(self.across)))
         return self.across[sum(passed) :]
 
     @staticmethod
     def _share_across(share: float) -> float:
-        """Of the way across, at this share of the flight's time."""
+        """The share of the way across, at this share of the flight's time."""
         return min(1.0, max(0.0, (share - CLIMB_ENDS_AT) / (DESCENT_STARTS_AT - CLIMB_ENDS_AT)))
 
     def share_flown(self, now_s: float) -> float:
-        """How much of the flight's time is over: 0.0 before the start, 1.0 from the end on."""
+        """The elapsed share of the flight's time: 0.0 before the start, 1.0 from the end on."""
         if self.duration_s == 0.0:
             return 1.0
         return min(1.0, max(0.0, (now_s - self.start_s) / self.duration_s))
 
     def position_at(self, now_s: float) -> Vector:
-        """Where the drone is at this time: at `start` before the flight, at `goal` after it."""
+        """The drone's position at this time: `start` before the flight, `goal` after it."""
         share = self.share_flown(now_s)
         if share >= 1.0:
             return self.goal
@@ -142,4 +142,4 @@ def _along(corners: Sequence[Vector], share: float) -> Vector:
 
 
 PlanFlight = Callable[[Vector, Vector, float, float], Optional[FlightPath]]
-"""From start, goal, time (s) and speed (m/s) to a flight; None: there is no way."""
+"""From start, goal, time (s) and speed (m/s) to a flight; None: no path."""

@@ -1,9 +1,9 @@
-"""Where the mesh's common frame lies on the earth: degrees to metres and back.
+"""The position of the mesh's common frame on the earth: degrees to metres and back.
 
 East is the longitude axis and north the latitude axis, in metres at the height of the origin;
 heights are differences of altitude, so straight up changes neither east nor north. pymap3d does the
-mathematics: it is pure Python without dependencies, so it installs on every Raspberry Pi; pyproj
-is 30 MB of compiled PROJ for the same result, and serves the tests as an independent witness.
+mathematics: it is pure Python without dependencies, so it installs on every Raspberry Pi; pyproj is
+30 MB of compiled PROJ for the same result, and serves as an independent reference in the tests.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from typing import NamedTuple
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError
 
-MAX_LATITUDE_DEG = 85.0  # our choice: nearer to a pole, east and north lose their meaning
+MAX_LATITUDE_DEG = 85.0  # our choice: closer to a pole, east and north become meaningless
 ALTITUDE_RANGE_M = (-500.0, 9000.0)  # of the earth's surface, rounded outwards
 _DIGEST_BYTES = 2
-_RESOLUTION_DEG = 1e7  # origins that agree in all of MAVLink's 1e-7 degrees are the same
+_RESOLUTION_DEG = 1e7  # origins are equal if they agree within MAVLink's 1e-7 degrees
 _SURFACE_STEPS = 3  # each divides the error of the height by 1000; two reach micrometres
 
 
 class EarthPlace(NamedTuple):
-    """A place on the earth (WGS84)."""
+    """A position on the earth (WGS84)."""
 
     latitude_deg: float
     longitude_deg: float
@@ -41,7 +41,7 @@ class Origin:
     altitude_m: float  # above mean sea level
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError for a place that cannot be an origin."""
+        """Raise ConfigurationError for a position that cannot be an origin."""
         lowest, highest = ALTITUDE_RANGE_M
         bounds = (
             ("latitude", self.latitude_deg, -MAX_LATITUDE_DEG, MAX_LATITUDE_DEG),
@@ -65,7 +65,7 @@ class Origin:
 
     @property
     def digest(self) -> int:
-        """A number 1..65535 that differs for different origins (but for one pair in 65535)."""
+        """A number 1..65535 that differs for different origins, except for 1 pair in 65535."""
         exact = struct.pack(
             "<qqq",
             round(self.latitude_deg * _RESOLUTION_DEG),
@@ -76,7 +76,7 @@ class Origin:
         return int.from_bytes(digest, "little") or 1  # 0 means: no origin
 
     def to_frame(self, place: EarthPlace) -> Location:
-        """The place in metres of the common frame."""
+        """The position in metres of the common frame."""
         import pymap3d  # with numpy, most of a second on a Pi; only frames on the earth need it
 
         east, north, _ = pymap3d.geodetic2enu(
@@ -90,7 +90,7 @@ class Origin:
         return Location(float(north), float(east), place.altitude_m - self.altitude_m)
 
     def to_earth(self, location: Location) -> EarthPlace:
-        """The place on the earth of a location in the common frame."""
+        """The position on the earth of a location in the common frame."""
         import pymap3d
 
         up = 0.0  # of the surface at the origin's height, which curves away below the plane

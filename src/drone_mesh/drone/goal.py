@@ -1,4 +1,4 @@
-"""Which goals a drone accepts (docs/protocol.md, "Goals"); used wherever orders pass."""
+"""The goals that a drone accepts (docs/protocol.md, "Goals"); checked wherever orders pass."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MAX_HEIGHT_M = 500.0  # height of the underside: 0..500 m
 
 
 def check_goal(latitude: float, longitude: float, height: float) -> None:
-    """Raise GoalRefused unless a drone may be sent to this place (metres, world frame)."""
+    """Raise GoalRefused unless a drone may fly to this position (metres, world frame)."""
     bounds = (
         ("latitude", latitude, -MAX_COORDINATE_M, MAX_COORDINATE_M),
         ("longitude", longitude, -MAX_COORDINATE_M, MAX_COORDINATE_M),

@@ -7,10 +7,10 @@ from drone_mesh.errors import GoalRefused, LocationUnknown
 
 
 class GroundEngine(IDroneEngine):
-    """Stays where it is and refuses each goal. Any thread may call it."""
+    """Stays where it is and refuses every goal. Any thread may call it."""
 
     def __init__(self, node_id: int, location: Location | None, frame_digest: int = 0) -> None:
-        """`location` None: it is not known where the node stands."""
+        """`location` None: the node's position is unknown."""
         self._frame_digest = frame_digest
         self._node_id = node_id
         self._location = location
@@ -20,15 +20,15 @@ class GroundEngine(IDroneEngine):
         raise GoalRefused(f"drone {self._node_id} cannot fly: {self.why_not_fly()}")
 
     def get_location(self) -> Location:
-        """Where it was put. Raises LocationUnknown if that is not known."""
+        """The given position. Raises LocationUnknown if there is none."""
         if self._location is None:
             raise LocationUnknown("no position was given; use --latitude and --longitude")
         return self._location
 
     def frame_digest(self) -> int:
-        """That of --origin."""
+        """The digest of --origin."""
         return self._frame_digest
 
     def why_not_fly(self) -> str:
-        """It never flies."""
+        """Always: the node never flies."""
         return "it stands on the ground"

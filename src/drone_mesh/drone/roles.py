@@ -1,4 +1,4 @@
-"""Role: what a drone does in the mesh, and the body that it has."""
+"""Role: the function of a drone in the mesh, and its size."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import enum
 
 
 class Role(enum.IntEnum):
-    """What a node is; the values are those of NodeState.msg."""
+    """The role of a node; the values are those of NodeState.msg."""
 
     ROUTER = 0
     GATEWAY = 1

@@ -1,4 +1,4 @@
-"""The way of one flight: up, across, down; and the target that leads the drone along it."""
+"""The path of one flight: up, across, down; and the target that leads the drone along it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Sequence
 from drone_mesh.drone.flight_path import Point, between
 from drone_mesh.drone.interfaces import Location
 
-LEAD_S = 1.5  # our choice: the target is at most so far ahead, in seconds of flight
-SHORTEST_LEAD_M = 2.0  # our choice: wider than the noise of a position
-CORNER_M = 1.0  # our choice: so near a corner is round it
+LEAD_S = 1.5  # our choice: greatest distance of the target ahead, in seconds of flight
+SHORTEST_LEAD_M = 2.0  # our choice: more than the noise of a position
+CORNER_M = 1.0  # our choice: distance at which a corner counts as passed
 
 
 class Route:
-    """Straight lines from here to the goal, over one height.
+    """Straight lines from here to the goal, across at one height.
 
     The target moves at the speed of the flight and waits for the drone: a drone whose link breaks
     ends at the last target, a few metres ahead of it, and never cuts a corner.
@@ -28,8 +28,10 @@ class Route:
         speed_m_s: float,
         around: Sequence[Point] = (),
     ) -> None:
-        """`cross_at_m` is the height between; `lands` leaves the last way down out; `around` are
-        corners (x, y) in between."""
+        """`cross_at_m` is the height in between; `around` are corners (x, y) in between.
+
+        `lands` leaves the final descent to the autopilot.
+        """
         height = max(cross_at_m, start.height, goal.height)
         between_ends = [Location.from_vector((x, y, height)) for x, y in around]
         corners = [start, start._replace(height=height), *between_ends]
@@ -44,7 +46,7 @@ class Route:
 
     @property
     def target(self) -> Location:
-        """Where the drone is to fly now."""
+        """The position to fly to now."""
         return self._target
 
     @property
@@ -54,11 +56,11 @@ class Route:
 
     @property
     def highest_m(self) -> float:
-        """The greatest height on the way."""
+        """The greatest height of the path."""
         return max(corner.height for corner in self._corners)
 
     def advance(self, here: Location, passed_s: float) -> bool:
-        """Move the target for this time; whether the drone is at the end of the route."""
+        """Move the target for this time; returns whether the drone is at the end of the route."""
         budget_m = self._speed_m_s * passed_s
         while budget_m > 0.0:
             corner = self._corners[self._next]

@@ -81,7 +81,7 @@ class EarthGoal(BaseModel, extra="forbid"):
 
 
 class OrderSent(BaseModel):
-    """The order was sent through the mesh. The header Location says where to ask about it."""
+    """The order was sent through the mesh. The Location header is the address of its state."""
 
     drone: int
     latitude: float = Field(description="y, metres")
@@ -90,22 +90,22 @@ class OrderSent(BaseModel):
 
 
 class GoalSent(OrderSent):
-    """An order that was given in a body."""
+    """An order whose goal was given in the request body."""
 
     earth: Optional[EarthGoal] = Field(description="The same in degrees; null: no origin.")
 
 
 class NodeReport(BaseModel):
-    """One node, as the gateway knows it."""
+    """One node as known to the gateway."""
 
     id: int
     next_hop: Optional[int] = Field(description="The neighbour that leads to it; null: no route.")
-    hops: Optional[int] = Field(description="From its last heartbeat; null: none came.")
+    hops: Optional[int] = Field(description="From its last heartbeat; null: none yet.")
     heard_s_ago: Optional[float] = Field(description="Seconds since it was heard; null: never.")
 
 
 class NodeReports(BaseModel):
-    """All nodes that the gateway knows, without itself."""
+    """All nodes known to the gateway, except itself."""
 
     gateway: int
     nodes: List[NodeReport]
@@ -119,11 +119,11 @@ def make_api(
     mesh: Optional[Callable[[int], Dict[str, Any]]] = None,
     users: Optional[UsersDesk] = None,
 ) -> FastAPI:
-    """The application. Its page /docs loads nothing from the internet.
+    """The ASGI application. Its page /docs loads nothing from the internet.
 
-    With the origin of the common frame, goals may be given in degrees. `status` is what the node
-    says of itself, from any thread; `mesh`, on the gateway's, what it knows of all nodes, with the
-    events after a number. `users` sends and receives messages.
+    With an `origin` of the common frame, goals may be given in degrees. `status` returns the node's
+    status, from any thread; `mesh` runs on the gateway's thread and returns what it knows of all
+    nodes, with the events after a number. `users` sends and receives messages.
     """
     app, guards = guarded_app(
         "drone_mesh gateway",
@@ -138,14 +138,14 @@ def make_api(
 
     @app.get("/ready", dependencies=guards, responses=refusals)
     async def ready() -> Ready:
-        """Whether the gateway is running; its own thread answers."""
+        """Whether the gateway is running; answered by its own thread."""
         return await desk.ask(
             lambda gateway, _now_s: Ready(ready=True, gateway=gateway.get_node_id())
         )
 
     @app.get("/nodes", dependencies=guards, responses=refusals)
     async def nodes() -> NodeReports:
-        """The nodes that the gateway knows, and its routes to them."""
+        """The nodes known to the gateway, and its routes to them."""
         return await desk.ask(_report_nodes)
 
     @app.post(
@@ -231,7 +231,7 @@ def make_api(
         async def whole_mesh(
             after: Annotated[int, Query(ge=0, description="Events with higher numbers.")] = 0,
         ) -> Dict[str, Any]:
-            """All nodes as they reported themselves, and what happened: for the web console."""
+            """All nodes as they reported themselves, and their events: for the web console."""
             return await desk.ask(lambda _gateway, _now_s: read_mesh(after))
 
     return app

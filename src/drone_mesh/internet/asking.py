@@ -25,10 +25,10 @@ class AnswerLate(MeshError):
 
 
 class GatewayDesk:
-    """Queues questions for the gateway and waits for its answers.
+    """Queues requests to the gateway and waits for its answers.
 
     Any thread may call `open` and `close`. Everything else belongs to the server's event loop,
-    except the questions themselves, which run on the thread behind `submit`.
+    except the requests themselves, which run on the thread behind `submit`.
     """
 
     def __init__(self, submit: Submit, answer_within_s: float) -> None:
@@ -39,20 +39,20 @@ class GatewayDesk:
         self._waiting: set[Future[Any]] = set()
 
     def open(self, gateway: IGatewayCommands) -> None:
-        """Take questions for this gateway."""
+        """Accept requests for this gateway."""
         self._gateway = gateway
 
     def close(self) -> None:
-        """Refuse further questions and cancel those that the gateway has not started."""
+        """Refuse further requests and cancel those that the gateway has not started."""
         self._gateway = None
         if self._loop is not None:
-            with contextlib.suppress(RuntimeError):  # the loop has ended, and its requests with it
+            with contextlib.suppress(RuntimeError):  # the loop has ended together with its requests
                 self._loop.call_soon_threadsafe(self._give_up)
 
     async def ask(self, question: Callable[[IGatewayCommands, float], Answer]) -> Answer:
         """Run `question(gateway, now_s)` on the gateway's thread and return its result.
 
-        Raises NotCarriedOut, AnswerLate, and whatever the question raises.
+        Raises NotCarriedOut, AnswerLate, and whatever `question` raises.
         """
         gateway = self._gateway
         if gateway is None:

@@ -1,4 +1,4 @@
-"""The requests about users' messages: `POST /nodes/{id}/data` and `GET /data`.
+"""Users' messages over HTTP: `POST /nodes/{id}/data` and `GET /data`.
 
 No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
 Python 3.8.
@@ -24,8 +24,8 @@ from drone_mesh.internet.guarded_app import Responses
 from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk
 
 LONGEST_WAIT_S = 60.0  # our choice
-SIGN_OF_LIFE_S = 15.0  # our choice: a comment to a client for which nothing came
-MOST_UNREAD = 256  # messages that may wait for a slow client; then its connection ends
+SIGN_OF_LIFE_S = 15.0  # our choice: a comment line for a client without messages
+MOST_UNREAD = 256  # messages waiting for a slow client; with more, its connection ends
 _LOOK_S = 0.02
 
 Destination = Annotated[
@@ -35,16 +35,16 @@ Port = Annotated[int, Query(ge=0, le=255)]
 
 
 class DataSent(BaseModel):
-    """A message that the gateway's node took."""
+    """A message accepted by the gateway's node."""
 
-    ticket: int = Field(description="Counts the messages of the gateway's node.")
+    ticket: int = Field(description="Sequence number of the message at the gateway's node.")
     state: TicketState
 
 
 def add_data_requests(
     app: FastAPI, users: UsersDesk, guards: Sequence[Depends], refusals: Responses
 ) -> None:
-    """`users` is the desk of the gateway's own node."""
+    """Add both requests; `users` is the desk of the gateway's own node."""
 
     @app.post(
         "/nodes/{id}/data",
@@ -101,7 +101,7 @@ def add_data_requests(
 
 
 async def _over(sending: Sending, wait_s: float) -> None:
-    """Let the node take the message, and then wait for its last state."""
+    """Wait until the node has accepted the message, then for its final state."""
     until_s = time.monotonic() + wait_s
     give_up_s = time.monotonic() + HANDOVER_S  # then `ticket` raises
     while not sending.is_over:

@@ -1,4 +1,4 @@
-"""An application with what all HTTP sides of nodes share: guard, token, and errors with a reason.
+"""The common base of all nodes' HTTP applications: guard, token, and errors with a reason.
 
 No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
 Python 3.8.
@@ -42,7 +42,7 @@ REFUSALS: Responses = {
     503: {"model": Refusal, "description": "Not done; nothing was sent"},
     504: {"model": Refusal, "description": "Started, but not finished in time"},
 }
-"""What any request may be answered with."""
+"""Possible refusals of any request."""
 
 
 def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, List[Guard]]:
@@ -55,7 +55,7 @@ def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, 
         description=description,
         version="1",
         redoc_url=None,
-        # Each operation has one spelling.
+        # Each operation has exactly one URL.
         redirect_slashes=False,
     )
     app.add_middleware(RequestGuard, access=access)

@@ -41,13 +41,13 @@ class HttpInternet(IInternetConnection):
         mesh: Callable[[int], dict[str, Any]] | None = None,
         users: UsersDesk | None = None,
     ) -> None:
-        """Take the port (0: any free one).
+        """Open the port (0: any free one).
 
         `submit` runs a function on the thread that owns the gateway. Without a token only this
-        machine may send requests; with one, `names` are those of this machine that may be asked
-        for. With an `origin` goals may be given in degrees; the desk of its
-        node's `users` sends and receives messages. Raises ConfigurationError for an
-        address that is not available, or that other machines can reach while there is no token.
+        machine may send requests; with one, `names` are the host names of this machine that clients
+        may use. With an `origin`, goals may be given in degrees; the node's `users` desk sends and
+        receives messages. Raises ConfigurationError for an address that is not available, or that
+        other machines can reach without a token.
         """
         access = access_for(bind_address, token, own_names(*names) if token else ())
         self._desk = GatewayDesk(submit, answer_within_s)
@@ -68,7 +68,7 @@ class HttpInternet(IInternetConnection):
         return self._server.url
 
     def connect(self, commands: IGatewayCommands) -> None:
-        """Answer requests, from what `commands` reports, until disconnect; only once."""
+        """Answer requests, from the reports of `commands`, until `disconnect`; only once."""
         self._desk.open(commands)
         self._server.start()
         _log.info("gateway %d: orders over HTTP at %s/docs", commands.get_node_id(), self.url)

@@ -1,8 +1,8 @@
 """MqttInternet: users' messages between a gateway and an MQTT broker (paho-mqtt).
 
-Delivery is "at least once" on both sides. What the gateway received waits in memory until the
-broker has it, also while there is no connection. A message from the broker is acknowledged only
-when its node has it or it was given up, so that the broker keeps it if the gateway restarts.
+Delivery is "at least once" on both sides. Received messages wait in memory until the broker has
+acknowledged them, even while there is no connection. A message from the broker is acknowledged only
+when the node has delivered it or given it up, so the broker keeps it if the gateway restarts.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ from drone_mesh.internet.mqtt_topics import Broker, Topics
 from drone_mesh.users.desk import UsersDesk
 
 QOS = 1  # at least once
-KEEP_ALIVE_S = 15  # our choice: how soon a broken connection is noticed, and the last will sent
-MOST_WAITING = 10_000  # our choice: messages for a broker that is gone, then new ones are dropped
+KEEP_ALIVE_S = 15  # our choice: time until a broken connection is noticed and the last will is sent
+MOST_WAITING = 10_000  # our choice: messages for an absent broker; then new ones are dropped
 STATE_PERIOD_S = 5.0  # our choice
-RETRY_S = 0.5  # our choice: after the mesh's queue was full
+RETRY_S = 0.5  # our choice: pause after the mesh's queue was full
 _DELAYS_S = (1, 30)  # our choice: shortest and longest pause between attempts to connect
 
 _log = logging.getLogger(__name__)
 
 
 class _Unacknowledged:
-    """A message that came from the broker."""
+    """A message from the broker that is not acknowledged yet."""
 
     def __init__(self, message: mqtt.MQTTMessage) -> None:
         self._content = message.topic, message.payload
-        self.is_over = False  # it arrived in the mesh, or was refused or given up
+        self.is_over = False  # delivered in the mesh, refused or given up
 
     def is_of(self, message: mqtt.MQTTMessage) -> bool:
         return self._content == (message.topic, message.payload)
@@ -60,9 +60,9 @@ class _Unacknowledged:
 class MqttInternet(IInternetConnection):
     """The MQTT connection of a gateway.
 
-    Threads: paho's, which calls `_on_...`; one for the states, which also hands in again what the
-    mesh refused for want of room; the node's, which calls `observe`, `_received` and what follows a
-    message. paho's client may be used by all.
+    Threads: paho's, which calls `_on_...`; one that publishes states and resubmits messages for
+    which the mesh had no room; the node's, which calls `observe`, `_received` and message
+    callbacks. All may use paho's client.
     """
 
     def __init__(
@@ -73,9 +73,9 @@ class MqttInternet(IInternetConnection):
         ca_file: Path | None = None,
         sends: bool = True,
     ) -> None:
-        """`submit` runs a function on the node's thread; `sends`: what is published on tx.
+        """`submit` runs a function on the node's thread; `sends`: forward what is published on tx.
 
-        Where several gateways use one broker, only one of them should send. Raises
+        If several gateways use one broker, only one of them should forward. Raises
         ConfigurationError for a file that cannot be read.
         """
         self._submit = submit
@@ -89,13 +89,13 @@ class MqttInternet(IInternetConnection):
         self._states: dict[int, str] = {}  # as published; for the thread of the states
         self._lock = threading.Lock()
         self._to_retry: list[mqtt.MQTTMessage] = []  # under the lock
-        # What the broker does not know to be acknowledged, by packet id. Under the lock.
+        # Messages whose acknowledgement the broker has not received, by packet id. Under the lock.
         self._unacknowledged: dict[int, _Unacknowledged] = {}
         self._dropped = 0
         self._client = mqtt.Client(
             CallbackAPIVersion.VERSION2,
             client_id=f"drone_mesh-{broker.mesh}-{self._node}",
-            clean_session=False,  # the broker keeps what comes while this program is away
+            clean_session=False,  # the broker keeps messages while this program is offline
             manual_ack=True,
         )
         self._client.max_queued_messages_set(MOST_WAITING)
@@ -117,7 +117,7 @@ class MqttInternet(IInternetConnection):
         self._complained = False
 
     def connect(self, commands: IGatewayCommands) -> None:
-        """Connect as soon as the broker answers; never waits for it."""
+        """Connect as soon as the broker answers; returns at once."""
         self._client.connect_async(self._broker.host, self._broker.port, KEEP_ALIVE_S)
         self._client.loop_start()
         self._end_subscription = self._users.subscribe(self._received)
@@ -127,7 +127,7 @@ class MqttInternet(IInternetConnection):
         self._watch.start()
 
     def disconnect(self) -> None:
-        """Disconnect from the broker, and end the threads."""
+        """Disconnect from the broker and end the threads."""
         self._stopped.set()
         self._end_subscription()
         if self._watch is not None:
@@ -144,14 +144,14 @@ class MqttInternet(IInternetConnection):
     # From the mesh to the broker ---------------------------------------------------------------
 
     def observe(self, event: MeshEvent) -> None:
-        """A MeshObserver: publishes what happened to a node."""
+        """A MeshObserver: publishes an event of a node."""
         peer = event.peer if event.peer <= MAX_NODE_ID else None
         self._say(
             str(event.node), {"event": event.kind.value, "peer": peer, "detail": event.detail}
         )
 
     def _received(self, message: ReceivedMessage) -> None:
-        """On the node's thread; paho keeps the message until the broker has it."""
+        """On the node's thread; paho keeps the message until the broker has acknowledged it."""
         topic = self._topics.rx(message.sender, message.port)
         if self._client.publish(topic, message.payload, QOS).rc == mqtt.MQTT_ERR_QUEUE_SIZE:
             self._dropped += 1
@@ -173,10 +173,10 @@ class MqttInternet(IInternetConnection):
             due_s -= RETRY_S
             if due_s <= 0.0 and self._client.is_connected():
                 due_s = STATE_PERIOD_S
-                self._submit(lambda now_s: self._tell_states(commands, now_s))
+                self._submit(lambda now_s: self._publish_states(commands, now_s))
 
-    def _tell_states(self, commands: IGatewayCommands, now_s: float) -> None:
-        """On the node's thread: publish what has changed."""
+    def _publish_states(self, commands: IGatewayCommands, now_s: float) -> None:
+        """On the node's thread: publish changed states."""
         states = {node.node_id: _state(node, now_s) for node in commands.get_known_nodes()}
         states[self._node] = json.dumps({"online": True, "node": self._node, "gateway": True})
         for node, state in states.items():
@@ -189,7 +189,7 @@ class MqttInternet(IInternetConnection):
     def _on_message(self, _client: mqtt.Client, _userdata: Any, message: mqtt.MQTTMessage) -> None:
         with self._lock:
             known = self._unacknowledged.get(message.mid)
-            # A broker that was restored may give the packet id to another message.
+            # A restored broker may reuse the packet id for another message.
             is_again = message.dup and known is not None and known.is_of(message)
             if not is_again:
                 self._unacknowledged[message.mid] = _Unacknowledged(message)
@@ -257,7 +257,7 @@ class MqttInternet(IInternetConnection):
         self._submit(lambda _now_s: self._states.clear())  # the will may have replaced them
 
     def _on_connect_fail(self, _client: mqtt.Client, _userdata: Any) -> None:
-        error = sys.exc_info()[1]  # paho calls this while it handles the error
+        error = sys.exc_info()[1]  # paho calls this from its error handler
         if isinstance(error, ssl.SSLCertVerificationError):
             self._complain(f"is not trusted: {error.verify_message}")
         else:
@@ -275,7 +275,7 @@ class MqttInternet(IInternetConnection):
             self._complain("broke the connection")
 
     def _complain(self, what: str) -> None:
-        """One line per outage."""
+        """Log one line per outage."""
         if not self._complained:
             self._complained = True
             _log.warning(

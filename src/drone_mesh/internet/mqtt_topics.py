@@ -1,13 +1,14 @@
-"""The topics of MQTT and what their messages hold.
+"""The MQTT topics and the content of their messages.
 
     drone_mesh/<mesh>/<node>/rx[/<port>]   a message that the gateway received from that node
     drone_mesh/<mesh>/<node>/tx[/<port>]   publish here to send a message to that node
-    drone_mesh/<mesh>/<node>/state         retained: JSON, what the gateway knows of the node
-    drone_mesh/<mesh>/<node>/event         JSON: what became of a message for that node ("state"),
-                                           or what happened to that node ("event")
+    drone_mesh/<mesh>/<node>/state         retained: JSON, the node's state as known to the gateway
+        drone_mesh/<mesh>/<node>/event         JSON: outcome of a message for that node ("state"),
+    or an
+                                               event of that node ("event")
 
-`rx` and `tx` hold the bytes of the message and nothing else; port 0 has no level of its own. <node>
-is an id, for `tx` also "all".
+`rx` and `tx` carry only the bytes of the message; port 0 has no level of its own. <node> is an id,
+for `tx` also "all".
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _PORTS = {"mqtt": 1883, "mqtts": 8883}
 
 @dataclass(frozen=True)
 class Broker:
-    """Where the broker is, and as whom to connect."""
+    """The address of the broker, and the user to log in as."""
 
     host: str
     port: int
@@ -75,7 +76,7 @@ def parse_broker(url: str, password: str = "") -> Broker:
 
 
 class Destination(NamedTuple):
-    """What a topic of `tx` says."""
+    """The destination that a `tx` topic names."""
 
     to: int
     port: int
@@ -88,20 +89,20 @@ class Topics:
         self._prefix = f"{ROOT}/{mesh}"
 
     def rx(self, node: int, port: int) -> str:
-        """Where a message from `node` goes."""
+        """The topic for messages from `node`."""
         return f"{self._prefix}/{node}/rx" + (f"/{port}" if port else "")
 
     def state(self, node: int) -> str:
-        """Where the state of `node` stays."""
+        """The topic for the retained state of `node`."""
         return f"{self._prefix}/{node}/state"
 
     def event(self, node: str) -> str:
-        """Where the outcome of a message for `node`, and what happens to it, is published."""
+        """The topic for outcomes of messages for `node`, and for its events."""
         return f"{self._prefix}/{node}/event"
 
     @property
     def all_tx(self) -> list[str]:
-        """Filters for every topic of `tx`."""
+        """Filters that match every `tx` topic."""
         return [f"{self._prefix}/+/tx", f"{self._prefix}/+/tx/+"]
 
     def node_of(self, topic: str) -> str:
@@ -109,7 +110,7 @@ class Topics:
         return topic[len(self._prefix) + 1 :].partition("/")[0]
 
     def destination(self, topic: str) -> Destination | None:
-        """Where a message on a topic of `tx` is to go; None: the topic is invalid."""
+        """The destination of a message on a `tx` topic; None if the topic is invalid."""
         node, _tx, rest = topic[len(self._prefix) + 1 :].partition("/tx")
         port = rest[1:] or "0"
         if not (port.isascii() and port.isdigit() and int(port) <= 255):

@@ -1,4 +1,4 @@
-"""Loads the web server when a gateway is to take orders over HTTP, and not before."""
+"""Imports the HTTP and MQTT libraries only when a gateway needs them."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def http_internet(
     token: str = "",
     **settings: Any,
 ) -> IInternetConnection:
-    """An HttpInternet, see there. Raises ConfigurationError also if its libraries are missing."""
-    try:  # they take a second to load, and only gateways with HTTP need them
+    """Create an HttpInternet. Also raises ConfigurationError if its libraries are missing."""
+    try:  # they take a second to load
         from drone_mesh.internet.http_internet import HttpInternet
     except ImportError as error:
         raise ConfigurationError(
@@ -36,7 +36,7 @@ def http_internet(
 def mqtt_internet(
     submit: Submit, users: UsersDesk, broker: Broker, **settings: Any
 ) -> MqttInternet:
-    """An MqttInternet, see there. Raises ConfigurationError also if its library is missing."""
+    """Create an MqttInternet. Also raises ConfigurationError if its library is missing."""
     try:
         from drone_mesh.internet.mqtt_internet import MqttInternet
     except ImportError as error:
@@ -47,7 +47,7 @@ def mqtt_internet(
 
 
 def status_server(status: ReadStatus, *settings: Any) -> StatusServer:
-    """A StatusServer, see there. Raises ConfigurationError also if its libraries are missing."""
+    """Create a StatusServer. Also raises ConfigurationError if its libraries are missing."""
     try:
         from drone_mesh.internet.status import StatusServer
     except ImportError as error:

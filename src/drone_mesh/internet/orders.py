@@ -1,4 +1,4 @@
-"""The requests about orders that a gateway has sent: what became of them.
+"""Orders over HTTP: the outcome of each order that a gateway has sent.
 
 No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
 Python 3.8.
@@ -24,7 +24,7 @@ OrderNumber = Annotated[
 
 
 class OrderReport(BaseModel):
-    """One order, as the gateway knows it."""
+    """One order as known to the gateway."""
 
     id: int
     drone: int
@@ -51,16 +51,16 @@ def add_order_requests(
     refusals: Responses,
     order_refusals: Responses,
 ) -> None:
-    """`GET /orders`, which may be answered with `refusals`, and `GET /orders/{id}`."""
+    """Add `GET /orders`, which may also answer with `refusals`, and `GET /orders/{id}`."""
 
     @app.get("/orders", dependencies=guards, responses=refusals)
     async def orders() -> OrderReports:
-        """What became of the orders: the latest of each drone, and up to 100 older ones."""
+        """The outcomes of the orders: the latest of each drone, and up to 100 older ones."""
         return await desk.ask(_report_orders)
 
     @app.get("/orders/{id}", dependencies=guards, responses=order_refusals)
     async def order(id: OrderNumber) -> OrderReport:
-        """What became of one order."""
+        """The outcome of one order."""
         for report in (await desk.ask(_report_orders)).orders:
             if report.id == id:
                 return report

@@ -1,4 +1,4 @@
-"""Refuses requests that are too large or come from a page of another site."""
+"""Refuses requests that are too large or that a page of another site sends."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST_BODY_BYTES = 1024  # our choice: five times the longest goal in JSON
-MOST_DISCARDED_BYTES = 10_000_000  # our choice: of a body that is refused
+MOST_DISCARDED_BYTES = 10_000_000  # our choice: of a refused body
 BODY_WITHIN_S = 2.0  # our choice
 MOST_TARGET_BYTES = 1024  # our choice: five times the longest valid address
 
 
 class _PromptBody:
-    """Hands out a request's body; a client that is slow with it counts as gone."""
+    """Delivers a request's body; a client that sends it too slowly counts as disconnected."""
 
     def __init__(self, receive: Receive) -> None:
         self._receive = receive
@@ -31,7 +31,7 @@ class _PromptBody:
 
     async def __call__(self) -> Message:
         if self._complete:
-            return await self._receive()  # waits for the client to go
+            return await self._receive()  # waits until the client disconnects
         try:
             message = await asyncio.wait_for(self._receive(), BODY_WITHIN_S)
         except asyncio.TimeoutError:
@@ -66,7 +66,7 @@ class RequestGuard:
         status, reason = refusal
         self.refused[status] += 1
         if status == 413 and "expect" not in Headers(scope=scope):
-            # A client that is still sending would get a reset and not the answer.
+            # A client that is still sending would get a reset instead of the answer.
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(_discard_body(receive), BODY_WITHIN_S)
         response = JSONResponse({"detail": reason}, status, headers={"Connection": "close"})

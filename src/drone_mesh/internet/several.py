@@ -12,7 +12,7 @@ class SeveralInternets(IInternetConnection):
         self._connections = connections
 
     def connect(self, commands: IGatewayCommands) -> None:
-        """Connect all, in their order."""
+        """Connect all, in order."""
         for connection in self._connections:
             connection.connect(commands)
 

@@ -1,4 +1,4 @@
-"""The request about the node itself, and a server for routers, which answer nothing else.
+"""The status of the node over HTTP, and a server for routers, which answer only this.
 
 No `from __future__ import annotations` here: FastAPI reads the annotations at run time, also on
 Python 3.8.
@@ -14,10 +14,10 @@ from drone_mesh.web.access import access_for, own_names
 from drone_mesh.web.server_thread import ServerThread
 from drone_mesh.web.tls import Certificate
 
-MOST_CONNECTIONS = 64  # our choice; more are answered 503
+MOST_CONNECTIONS = 64  # our choice; further ones get 503
 
 ReadStatus = Callable[[], Dict[str, Any]]
-"""What a node says of itself; any thread may call it."""
+"""Returns a node's status; any thread may call it."""
 
 
 def add_status_request(app: FastAPI, guards: Sequence[Guard], status: ReadStatus) -> None:
@@ -26,7 +26,7 @@ def add_status_request(app: FastAPI, guards: Sequence[Guard], status: ReadStatus
 
     @app.get("/status", dependencies=list(guards), responses=refusals)
     async def node_status() -> Dict[str, Any]:
-        """What this node says of itself: mesh, radio, flight, version."""
+        """The status of this node: mesh, radio, flight, version."""
         return status()
 
 
@@ -42,9 +42,9 @@ class StatusServer(ServerThread):
         certificate: Optional[Certificate] = None,
         names: Iterable[str] = (),
     ) -> None:
-        """Take the port (0: any free one). Raises ConfigurationError as HttpInternet does."""
+        """Open the port (0: any free one). Raises ConfigurationError as HttpInternet does."""
         access = access_for(bind_address, token, own_names(*names) if token else ())
-        app, guards = guarded_app("drone_mesh router", "Says how this node is.", access)
+        app, guards = guarded_app("drone_mesh router", "Reports the status of this node.", access)
         add_status_request(app, guards, status)
         super().__init__(
             app,

@@ -1,1 +1,1 @@
-"""The mesh on Raspberry Pis: one node for each, with a real radio. No ROS in here."""
+"""The mesh on Raspberry Pis: one node each, with a real radio. Without ROS."""

@@ -1,4 +1,4 @@
-"""The options for an emulated air that several processes share."""
+"""The options for an emulated air shared by several processes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LOCAL = "127.0.0.1"
 
 
 class AirAddress(NamedTuple):
-    """Where an emulated air is served."""
+    """The address at which an emulated air is served."""
 
     host: str
     port: int
@@ -21,14 +21,14 @@ class AirAddress(NamedTuple):
 
 @dataclass(frozen=True)
 class AirOptions:
-    """How a node takes part in such an air; neither: it does not."""
+    """How a node joins or serves a shared emulated air; neither: not at all."""
 
     join: AirAddress | None = None
     serve: AirAddress | None = None
 
 
 def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
-    """Add them to a parser or a group."""
+    """Add the options to a parser or a group."""
     node.add_argument(
         "--emulated-air",
         metavar="[HOST:]PORT",
@@ -46,7 +46,7 @@ def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
 
 
 def air_options(parsed: argparse.Namespace) -> AirOptions:
-    """What was asked for. Raises ConfigurationError."""
+    """The parsed options. Raises ConfigurationError."""
     join = _address("--emulated-air", parsed.emulated_air)
     serve = _address("--emulated-air-serve", getattr(parsed, "emulated_air_serve", None))
     if join is not None and serve is not None:

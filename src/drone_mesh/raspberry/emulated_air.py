@@ -1,4 +1,4 @@
-"""An emulated air on the wall clock, to try the programs without hardware."""
+"""An emulated air on the wall clock, for running the programs without hardware."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
-# From one column to the next: 0.7 of the distance at which one frame in four is lost (0 dBm, path
+# Distance between columns: 0.7 of the distance at which one frame in four is lost (0 dBm, path loss
+# exponent 2.7). The next column is in range, the one after it is not.
 # loss exponent 2.7). The next column is in range, the one after it is not.
 COLUMN_M = {DataRate.KBPS_250: 70.0, DataRate.MBPS_1: 32.0, DataRate.MBPS_2: 25.0}
 MOST_COLUMNS = 4  # of routers; over more hops, collisions delay the gateway's answers too long
-FEWEST_IN_COLUMN = 2  # so that each router has a detour
+FEWEST_IN_COLUMN = 2  # so that each router has a second route
 _COLUMN_WIDTH = 0.5  # from its first to its last router, in distances between columns
 
 
@@ -63,7 +64,7 @@ class EmulatedAir:
         return column_place(node_id, self._settings.data_rate, self._in_column)
 
     def serve(self, host: str, port: int) -> tuple[str, int]:
-        """Let other processes join; returns the address. Raises ConfigurationError."""
+        """Let other processes join; returns (host, port). Raises ConfigurationError."""
         try:
             self._server = AirServer(self._air, host, port)
         except OSError as error:
@@ -75,7 +76,7 @@ class EmulatedAir:
     def radio(
         self, node_id: int, settings: RadioSettings, place: Location | None = None
     ) -> NRF24LowLevelInterface:
-        """The driver of a new chip at the place of that node, or at another one."""
+        """The driver of a new chip at that node's position, or at `place`."""
         place = place or self.place(node_id)
         chip = EmulatedChip(self._air, f"node {node_id}", place.to_vector())
         self._chips[node_id] = chip
@@ -89,11 +90,11 @@ class EmulatedAir:
         )
 
     def move(self, node_id: int, place: Location) -> None:
-        """Bring the radio of that node to a place."""
+        """Move the radio of that node to this position."""
         self._chips[node_id].position = place.to_vector()
 
     def close(self) -> None:
-        """End the air and write the trace. The radios must be closed before."""
+        """End the air and write the trace. Close the radios first."""
         if self._server is not None:
             self._server.close()
         self._clock.close()

@@ -1,4 +1,4 @@
-"""The drones of emulated nodes: on the ground, or simulated MAVLink vehicles that really fly."""
+"""The drones of emulated nodes: on the ground, or simulated MAVLink vehicles that fly."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class FleetOptions:
-    """Which drones the emulated nodes have."""
+    """The drones of the emulated nodes."""
 
     drones: str = GROUND  # one of _KINDS
     ground_stations: tuple[str, ...] = ()  # HOST:PORT
@@ -54,7 +54,7 @@ def add_fleet_options(parser: argparse.ArgumentParser) -> None:
 
 
 def fleet_options(parsed: argparse.Namespace) -> FleetOptions:
-    """What was asked for. Raises ConfigurationError."""
+    """The parsed options. Raises ConfigurationError."""
     if parsed.drones != GROUND and not parsed.emulated:
         raise ConfigurationError("--drones needs --emulated; use --drone for a real one")
     if parsed.ground_station and parsed.drones == GROUND:
@@ -63,10 +63,10 @@ def fleet_options(parsed: argparse.Namespace) -> FleetOptions:
 
 
 class EmulatedFleet:
-    """Engines for the nodes on an emulated air; the radios go where the drones fly."""
+    """Engines for the nodes on an emulated air; each radio follows its drone."""
 
     def __init__(self, fleet: FleetOptions, flight: FlightOptions, air: EmulatedAir) -> None:
-        """Starts the simulated vehicles, if there are to be some; `close` ends them."""
+        """Start the simulated vehicles, if there are any; `close` ends them."""
         self.air = air
         self._flight = flight
         self._engines: dict[int, IDroneEngine] = {}
@@ -101,7 +101,7 @@ class EmulatedFleet:
         return engine
 
     def move_radios(self) -> None:
-        """Bring each radio to where its drone is."""
+        """Move each radio to the position of its drone."""
         for node_id, engine in self._engines.items():
             place = _place(engine)
             if place is not None:
@@ -109,7 +109,7 @@ class EmulatedFleet:
 
     @property
     def origin(self) -> Origin | None:
-        """Where the frame of the drones lies on the earth; None: they have none."""
+        """The geographic origin of the drones' frame; None: they have none."""
         return self._flight.origin
 
     @property

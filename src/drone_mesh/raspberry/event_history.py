@@ -1,4 +1,4 @@
-"""EventHistory: the latest events of the nodes of one program, for the log and for readers."""
+"""EventHistory: recent events of the nodes of one program, for the log and for readers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind, MeshObserver
 
-EVENTS_KEPT = 500  # our choice: an hour of a restless mesh
+EVENTS_KEPT = 500  # our choice: an hour of a mesh with frequent changes
 
 _ABOUT_GATEWAYS = frozenset(
     (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class EventHistory:
-    """Any thread. The lock guards number and history, and is held for no longer than a copy."""
+    """Any thread. The lock guards number and history, and is held only for a copy."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -30,7 +30,7 @@ class EventHistory:
         self._others: list[MeshObserver] = []  # complete before the nodes start
 
     def pass_on(self, observer: MeshObserver) -> None:
-        """Have `observer` called with each event, too. Before the nodes start."""
+        """Also pass each event to `observer`. Before the nodes start."""
         self._others.append(observer)
 
     def observe(self, event: MeshEvent) -> None:
@@ -43,7 +43,7 @@ class EventHistory:
             observer(event)
 
     def since(self, number: int, started_s: float) -> list[dict[str, Any]]:
-        """The events after this number, oldest first, as JSON values; times count from a start."""
+        """Events after this number, oldest first, as JSON values; times relative to the start."""
         with self._lock:
             kept = list(self._kept)
         return [
@@ -61,7 +61,7 @@ class EventHistory:
 
 
 def _log_event(event: MeshEvent) -> None:
-    """One line per event; orders that are lost or flown have their own lines already."""
+    """Log one line per event; orders that were lost or flown have their own lines already."""
     if event.kind in _WITHOUT_LINE:
         return
     words = [event.kind.value]

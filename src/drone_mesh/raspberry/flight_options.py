@@ -1,4 +1,4 @@
-"""The options of raspberry_router and raspberry_gateway that are about the drone."""
+"""The drone options of raspberry_router and raspberry_gateway."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def add_flight_options(parser: argparse.ArgumentParser) -> None:
 
 
 def flight_options(parsed: argparse.Namespace) -> FlightOptions:
-    """What was asked for. Raises ConfigurationError."""
+    """The parsed options. Raises ConfigurationError."""
     if parsed.emulated and parsed.drone != GROUND:
         raise ConfigurationError("--drone is for a single node; use --drones with --emulated")
     return FlightOptions(

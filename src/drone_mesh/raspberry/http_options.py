@@ -1,4 +1,4 @@
-"""The options of a node's HTTP side."""
+"""The HTTP options of a node."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
 
 @dataclass(frozen=True)
 class HttpOptions:
-    """The address at which a node answers."""
+    """The address on which a node answers, and its access rules."""
 
     address: str
     port: int
     token: str  # empty: none
-    names: tuple[str, ...] = ()  # of this machine, beside its host name
+    names: tuple[str, ...] = ()  # of this machine, besides its host name
     certificate: Certificate | None = None  # None: plain HTTP
 
 
@@ -63,7 +63,7 @@ def add_http_options(http: argparse._ArgumentGroup) -> None:
 
 
 def http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> HttpOptions:
-    """What was asked for. Raises ConfigurationError."""
+    """The parsed options. Raises ConfigurationError."""
     token = environment.get(TOKEN_VARIABLE, "")
     if parsed.token_file is not None:
         try:

@@ -1,4 +1,4 @@
-"""The program raspberry_key: makes the key files of a mesh (docs/security.md, "Keys")."""
+"""The program raspberry_key: creates the key files of a mesh (docs/security.md, "Keys")."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drone_mesh.raspberry.wiring_options import whole
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make a file; the exit status is 1 if that is not possible."""
+    """Create a key file; the exit status is 1 if that is not possible."""
     parser = argparse.ArgumentParser(
         "raspberry_key",
         description="Makes the key files of a mesh. A key is never printed.",

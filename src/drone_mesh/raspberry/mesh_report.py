@@ -1,4 +1,4 @@
-"""What a gateway knows of its mesh: for GET /mesh, and from there for the web console."""
+"""A gateway's knowledge of its mesh: for GET /mesh, and through it for the web console."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _node(
 
 
 def _place(place: Location | None, origin: Origin | None) -> dict[str, Any]:
-    """In metres of the common frame, and in degrees where that frame has an origin."""
+    """A position in metres in the common frame, and in degrees if that frame has an origin."""
     if place is None:
         return {"place": None, "earth": None}
     metres = [round(value, 2) for value in place]

@@ -1,4 +1,4 @@
-"""The options of raspberry_gateway that are about MQTT."""
+"""The MQTT options of raspberry_gateway."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def add_mqtt_options(parser: argparse.ArgumentParser) -> None:
 
 
 def mqtt_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> MqttOptions | None:
-    """What was asked for. Raises ConfigurationError."""
+    """The parsed options. Raises ConfigurationError."""
     if parsed.mqtt is None:
         if parsed.mqtt_password_file is not None or parsed.mqtt_ca is not None:
             raise ConfigurationError("--mqtt-password-file and --mqtt-ca need --mqtt")

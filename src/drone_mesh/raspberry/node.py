@@ -24,7 +24,7 @@ from drone_mesh.raspberry.options import Options
 from drone_mesh.users.desk import UsersDesk
 from drone_mesh.users.local_socket import local_socket
 
-ALIVE_WITHIN_S = 20.0  # our choice: two check periods; systemd's watchdog waits longer
+ALIVE_WITHIN_S = 20.0  # our choice: two check periods, less than systemd's watchdog waits
 
 _log = logging.getLogger(__name__)
 
@@ -33,9 +33,9 @@ MakeInternet = Callable[["RadioNode"], IInternetConnection]
 
 
 class RadioNode:
-    """A router, or a gateway if it gets an internet connection. For one thread at a time.
+    """A router, or a gateway if it has an internet connection. For one thread at a time.
 
-    The node's own thread works in the component, from start to stop.
+    From start to stop, the node's own thread runs the component.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class RadioNode:
         self._started_s = self._beat_s = time.monotonic()
 
     def submit(self, work: Work) -> None:
-        """Have the node's own thread do this soon. Any thread."""
+        """Run this soon on the node's own thread. Any thread."""
         self._slot.submit(work)
 
     def mesh(self, after: int) -> dict[str, Any]:
@@ -118,7 +118,7 @@ class RadioNode:
         self._changes.look(component.get_known_nodes(), component.get_node_reports(), now_s)
 
     def status(self) -> dict[str, Any]:
-        """What `node_status` says; any thread may call it."""
+        """The result of `node_status`; any thread may call it."""
         now_s = time.monotonic()
         return node_status(
             self.component,
@@ -131,7 +131,7 @@ class RadioNode:
         )
 
     def is_alive(self) -> bool:
-        """Whether the node's own thread came to its work lately; to be asked again and again."""
+        """Whether the node's own thread has run recently; to be called repeatedly."""
         self._slot.submit(self._beat)
         return time.monotonic() - self._beat_s < ALIVE_WITHIN_S
 

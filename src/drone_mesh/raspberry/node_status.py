@@ -1,4 +1,4 @@
-"""What a node says of itself: for GET /status, for one line in the log, and for a table."""
+"""The status of a node: for GET /status, for one log line, and for a table."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def node_status(
     uptime_s: float,
     now_s: float,
 ) -> dict[str, Any]:
-    """Everything, as JSON values. Reads snapshots, so any thread may call it."""
+    """The complete status as JSON values. Reads snapshots, so any thread may call it."""
     neighbours = [
         {
             "id": node,
@@ -62,7 +62,7 @@ def node_status(
 
 
 def one_line(status: dict[str, Any]) -> str:
-    """The most important of it."""
+    """The most important parts, in one line."""
     connected = (
         f"gateway {status['gateway']}, {status['hops']} hops"
         if status["connected"]
@@ -78,7 +78,7 @@ def one_line(status: dict[str, Any]) -> str:
 
 
 def table(status: dict[str, Any]) -> str:
-    """All of it, one line each."""
+    """The complete status, one value per line."""
     rows: list[tuple[str, Any]] = []
     for key, value in status.items():
         if isinstance(value, dict):
@@ -92,7 +92,7 @@ def table(status: dict[str, Any]) -> str:
 
 
 def _link(neighbour: dict[str, Any]) -> str:
-    """A neighbour in words: when it was heard, and how well packets reach it."""
+    """A neighbour as text: when it was heard, and how well packets reach it."""
     words = f"{neighbour['heard_s_ago']:g} s ago"
     if neighbour.get("tries_per_packet") is not None:
         words += (

@@ -36,8 +36,8 @@ LOG_LEVELS = ("debug", "info", "warning", "error")
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
-CLEARANCE_M = 5.0  # our choice: a position by satellite is good to some metres
-RANGE_M = 100.0  # our choice: hardly a packet was lost at it (nrf24/emulator/nrf24_range.csv)
+CLEARANCE_M = 5.0  # our choice: satellite positions are accurate to a few metres
+RANGE_M = 100.0  # our choice: hardly any packet was lost there (nrf24/emulator/nrf24_range.csv)
 
 
 @dataclass(frozen=True)

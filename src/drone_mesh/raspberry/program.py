@@ -1,4 +1,4 @@
-"""The run of raspberry_router and raspberry_gateway, from start to end."""
+"""Runs raspberry_router and raspberry_gateway, from start to end."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ from drone_mesh.stopping import StopRequest
 if TYPE_CHECKING:
     from drone_mesh.internet.status import StatusServer
 
-LOOK_PERIOD_S = 0.5  # our choice: how often the main thread looks at the nodes
+LOOK_PERIOD_S = 0.5  # our choice: how often the main thread checks the nodes
 ALIVE_PERIOD_S = 5.0  # our choice: several times in WatchdogSec of the units
 STATUS_PERIOD_S = 60.0  # our choice: one line a minute for each node
 LONELY_AFTER_S = 15.0  # our choice: one check period and half of the next
-LONELY_AGAIN_S = 300.0  # our choice: how often the warning is repeated
+LONELY_AGAIN_S = 300.0  # our choice: period of the repeated warning
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _log = logging.getLogger(__name__)
@@ -63,7 +63,7 @@ def run(program: str, parse: Callable[[], Options]) -> int:
 
 @contextlib.contextmanager
 def _signals() -> Iterator[StopRequest]:
-    """A request that Ctrl-C, TERM or HUP make; a second signal ends the program at once."""
+    """A stop request set by Ctrl-C, TERM or HUP; a second signal ends the program at once."""
     with StopRequest() as request:
 
         def end(number: int, _frame: FrameType | None) -> None:
@@ -119,7 +119,7 @@ def _run(options: Options, request: StopRequest) -> None:
 
 
 def _stop(nodes: Sequence[RadioNode]) -> None:
-    """Stop all at once; one by one, each would still call those that have stopped."""
+    """Stop all nodes in parallel; one by one, each would still call nodes that have stopped."""
     with ThreadPoolExecutor(len(nodes)) as pool:
         for stopped in [pool.submit(node.stop) for node in nodes]:
             stopped.result()
@@ -188,11 +188,11 @@ def _emulated_nodes(options: Options, fleet: EmulatedFleet) -> list[RadioNode]:
 
 
 def _stay() -> None:
-    """Real radios go with their drones by themselves."""
+    """Does nothing: real radios move with their drones."""
 
 
 def _orders(options: Options) -> MakeInternet | None:
-    """How a gateway takes orders; None for a router."""
+    """How a gateway receives orders; None for a router."""
     return _internet(options) if options.gateway else None
 
 
@@ -236,7 +236,7 @@ def _status_server(node: RadioNode, http: HttpOptions) -> StatusServer:
 
 
 class _NoInternet(IInternetConnection):
-    """No connection: the gateway beside emulated routers takes no orders."""
+    """No connection: the gateway beside emulated routers receives no orders."""
 
     def connect(self, commands: IGatewayCommands) -> None:
         pass
@@ -246,7 +246,7 @@ class _NoInternet(IInternetConnection):
 
 
 def without_internet(_node: RadioNode) -> IInternetConnection:
-    """For a gateway that takes no orders."""
+    """For a gateway that receives no orders."""
     return _NoInternet()
 
 
@@ -267,7 +267,7 @@ class _Watch:
 
     def look(self, now_s: float) -> None:
         """Log what has changed; to be called periodically."""
-        self._tell_status(now_s)
+        self._log_status(now_s)
         if len(self._nodes) > 1:
             self._count_connected(now_s)
         elif self._nodes[0].component.get_neighbours():
@@ -280,7 +280,7 @@ class _Watch:
                 self._options.node_id,
             )
 
-    def _tell_status(self, now_s: float) -> None:
+    def _log_status(self, now_s: float) -> None:
         if now_s >= self._alive_at_s:
             self._alive_at_s = now_s + ALIVE_PERIOD_S
             alive = [node.is_alive() for node in self._nodes]

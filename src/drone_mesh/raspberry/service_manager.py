@@ -1,4 +1,4 @@
-"""Notices to systemd (sd_notify(3)): ready, alive, stopping, and a line for its own status."""
+"""Notifications to systemd (sd_notify(3)): ready, alive, stopping, and a status line."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Mapping
 
 
 class ServiceManager:
-    """Speaks to the manager that started this program; without one, nothing happens.
+    """Notifies the service manager that started this program; without one, does nothing.
 
-    Our own because it is a datagram: the library for it has had no release since 2017.
+    Our own because it sends one datagram: the library for it has had no release since 2017.
     """
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
@@ -20,15 +20,15 @@ class ServiceManager:
             self._address = "\0" + self._address[1:]  # an abstract socket
 
     def ready(self) -> None:
-        """The program works."""
+        """The program is ready."""
         self._send("READY=1")
 
     def alive(self, status: str) -> None:
-        """It still works; to be said more often than WatchdogSec."""
+        """The program is alive; to be sent more often than WatchdogSec."""
         self._send(f"WATCHDOG=1\nSTATUS={status}")
 
     def stopping(self) -> None:
-        """It ends on purpose."""
+        """The program ends on purpose."""
         self._send("STOPPING=1")
 
     def _send(self, text: str) -> None:

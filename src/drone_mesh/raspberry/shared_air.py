@@ -1,4 +1,4 @@
-"""A node on an emulated air that several processes share."""
+"""A node on an emulated air shared by several processes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from drone_mesh.web.access import is_loopback
 _log = logging.getLogger(__name__)
 
 MoveRadio = Callable[[], None]
-"""Brings the radio to where the drone is."""
+"""Moves the radio to the position of the drone."""
 
 
 def joining_node(

@@ -18,7 +18,7 @@ ANSWER_WITHIN_S = 10.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print it; the exit status is 1 if it cannot be had."""
+    """Print it; the exit status is 1 if the gateway does not answer properly."""
     parser = argparse.ArgumentParser(
         "raspberry_status",
         description="Prints the status of a gateway.",

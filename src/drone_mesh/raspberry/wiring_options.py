@@ -1,4 +1,4 @@
-"""Where a radio is connected: options that the programs of a Pi share."""
+"""The wiring of a radio: options that the programs of a Pi share."""
 
 from __future__ import annotations
 

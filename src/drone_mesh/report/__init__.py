@@ -1,1 +1,1 @@
-"""One HTML page about a recorded run. No ROS: states and events come in as plain records."""
+"""One HTML page about a recorded run. Without ROS: states and events are plain records."""

@@ -15,7 +15,7 @@ from drone_mesh.report.story import RunStory
 from drone_mesh.state.model import EventRecord
 from drone_mesh.view.palette import LIGHT
 
-MOST_NAMED = 12  # events of one kind that are labelled; more would overlap
+MOST_NAMED = 12  # labelled events of one kind; more would overlap
 MOST_IDS = 4  # of nodes in one label
 LABEL_POINTS = (8, 18)  # above their marks; labels close to each other alternate
 MARKS_AT = 1.04  # of the share's axis: above a line at 100 %
@@ -24,7 +24,7 @@ MOST_BARS_NAMED = 40  # nodes whose ids all fit below their bars
 
 
 def timeline_figure(story: RunStory) -> str:
-    """The connected share and the hops over time, with marks for what happened."""
+    """The connected share and the hops over time, with marks for events."""
     figure, (share, hops) = figure_with_rows(4.2, rows=2, heights=(2, 1))
     times = [sample.stamp_s for sample in story.samples]
     connected = with_gaps(sample.connected_share for sample in story.samples)
@@ -54,7 +54,7 @@ def with_gaps(values: Iterable[float | None]) -> list[float]:
 
 
 def messages_figure(story: RunStory) -> str:
-    """Messages that each node sent."""
+    """The number of messages that each node sent."""
     ids = sorted(story.messages_of)
     figure, (axes,) = figure_with_rows(2.4)
     gateways = {node.id for node in story.after.nodes if node.role == Role.GATEWAY}
@@ -97,7 +97,7 @@ def _mark_events(axes: Axes, story: RunStory) -> None:
 def grouped(
     events: Sequence[EventRecord], word: str, close_s: float
 ) -> Iterator[tuple[float, str]]:
-    """(time, text) of one label for all events, oldest first, within so many seconds."""
+    """Yield (time, text): one label for all events within so many seconds, oldest first."""
     rest = list(events)
     while rest:
         first_s = rest[0].stamp_s

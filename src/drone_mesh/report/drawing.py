@@ -21,7 +21,7 @@ _STYLE = {
     "grid.color": LIGHT.grid,
     "grid.linewidth": 0.6,
     "savefig.facecolor": "none",
-    "svg.hashsalt": "drone_mesh",  # so that the same run gives the same page
+    "svg.hashsalt": "drone_mesh",  # so that the same run produces the same page
     "text.color": LIGHT.ink,
     "xtick.color": LIGHT.muted,
     "ytick.color": LIGHT.muted,
@@ -32,7 +32,7 @@ _VARIABLES = {colour: f"var(--{name})" for colour, name in variable_names(LIGHT)
 def figure_with_rows(
     height_in: float, rows: int = 1, heights: Sequence[float] = (1,)
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with axes one below the other that share their x axis."""
+    """A figure with stacked axes that share their x axis."""
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
         axes = figure.subplots(
@@ -57,7 +57,7 @@ def figure_with_columns(height_in: float, columns: int) -> tuple[Figure, list[Ax
 
 
 def svg_of(figure: Figure) -> str:
-    """The figure as an SVG element, each colour of the palette as its CSS variable."""
+    """The figure as an SVG element, with each colour of the palette as its CSS variable."""
     text = io.StringIO()
     with matplotlib.rc_context(_STYLE):
         figure.savefig(text, format="svg", metadata={"Date": None})

@@ -37,7 +37,7 @@ def maps_figure(story: RunStory) -> str:
 
 
 def _limits(story: RunStory, axis: int) -> tuple[float, float]:
-    """What both maps show along one axis, in metres: all nodes and paths with room around them."""
+    """The range of both maps along one axis, in metres: all nodes and paths, with a margin."""
     positions = [
         node.position[axis]
         for mesh in (story.before, story.after)

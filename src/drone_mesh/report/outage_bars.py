@@ -1,4 +1,4 @@
-"""One bar per node that was without a gateway: what it did, and for how long."""
+"""One bar per node that was without a gateway: its phases and their durations."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def phases_of(outage: Outage, end_s: float) -> list[tuple[float, float, str, str
         stop_s = getattr(outage, attribute)
         if stop_s is None and attribute != "connected_s":
             continue
-        # A node that did not fly has nothing to reconnect after, and a node that a neighbour drew
+        # A node that did not fly had nothing to reconnect after, and a node that a neighbour drew
         # into a negotiation had no emergency of its own: both were waiting.
         if attribute == "connected_s" and outage.landed_s is None:
             name, colour = PHASES[0][1:] if outage.decided_s is None else PHASES[2][1:]

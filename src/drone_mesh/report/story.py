@@ -1,4 +1,4 @@
-"""RunStory: what happened in a run, gathered in one pass over its states."""
+"""RunStory: the events of a run, gathered in one pass over its states."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.outages import MeshSample, Outage, find_outages, take_sample
 
-BLIP_S = 1.0  # our choice: a shorter outage was only the wait for an answer
+BLIP_S = 1.0  # our choice: a shorter outage was just the wait for an answer
 
 
 class NothingRecorded(MeshError):
@@ -19,12 +19,12 @@ class NothingRecorded(MeshError):
 
 @dataclass(frozen=True)
 class RunStory:
-    """A run, ready to be drawn and written. Seconds are simulated seconds."""
+    """A run, ready to be drawn and written. All times are simulated seconds."""
 
     samples: Sequence[MeshSample]
     events: Sequence[EventRecord]
     outages: Sequence[Outage]  # without blips, and without nodes that were switched off themselves
-    blips: int  # how many outages were shorter than BLIP_S
+    blips: int  # number of outages shorter than BLIP_S
     before: MeshStatus  # the last state before the first power-off or loss, else the first one
     after: MeshStatus  # the last state
     tracks: Mapping[int, Sequence[tuple[float, float]]]  # x, y in metres, of nodes that moved

@@ -24,7 +24,7 @@ EVENT_KINDS_LEFT_OUT = frozenset(
 
 
 def key_numbers(story: RunStory) -> list[tuple[str, str]]:
-    """(name, value) of the most important figures."""
+    """(name, value) of the key figures."""
     first, last = story.samples[0], story.samples[-1]
     seconds = max(last.stamp_s - first.stamp_s, 1e-9)
     lengths = [outage.seconds for outage in story.outages if outage.seconds is not None]
@@ -43,7 +43,7 @@ def key_numbers(story: RunStory) -> list[tuple[str, str]]:
 
 
 def repair_rows(story: RunStory) -> list[dict[str, str]]:
-    """One row per outage: when, and how long each phase of its repair took."""
+    """One row per outage: when it happened, and the duration of each repair phase."""
     return [
         {
             "node": str(outage.node),
@@ -62,7 +62,7 @@ def repair_rows(story: RunStory) -> list[dict[str, str]]:
 
 
 def repairs_left(story: RunStory) -> list[tuple[int, str]]:
-    """Each node that still had something to repair at the end, and its own words about it."""
+    """Each node with something left to repair at the end, and its own description of it."""
     return [(node.id, node.repair) for node in story.after.nodes if node.repair]
 
 
@@ -93,7 +93,7 @@ def _cell(value: object) -> object:
 
 
 def _stood_s(outage: Outage) -> float:
-    """The earliest time it could reconnect: its landing, or its loss if it did not fly."""
+    """The earliest time at which it could reconnect: its landing, or its loss if it did not fly."""
     if outage.landed_s is None:
         return outage.lost_s
     return (
@@ -110,7 +110,7 @@ def _seconds(start_s: float | None, stop_s: float | None) -> str:
 
 
 def _on_ground(outage: Outage) -> str:
-    """From the cause to the connection, without flight time (docs/protocol.md, "Requirements")."""
+    """Cause to connection, without flight time (docs/protocol.md, "Requirements")."""
     if outage.connected_s is None:
         return "–"
     flown_s = 0.0

@@ -1,4 +1,4 @@
-"""What serves the network user: the ways to a node's data from other threads and programs.
+"""Access for users: how other threads and programs send and receive data through a node.
 
-No ROS and no hardware. A node's own threads are not needed to import it.
+No ROS and no hardware.
 """

@@ -1,4 +1,4 @@
-"""What the commands mesh_send, mesh_listen, mesh_ping and mesh_trace have in common."""
+"""Shared by the commands mesh_send, mesh_listen, mesh_ping and mesh_trace."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def parser_for(command: str, description: str) -> argparse.ArgumentParser:
 
 
 def add_echo_arguments(parser: argparse.ArgumentParser) -> None:
-    """The node that is asked for an echo, and the time to wait for it."""
+    """Add the node to send echo requests to, and the time to wait for its answer."""
     parser.add_argument("id", type=node_id, help="id of the node that answers")
     parser.add_argument(
         "-W",
@@ -68,7 +68,7 @@ def port(text: str) -> int:
 
 
 def count(text: str) -> int:
-    """How many times, at least once, for argparse."""
+    """A number of times, at least 1, for argparse."""
     if not text.isdigit() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"invalid number {text!r}: must be 1 or more")
     return int(text)
@@ -86,7 +86,7 @@ def seconds(text: str) -> float:
 
 
 def client(parsed: argparse.Namespace) -> LocalClient:
-    """The node that the options name. Raises MeshError."""
+    """The node that the options select. Raises MeshError."""
     if parsed.socket is not None:
         return LocalClient(parsed.socket)
     chosen = parsed.node

@@ -1,4 +1,4 @@
-"""UsersDesk: a node's data for the other threads of its process."""
+"""UsersDesk: gives other threads of the process access to a node's data service."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_mesh.communication.data.ticket import Ticket, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, Transport
 from drone_mesh.errors import MessageRefused
 
-HANDOVER_S = 5.0  # our choice: a node takes a message within this time
+HANDOVER_S = 5.0  # our choice: a node accepts a message within this time
 MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is dropped
 
 Submit = Callable[[Callable[[float], None]], None]
@@ -22,7 +22,7 @@ WhenOver = Callable[[Optional[Ticket], Optional[MessageRefused]], None]
 
 
 class Sending:
-    """One message that another thread hands in. Its fields are set by the node's thread."""
+    """One message submitted by another thread. The node's thread sets its fields."""
 
     def __init__(self, to: int, payload: bytes, port: int, reliable: bool) -> None:
         self._arguments = (to, payload, port, reliable)
@@ -43,7 +43,7 @@ class Sending:
         return self._ticket
 
     def wait(self, seconds: float) -> bool:
-        """Whether the message arrived within that time (without acknowledgement: was sent)."""
+        """Whether the message was delivered (without acknowledgement: sent) within `seconds`."""
         ticket = self.ticket()
         if seconds > 0 and not self._ended.wait(seconds):
             return False
@@ -58,18 +58,18 @@ class Sending:
 
     @property
     def is_taken(self) -> bool:
-        """Whether the node has looked at it."""
+        """Whether the node has accepted or refused it."""
         return self._handed_in.is_set()
 
     @property
     def is_over(self) -> bool:
-        """Whether the message was refused, or its last state is known."""
+        """Whether the message was refused or has its final state."""
         return self._ended.is_set() or (self._handed_in.is_set() and self._ticket is None)
 
     def when_over(self, call: WhenOver) -> None:
-        """Have `call` called once, with the ticket or the refusal; on this thread or the node's."""
+        """Call `call` once, with the ticket or the refusal; on this thread or the node's."""
         self._when_over = call
-        self._tell()
+        self._call_when_over()
 
     def hand_in(self, transport: Transport, now_s: float) -> None:
         """On the node's thread."""
@@ -83,14 +83,14 @@ class Sending:
             self._ticket = ticket
             self._changed(ticket)
         self._handed_in.set()
-        self._tell()
+        self._call_when_over()
 
     def _changed(self, ticket: Ticket) -> None:
         if ticket.final:
             self._ended.set()
-            self._tell()
+            self._call_when_over()
 
-    def _tell(self) -> None:
+    def _call_when_over(self) -> None:
         """Call `when_over` once, whichever comes last: the end, or that it was asked for."""
         with self._lock:
             call = self._when_over if self._handed_in.is_set() and self.is_over else None
@@ -107,10 +107,10 @@ class Listener:
         self._port = port
         self.close: Callable[[], None] = lambda: None  # no more messages
         self._messages: queue.Queue[ReceivedMessage] = queue.Queue(MOST_UNREAD)
-        self.dropped = 0  # because they were not read in time
+        self.dropped = 0  # messages dropped because they were not read in time
 
     def next(self, timeout_s: float) -> ReceivedMessage | None:
-        """The next message; None: none came in time."""
+        """The next message; None if none arrived in time."""
         try:
             return self._messages.get(timeout=timeout_s)
         except queue.Empty:
@@ -133,13 +133,13 @@ class Listener:
 
 
 class UsersDesk:
-    """Sends, listens and asks for echoes on behalf of other threads. Any thread may use it.
+    """Sends, listens and requests echoes on behalf of other threads. Any thread may use it.
 
-    What it hands to the node runs there; a lock guards the receivers.
+    What it submits to the node runs there; a lock guards the receivers.
     """
 
     def __init__(self, node_id: int, submit: Submit) -> None:
-        """`open` follows when the node has its transport."""
+        """Call `open` once the node has its transport."""
         self.node_id = node_id
         self._submit = submit
         self._transport: Transport | None = None
@@ -147,19 +147,19 @@ class UsersDesk:
         self._receivers: list[Receiver] = []
 
     def open(self, transport: Transport) -> None:
-        """Begin to serve; before the node starts, or on its thread."""
+        """Start serving; before the node starts, or on its thread."""
         self._transport = transport
         transport.on_received(self._received)
 
     def send(self, to: int, payload: bytes, port: int = 0, reliable: bool = True) -> Sending:
-        """Hand a message to the node. What it refuses shows in the result."""
+        """Submit a message to the node. The result reports a refusal."""
         sending = Sending(to, payload, port, reliable)
         transport = self._require()
         self._submit(lambda now_s: sending.hand_in(transport, now_s))
         return sending
 
     def subscribe(self, receiver: Receiver) -> Callable[[], None]:
-        """Have `receiver` called on the node's thread; returns a function that ends it."""
+        """Call `receiver` on the node's thread for each message; returns a function to end it."""
         with self._lock:
             self._receivers.append(receiver)
 
@@ -171,13 +171,13 @@ class UsersDesk:
         return end
 
     def listen(self, port: int | None = None) -> Listener:
-        """Receive the messages for a port, or for all of them; to be closed."""
+        """Receive the messages for one port, or for all; close the result."""
         listener = Listener(port)
         listener.close = self.subscribe(listener.put)
         return listener
 
     def echo(self, to: int, timeout_s: float) -> EchoAnswer | None:
-        """Ask a node for an echo, and wait; None: no answer came.
+        """Request an echo and wait for it; None: no answer.
 
         Raises MessageRefused if there is no route to it.
         """

@@ -1,4 +1,4 @@
-"""LocalClient: a program's requests to a node of this machine; see local_socket."""
+"""LocalClient: sends a program's requests to a node of this machine; see local_socket."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CONNECT_WITHIN_S = 5.0  # our choice
 
 
 class NodeUnreachable(MeshError):
-    """No program answers at the socket. Start the node, or name another socket."""
+    """No program answers at the socket. Start the node, or specify another socket."""
 
 
 class Refused(MeshError):
@@ -23,7 +23,7 @@ class Refused(MeshError):
 
 
 class LocalClient:
-    """One node, through its socket. Each call is a connection of its own."""
+    """One node, through its socket. Each call opens its own connection."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -31,7 +31,7 @@ class LocalClient:
     def send(
         self, to: int, payload: bytes, *, port: int = 0, reliable: bool = True, wait_s: float = 0.0
     ) -> tuple[bool, str]:
-        """Whether the message arrived within `wait_s`, and its ticket in words."""
+        """Whether the message was delivered within `wait_s`, and its ticket as text."""
         answer = self._ask(
             {
                 "do": "send",

@@ -1,9 +1,9 @@
-"""LocalSocket: a node's data for other programs of this machine, over a UNIX socket.
+"""LocalSocket: gives other programs of this machine access to a node, over a UNIX socket.
 
-One request per connection, a line of JSON; the answer is one line, or many:
+One request per connection, a line of JSON; the answer is one or more lines:
 
     {"do": "send", "to": 5, "port": 0, "reliable": true, "payload": BASE64, "wait": SECONDS}
-    {"do": "listen", "port": 0 or null}       one line per message, until the client goes
+    {"do": "listen", "port": 0 or null}       one line per message, until the client disconnects
     {"do": "echo", "to": 5, "wait": SECONDS}
 
 A refusal is {"error": reason}. Only the user that runs the node can open the socket.
@@ -31,7 +31,7 @@ from drone_mesh.users.socket_path import is_served, socket_path
 MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
 MOST_CLIENTS = 32  # our choice
 REQUEST_WITHIN_S = 5.0  # our choice
-_LOOK_S = 0.1  # how soon a listener's thread notices the end
+_LOOK_S = 0.1  # how soon a listener's thread notices the end of the node
 
 _log = logging.getLogger(__name__)
 
@@ -43,7 +43,7 @@ class LocalSocket:
     """
 
     def __init__(self, desk: UsersDesk, path: Path) -> None:
-        """Make the socket. Raises ConfigurationError if that is not possible."""
+        """Create the socket. Raises ConfigurationError if that is not possible."""
         _prepare(path)
         self.path = path
         try:
@@ -56,7 +56,7 @@ class LocalSocket:
         )
 
     def start(self) -> None:
-        """Begin to serve."""
+        """Start serving."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -71,7 +71,7 @@ class LocalSocket:
 
 
 def local_socket(desk: UsersDesk) -> LocalSocket | None:
-    """The socket of a node, where the commands look for it; None, and a warning, without one.
+    """The socket of a node in its default place; None, with a warning, if it cannot be created.
 
     The commands are a convenience: a node works without them.
     """
@@ -98,7 +98,7 @@ class _Server(socketserver.ThreadingUnixStreamServer):
         super().__init__(path, _Client)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A client that goes away in the middle is normal."""
+        """Ignored: clients may disconnect at any time."""
 
 
 class _Client(socketserver.StreamRequestHandler):
@@ -106,7 +106,7 @@ class _Client(socketserver.StreamRequestHandler):
     timeout = REQUEST_WITHIN_S
 
     def handle(self) -> None:
-        """One request."""
+        """Handle one request."""
         if not self.server.clients.acquire(blocking=False):
             self._say({"error": f"{MOST_CLIENTS} programs use this node already"})
             return
@@ -117,7 +117,7 @@ class _Client(socketserver.StreamRequestHandler):
         except MessageRefused as error:
             self._say({"error": str(error)})
         except OSError:
-            pass  # the client went away
+            pass  # the client disconnected
         finally:
             self.server.clients.release()
 
@@ -153,7 +153,7 @@ class _Client(socketserver.StreamRequestHandler):
             raise ValueError(f"unknown request: {what}")
 
     def _wait(self, wait: Any, seconds: float) -> bool:
-        """Wait in steps, so that the end of the node ends it."""
+        """Wait in short steps, so that the end of the node ends the wait."""
         if seconds <= 0:
             return bool(wait(0.0))
         while seconds > 0 and not self.server.stopping:
@@ -192,7 +192,7 @@ class _Client(socketserver.StreamRequestHandler):
 
 
 def _prepare(path: Path) -> None:
-    """Have the folder, for this user alone; remove a socket that no program serves any more."""
+    """Create the folder for this user alone; remove a socket that no program serves any more."""
     folder = path.parent
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

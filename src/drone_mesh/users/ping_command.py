@@ -10,7 +10,7 @@ from drone_mesh.users.local_client import LocalClient, Refused
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Ask a node for echoes; the exit status is 1 if none came."""
+    """Send echo requests to a node; the exit status is 1 if none was answered."""
     parser = command_line.parser_for(
         "mesh_ping", "Sends echo requests to a node and prints round trip, hops and loss."
     )

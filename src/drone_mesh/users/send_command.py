@@ -10,7 +10,7 @@ from drone_mesh.users import command_line
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Send one message; the exit status is 1 if it did not arrive."""
+    """Send one message; the exit status is 1 if it was not delivered."""
     parser = command_line.parser_for(
         "mesh_send", "Sends a message of up to 1024 bytes through the mesh."
     )

@@ -1,4 +1,4 @@
-"""Where the local sockets of nodes are."""
+"""The paths of the local sockets of nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SYSTEM_FOLDER = Path("/run/drone_mesh")  # of the services: RuntimeDirectory=dro
 
 
 def socket_folder(environment: Mapping[str, str] = os.environ) -> Path:
-    """The folder of the sockets of nodes that this user starts."""
+    """The folder for the sockets of nodes that this user starts."""
     if environment.get("RUNTIME_DIRECTORY"):  # set by systemd
         return Path(environment["RUNTIME_DIRECTORY"])
     if environment.get("XDG_RUNTIME_DIR"):
@@ -20,31 +20,31 @@ def socket_folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 
 def socket_path(node_id: int) -> Path:
-    """The socket of a node that this user starts."""
+    """The socket path of a node that this user starts."""
     return socket_folder() / _name(node_id)
 
 
 def served_sockets() -> list[Path]:
-    """The sockets of the nodes of this user and of the services that run now, by name."""
+    """The sockets of running nodes, of this user and of the services, sorted by name."""
     folders = (socket_folder(), SYSTEM_FOLDER)
     found = {path for folder in folders for path in folder.glob(_name("*"))}
     return sorted(path for path in found if is_served(path))
 
 
 def is_served(path: Path) -> bool:
-    """Whether a program answers at this socket; one that was killed leaves its socket behind."""
+    """Whether a program answers at this socket; a killed one leaves its socket behind."""
     with socket.socket(socket.AF_UNIX) as probe:
         try:
             probe.connect(str(path))
         except PermissionError:
-            return True  # of another user: the request says so
+            return True  # of another user: the request will report that
         except OSError:
             return False
     return True
 
 
 def node_of(path: Path) -> str:
-    """The id of the node that has this socket."""
+    """The id of the node whose socket this is."""
     return path.stem[len("node-") :]
 
 

@@ -1,6 +1,6 @@
-"""Authority: who may fly the drone now, this program or its human pilot, and why.
+"""Authority: who may fly the drone, this program or the human pilot, and why.
 
-The human pilot is the master. This program follows only while the autopilot is in the mode that is
+The human pilot always has priority. This program flies only while the autopilot is in the mode
 meant for it.
 """
 
@@ -14,7 +14,7 @@ from drone_mesh.drone.mavlink.telemetry import Telemetry
 
 
 class Authority:
-    """Judges by the telemetry; changes nothing."""
+    """Decides from the telemetry; changes nothing."""
 
     def __init__(
         self,
@@ -27,10 +27,10 @@ class Authority:
         self._area = area
         self._limits = limits
         self._permissions = permissions
-        self.we_landed = False  # the autopilot is in its landing mode because we said so
+        self.we_landed = False  # the autopilot is in its landing mode because we ordered it
 
     def trouble(self, now_s: float) -> str:
-        """Why no flight is possible now, under any control; empty: it is possible."""
+        """Why no flight is possible now, under any control; empty if one is."""
         telemetry, limits = self._telemetry, self._limits
         link = telemetry.link_trouble(now_s)
         if link:
@@ -58,13 +58,13 @@ class Authority:
         return ""
 
     def why_not(self, now_s: float, phase: Phase) -> str:
-        """Why a goal would not be flown to now; empty: it would."""
+        """Why a goal would be refused now; empty if it would not."""
         trouble = self.trouble(now_s)
         if trouble:
             return trouble
         telemetry, may = self._telemetry, self._permissions
         autopilot = telemetry.autopilot
-        assert autopilot is not None  # else there was trouble
+        assert autopilot is not None  # otherwise `trouble` has a reason
         on_ground = telemetry.on_ground(now_s)
         if phase is Phase.LANDING:
             return "landing, as ordered"
@@ -88,7 +88,7 @@ class Authority:
         return self.we_landed and mode == autopilot.land_mode and on_ground
 
     def why_let_go(self, now_s: float, phase: Phase) -> str:
-        """Why the present flight has to end; empty: it continues."""
+        """Why the current flight must end; empty if it continues."""
         telemetry = self._telemetry
         trouble = self.trouble(now_s)
         autopilot = telemetry.autopilot

@@ -1,4 +1,4 @@
-"""What differs between the autopilots: modes, parameters that make it safe, how it takes off."""
+"""Differences between the autopilots: modes, safety parameters, take-off."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 @dataclass(frozen=True)
 class Requirement:
-    """A parameter of the autopilot that has to be set for a flight without a pilot."""
+    """A parameter of the autopilot that must be set for a flight without a pilot."""
 
-    names: tuple[str, ...]  # of the releases, newest first; one of them exists
+    names: tuple[str, ...]  # in different releases, newest first; one of them exists
     holds: Callable[[float], bool]
-    wanted: str  # in words
+    wanted: str  # as text
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,12 @@ class Autopilot:
 
     name: str
     mode_names: Mapping[int, str]
-    own_mode: int  # the one in which it follows this program
-    hold_mode: int  # the one that a drone may be taken from with --may-change-mode
+    own_mode: int  # the mode in which it follows this program
+    hold_mode: int  # the mode that --may-change-mode allows to leave
     land_mode: int
-    takes_off_by_command: bool  # else by a target above the ground
-    wants_targets_beforehand: bool  # it enters its own mode only while targets arrive
-    integers_as_bytes: bool  # of parameters: their bytes stand in the float's place
+    takes_off_by_command: bool  # otherwise by a target above the ground
+    wants_targets_beforehand: bool  # it enters `own_mode` only while targets arrive
+    integers_as_bytes: bool  # integer parameters are sent as their bytes in place of the float
     requirements: tuple[Requirement, ...] = field(repr=False)
 
     def mode_name(self, mode: int) -> str:
@@ -43,13 +43,13 @@ class Autopilot:
         return float(mode), 0.0
 
     def parameter_value(self, value: float, kind: int) -> float:
-        """The number in a PARAM_VALUE."""
+        """The value in a PARAM_VALUE."""
         if not self.integers_as_bytes or kind == mavlink.MAV_PARAM_TYPE_REAL32:
             return value
         return float(struct.unpack("<i", struct.pack("<f", value))[0])
 
     def parameter_bytes(self, value: float, kind: int) -> float:
-        """The float that stands for a number in a PARAM_VALUE or a PARAM_SET."""
+        """The float that represents a value in a PARAM_VALUE or a PARAM_SET."""
         if not self.integers_as_bytes or kind == mavlink.MAV_PARAM_TYPE_REAL32:
             return value
         return float(struct.unpack("<f", struct.pack("<i", int(value)))[0])
@@ -133,7 +133,7 @@ PX4 = Autopilot(
 
 
 def autopilot_of(heartbeat_autopilot: int) -> Autopilot | None:
-    """By MAV_AUTOPILOT of a heartbeat; None: not one that can be flown."""
+    """Look up MAV_AUTOPILOT of a heartbeat; None: not supported."""
     return {
         mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: ARDUPILOT,
         mavlink.MAV_AUTOPILOT_PX4: PX4,

@@ -1,4 +1,4 @@
-"""What is said to an autopilot: heartbeats, commands until they are acknowledged, targets."""
+"""Messages to an autopilot: heartbeats, commands until they are acknowledged, targets."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drone_mesh.drone.geodesy import EarthPlace
 from drone_mesh.drone.mavlink.autopilots import Requirement
 from drone_mesh.drone.mavlink.telemetry import STREAMS_HZ, Message, Telemetry
 
-HEARTBEAT_PERIOD_S = 1.0  # MAVLink's own rule
+HEARTBEAT_PERIOD_S = 1.0  # required by MAVLink
 ASK_STREAMS_PERIOD_S = 5.0  # our choice
 COMMAND_PERIOD_S = 1.0  # our choice: an autopilot answers within tens of milliseconds
 COMMAND_TRIES = 3  # our choice
@@ -34,10 +34,10 @@ _log = logging.getLogger(__name__)
 
 
 class Commander:
-    """Speaks to the autopilot that `telemetry` listens to."""
+    """Sends to the autopilot that `telemetry` listens to."""
 
     def __init__(self, telemetry: Telemetry, send: Callable[[Message], None]) -> None:
-        """`send` brings a message to the link; it may lose it."""
+        """`send` passes a message to the link, which may lose it."""
         self._telemetry = telemetry
         self._send = send
         self._heartbeat_due_s = -math.inf
@@ -48,7 +48,7 @@ class Commander:
         self._refusal = ""
 
     def tick(self, now_s: float) -> None:
-        """Send what is due all the time."""
+        """Send whatever is periodically due."""
         if now_s >= self._heartbeat_due_s:
             self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
             self._send(
@@ -74,10 +74,10 @@ class Commander:
                 )
 
     def command(self, command: int, parameters: tuple[float, ...], now_s: float) -> str:
-        """Give this command, again and again until its effect ends the calls.
+        """Send this command repeatedly until the caller sees its effect and stops calling.
 
-        Returns why it will not be done, once that is known, else nothing. Changing the command
-        starts again.
+        Returns why it will not be carried out, once that is known, otherwise an empty string. A
+        different command starts over.
         """
         if self._command != (command, parameters):
             self._command = (command, parameters)
@@ -92,7 +92,7 @@ class Commander:
         return self._refusal
 
     def no_command(self) -> None:
-        """Forget the command that was being given."""
+        """Forget the current command."""
         self._command = None
 
     def on_ack(self, message: Message) -> None:
@@ -104,7 +104,7 @@ class Commander:
             self._refusal = f"the autopilot refused: {result_name(message.result)}"
 
     def target(self, place: EarthPlace) -> None:
-        """Where to fly now."""
+        """Send the position to fly to now."""
         telemetry = self._telemetry
         self._send(
             mavlink.MAVLink_set_position_target_global_int_message(
@@ -121,7 +121,7 @@ class Commander:
         )
 
     def read_parameter(self, name: str) -> None:
-        """Ask for one; the answer is a PARAM_VALUE."""
+        """Request one parameter; the answer is a PARAM_VALUE."""
         telemetry = self._telemetry
         self._send(
             mavlink.MAVLink_param_request_read_message(
@@ -140,13 +140,13 @@ class Commander:
 
 
 def result_name(result: int) -> str:
-    """The word for a MAV_RESULT."""
+    """The name of a MAV_RESULT."""
     entry: Any = mavlink.enums["MAV_RESULT"].get(result)
     return str(entry.name)[len("MAV_RESULT_") :].lower() if entry else f"result {result}"
 
 
 class ParameterCheck:
-    """Reads the parameters that make a flight safe, and reports those that are set wrongly."""
+    """Reads the parameters that make a flight safe, and reports those with unsafe values."""
 
     def __init__(self, commander: Commander, telemetry: Telemetry) -> None:
         self._commander = commander
@@ -162,7 +162,7 @@ class ParameterCheck:
         return self._open is not None and not self._open
 
     def tick(self, now_s: float) -> None:
-        """Ask for the next one."""
+        """Request the next one."""
         autopilot = self._telemetry.autopilot
         if autopilot is None:
             return

@@ -15,8 +15,8 @@ from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.drone.mavlink.pilot_status import PilotStatus
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
-TICK_S = 0.05  # our choice: four looks for each target
-STALE_S = 2.0  # a look that is older says nothing about the drone
+TICK_S = 0.05  # our choice: four ticks per target
+STALE_S = 2.0  # an older status is no longer valid
 
 _log = logging.getLogger(__name__)
 
@@ -24,8 +24,8 @@ _log = logging.getLogger(__name__)
 class MavlinkEngine(IDroneEngine):
     """Any thread may call it; its own thread owns the link and the pilot, until `close`.
 
-    When it is closed, or dies, the drone does what its autopilot is set to do without a ground
-    station: docs/flying.md.
+    After it is closed or dies, the drone does what its autopilot is configured to do without a
+    ground station: docs/flying.md.
     """
 
     def __init__(
@@ -36,24 +36,24 @@ class MavlinkEngine(IDroneEngine):
         limits: FlightLimits,
         permissions: Permissions,
     ) -> None:
-        """Open the link. Raises ConfigurationError if that cannot be done."""
+        """Open the link. Raises ConfigurationError if that fails."""
         self._node_id = node_id
         self._origin = origin
         self._limits = limits
         self._link = MavlinkLink(address)
         self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send)
-        self._goals: deque[tuple[Location, bool]] = deque()  # with: whether it lands there
+        self._goals: deque[tuple[Location, bool]] = deque()  # and whether it lands there
         self._look = (PilotStatus(), time.monotonic())
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"mavlink {node_id}", daemon=True)
         self._thread.start()
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there, and land if the height is 0. Raises GoalRefused, with the reason."""
+        """Fly there, and land if the height is 0. Raises GoalRefused with the reason."""
         self._take(Location(latitude, longitude, height), lands=height <= 0.0)
 
     def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there and hover: at --hover, or else at the height that the drone has now."""
+        """Fly there and hover: at --hover, or else at the drone's current height."""
         status = self.status()
         hover_m = self._limits.hover_m
         if hover_m is None:
@@ -67,14 +67,14 @@ class MavlinkEngine(IDroneEngine):
         self._take(Location(latitude, longitude, hover_m), lands=False)
 
     def get_location(self) -> Location:
-        """Where the drone is. Raises LocationUnknown, with the reason."""
+        """The drone's position. Raises LocationUnknown with the reason."""
         status = self.status()
         if status.location is None:
             raise LocationUnknown(status.location_trouble)
         return status.location
 
     def why_not_fly(self) -> str:
-        """Why it would not fly to a goal now; empty while it would."""
+        """Why it cannot fly to a goal now; empty if it can."""
         return self.status().why_not_fly
 
     def is_flying(self) -> bool:
@@ -82,15 +82,15 @@ class MavlinkEngine(IDroneEngine):
         return bool(self._goals) or self.status().is_flying
 
     def battery_percent(self) -> float | None:
-        """As the autopilot reports it."""
+        """The charge that the autopilot reports."""
         return self.status().battery_percent
 
     def frame_digest(self) -> int:
-        """That of --origin."""
+        """The digest of --origin."""
         return self._origin.digest
 
     def status(self) -> PilotStatus:
-        """The last look at the drone; without a place if that is too long ago."""
+        """The latest status of the drone; without a position if it is too old."""
         status, taken_s = self._look
         if time.monotonic() - taken_s > STALE_S:
             silent = "the engine does not answer"
@@ -98,7 +98,7 @@ class MavlinkEngine(IDroneEngine):
         return status
 
     def close(self) -> None:
-        """End the thread and give the link back."""
+        """End the thread and close the link."""
         self._ended.set()
         self._thread.join()
 
@@ -106,7 +106,7 @@ class MavlinkEngine(IDroneEngine):
         status = self.status()
         if status.why_not_fly:
             raise GoalRefused(f"the drone cannot fly: {status.why_not_fly}")
-        assert status.home is not None  # else there was a reason
+        assert status.home is not None  # otherwise there was a reason
         self._limits.check(goal, status.home)
         self._goals.append((goal, lands))
 

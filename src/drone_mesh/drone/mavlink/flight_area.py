@@ -1,4 +1,4 @@
-"""FlightArea: where the drone is in the common frame, and the area that no target leaves."""
+"""FlightArea: the drone's position in the common frame, and the area that no target leaves."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class FlightArea:
         self._limits = limits
 
     def here(self, now_s: float) -> Location | None:
-        """Where the drone is; None if the telemetry does not say."""
+        """The drone's position; None if the telemetry does not have it."""
         place = self._telemetry.place(now_s)
         return None if place is None else self._origin.to_frame(place)
 
@@ -30,13 +30,13 @@ class FlightArea:
         return None if home is None else self._origin.to_frame(home)
 
     def is_in_frame(self, place: EarthPlace) -> bool:
-        """Whether goals may be so far from the origin."""
+        """Whether a position is near enough to the origin for goals."""
         location = self._origin.to_frame(place)
         reach_m = max(abs(location.latitude), abs(location.longitude))
         return reach_m <= MAX_COORDINATE_M and abs(location.height) <= MAX_HEIGHT_M
 
     def within(self, place: Location) -> Location:
-        """The nearest place inside the limits: no target lies outside them, wherever it is now."""
+        """The nearest position within the limits; no target is outside, wherever the drone is."""
         home = self.home()
         if home is None:
             return place
@@ -50,5 +50,5 @@ class FlightArea:
         )
 
     def to_earth(self, place: Location) -> EarthPlace:
-        """A place inside the limits, in degrees."""
+        """A position, moved into the limits, in degrees."""
         return self._origin.to_earth(self.within(place))

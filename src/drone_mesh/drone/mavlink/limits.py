@@ -1,4 +1,4 @@
-"""How high, how far and how fast a drone may be flown, and what the program may do by itself."""
+"""Limits of height, distance and speed, and what the program may do without the pilot."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
 
-MAX_SPEED_M_S = 20.0  # our choice: beyond what a drone of this kind flies
+MAX_SPEED_M_S = 20.0  # our choice: more than drones of this kind can fly
 
 
 @dataclass(frozen=True)
 class FlightLimits:
-    """Metres, seconds, percent. Heights without another word are in the common frame."""
+    """Metres, seconds, percent. Heights are in the common frame unless stated otherwise."""
 
     max_height_m: float = 50.0  # above home
     max_distance_m: float = 500.0  # from home, horizontally
@@ -22,10 +22,10 @@ class FlightLimits:
     min_battery_percent: float = 30.0
     cruise_height_m: float = 10.0  # of the lowest layer
     layer_m: float = 2.0  # between layers; 0: all drones cross at the same height
-    hover_m: float | None = None  # where a repair ends; None: at the height it had before
+    hover_m: float | None = None  # height at the end of a repair; None: unchanged
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError, which names the option."""
+        """Raise ConfigurationError, which names the option, for values out of range."""
         bounds = (
             ("--max-height", self.max_height_m, 1.0, 500.0),
             ("--max-distance", self.max_distance_m, 1.0, 5000.0),
@@ -40,7 +40,7 @@ class FlightLimits:
                 raise ConfigurationError(f"{name} {value:g} is outside {lowest:g}..{highest:g}")
 
     def layer_height_m(self, node_id: int) -> float:
-        """The height at which this node crosses: a layer of its own, as far as they reach."""
+        """The height at which this node crosses: its own layer, as far as there are enough."""
         if self.layer_m == 0.0:
             return self.cruise_height_m
         room_m = self.max_height_m - self.cruise_height_m
@@ -52,7 +52,7 @@ class FlightLimits:
         return home.height + self.max_height_m
 
     def check(self, goal: Location, home: Location) -> None:
-        """Raises GoalRefused for a goal outside the limits around `home`."""
+        """Raise GoalRefused for a goal outside the limits around `home`."""
         check_goal(*goal)
         distance_m = math.hypot(goal.latitude - home.latitude, goal.longitude - home.longitude)
         if distance_m > self.max_distance_m:
@@ -68,7 +68,7 @@ class FlightLimits:
 
 @dataclass(frozen=True)
 class Permissions:
-    """What the program may do that is otherwise the pilot's."""
+    """Actions of the pilot that the program may take."""
 
     may_arm: bool = False
     may_take_off: bool = False

@@ -15,23 +15,23 @@ MOST_BYTES = 4096  # of one reading
 
 
 class Line(Protocol):
-    """Where bytes come and go. Any function raises OSError when the line has broken."""
+    """A connection for bytes. Any function raises OSError when it has broken."""
 
     def receive(self, timeout_s: float) -> bytes:
-        """What arrives within this time, as soon as there is something."""
+        """Wait up to this time for data; returns as soon as there is some."""
 
     def send(self, data: bytes) -> None:
-        """Bring it onto the line."""
+        """Send these bytes."""
 
     def forget_peer(self) -> None:
         """Accept the next peer that sends, if the line can have several."""
 
     def close(self) -> None:
-        """Give it back."""
+        """Close the connection."""
 
 
 class SerialLine:
-    """A serial port, or a TCP connection as pyserial makes it."""
+    """A serial port, or a TCP connection through pyserial."""
 
     def __init__(self, url: str, baud: int) -> None:
         """`url` is a device, or socket://HOST:PORT. Raises OSError."""
@@ -47,17 +47,17 @@ class SerialLine:
         self._port.write(data)
 
     def forget_peer(self) -> None:
-        """A serial port or a connection has but one."""
+        """Does nothing: there is only one peer."""
 
     def close(self) -> None:
         self._port.close()
 
 
 class UdpLine:
-    """Datagrams: `listens` waits at the address for a peer, else the address is the peer's."""
+    """UDP: with `listens` the address is ours and any peer may begin, else it is the peer's."""
 
     def __init__(self, host: str, port: int, listens: bool) -> None:
-        """Raises OSError for an address that cannot be had."""
+        """Raises OSError for an address that is not available."""
         self._listens = listens
         self._peer = None if listens else (host, port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -79,7 +79,7 @@ class UdpLine:
             return b""
         data, peer = self._socket.recvfrom(MOST_BYTES)
         if self._peer is None:
-            self._peer = peer  # the first that sends; no other peer can take the drone over
+            self._peer = peer  # the first to send; no other peer can take over the drone
         return data if peer == self._peer or self._is_peer(peer) else b""
 
     def send(self, data: bytes) -> None:
@@ -121,7 +121,7 @@ def parse_address(text: str) -> tuple[str, str, int]:
 
 
 def open_line(address: str) -> Line:
-    """Raises ConfigurationError for an invalid address, OSError for one that cannot be had."""
+    """Raises ConfigurationError for an invalid address, OSError if it is not available."""
     kind, place, number = parse_address(address)
     if kind == "serial":
         return SerialLine(place, number)

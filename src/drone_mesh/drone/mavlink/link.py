@@ -1,4 +1,4 @@
-"""MavlinkLink: messages over a line that may break."""
+"""MavlinkLink: messages over a line that may break and is opened again."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from drone_mesh.drone.mavlink.lines import Line, open_line
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.errors import ConfigurationError
 
-SILENT_S = 10.0  # our choice: after so much silence a peer on another port may speak
-OPEN_AGAIN_S = 2.0  # our choice: how often a line that broke is tried
+SILENT_S = 10.0  # our choice: after this silence a peer on another port is accepted
+OPEN_AGAIN_S = 2.0  # our choice: period of attempts to open a broken line
 _BAD_DATA = "BAD_DATA"
 
 _log = logging.getLogger(__name__)
 
 
 class MavlinkLink:
-    """Opens the line, and again whenever it breaks. One thread uses it."""
+    """Opens the line, and reopens it whenever it breaks. One thread uses it."""
 
     def __init__(self, address: str) -> None:
-        """Raises ConfigurationError if the address is wrong or the line cannot be had."""
+        """Raises ConfigurationError if the address is invalid or the line not available."""
         self._address = address
         self._codec = mavlink.MAVLink(None, OUR_SYSTEM_ID, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
         self._codec.robust_parsing = True  # noise is normal: skip it
@@ -35,7 +35,7 @@ class MavlinkLink:
             raise ConfigurationError(f"MAVLink address {address}: {error}") from error
 
     def receive(self, timeout_s: float) -> list[Message]:
-        """The messages that arrive within this time, as soon as there are some."""
+        """Wait up to this time for messages; returns as soon as there are some."""
         if self._line is None:
             time.sleep(timeout_s)
             self._try_to_open()
@@ -55,7 +55,7 @@ class MavlinkLink:
         return [m for m in messages or () if m.get_type() != _BAD_DATA]
 
     def send(self, message: Message) -> None:
-        """Bring it onto the line; lost if that is broken."""
+        """Send a message; it is lost if the line is broken."""
         if self._line is None:
             return
         try:
@@ -65,7 +65,7 @@ class MavlinkLink:
             self._broke(error)
 
     def close(self) -> None:
-        """Give the line back."""
+        """Close the line."""
         if self._line is not None:
             self._line.close()
             self._line = None

@@ -1,7 +1,7 @@
-"""MavlinkPilot: flies one drone by talking to its autopilot, as far as the human pilot allows.
+"""MavlinkPilot: flies one drone through its autopilot, as far as the human pilot allows.
 
-It lets go as soon as its authority ends for any reason (`authority.py`), and never resumes a flight
-that it let go of.
+It releases control as soon as its authority ends for any reason (`authority.py`), and never resumes
+a released flight.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from drone_mesh.drone.mavlink.telemetry import Message, Telemetry
 from drone_mesh.drone.route import Route
 from drone_mesh.errors import GoalRefused
 
-TARGET_PERIOD_S = 0.2  # 5 Hz: PX4 wants 2 Hz at least
-TARGETS_BEFORE_MODE_S = 1.0  # PX4 wants targets for a second before it enters OFFBOARD
+TARGET_PERIOD_S = 0.2  # 5 Hz: PX4 needs at least 2 Hz
+TARGETS_BEFORE_MODE_S = 1.0  # PX4 needs targets for a second before it enters OFFBOARD
 TAKE_OFF_M = 3.0  # our choice: above home, before the route begins
 TAKEN_OFF_WITHIN_M = 1.0  # our choice
-TAKE_OFF_WITHIN_S = 20.0  # our choice; armed and not risen by then, it gives up
+TAKE_OFF_WITHIN_S = 20.0  # our choice; if it is armed but still on the ground then, it gives up
 
 _log = logging.getLogger(__name__)
 
 
 class MavlinkPilot:
-    """Driven from outside: messages and ticks come in, messages go out through `send`."""
+    """Driven from outside: receives messages and ticks, sends messages through `send`."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class MavlinkPilot:
         self._last_tick_s = -math.inf
 
     def on_message(self, message: Message, now_s: float) -> None:
-        """Take a message from the link."""
+        """Process a message from the link."""
         if not self._telemetry.on_message(message, now_s):
             return
         if message.get_type() == "COMMAND_ACK":
@@ -70,14 +70,14 @@ class MavlinkPilot:
             self._parameters.on_value(message)
 
     def set_goal(self, goal: Location, lands: bool, now_s: float) -> None:
-        """Fly there. Raises GoalRefused for a place outside the limits, or if it cannot fly."""
+        """Fly there. Raises GoalRefused for a position outside the limits, or if it cannot fly."""
         if (goal, lands) == (self._goal, self._lands):
             return
         reason = self._authority.why_not(now_s, self._phase)
         if reason:
             raise GoalRefused(f"the drone cannot fly: {reason}")
         home = self._area.home()
-        assert home is not None  # else there was a reason
+        assert home is not None  # otherwise there was a reason
         self._limits.check(goal, home)
         self._goal, self._lands = goal, lands
         _log.info(
@@ -93,7 +93,7 @@ class MavlinkPilot:
             self._enter(Phase.CHANGING_MODE, now_s)
 
     def tick(self, now_s: float) -> None:
-        """Do what is due; to be called ten times a second or so."""
+        """Do what is due; to be called about ten times a second."""
         passed_s = min(1.0, now_s - self._last_tick_s)
         self._last_tick_s = now_s
         self._commander.tick(now_s)
@@ -105,7 +105,7 @@ class MavlinkPilot:
         self._act(passed_s, now_s)
 
     def status(self, now_s: float) -> PilotStatus:
-        """What there is to see."""
+        """The current status."""
         telemetry = self._telemetry
         trouble = telemetry.link_trouble(now_s) or telemetry.position_trouble(now_s)
         autopilot = telemetry.autopilot
@@ -125,7 +125,7 @@ class MavlinkPilot:
         )
 
     def _let_go(self, reason: str, now_s: float) -> None:
-        """End what is under way. The drone holds where it is, or does what its autopilot chose."""
+        """End the flight. The drone holds its position, or does what its autopilot chose."""
         telemetry = self._telemetry
         was, self._goal, self._route = self._phase, None, None
         self._commander.no_command()
@@ -161,7 +161,7 @@ class MavlinkPilot:
             self._land(now_s)
 
     def _offer_targets(self, now_s: float) -> None:
-        """PX4 lets its pilot choose OFFBOARD only while targets arrive: stay where you are."""
+        """PX4's pilot can choose OFFBOARD only while targets arrive: send the current position."""
         telemetry = self._telemetry
         autopilot = telemetry.autopilot
         if autopilot is None or not autopilot.wants_targets_beforehand:
@@ -181,7 +181,7 @@ class MavlinkPilot:
     def _change_mode(self, now_s: float) -> None:
         telemetry = self._telemetry
         autopilot = telemetry.autopilot
-        assert autopilot is not None  # else it had let go
+        assert autopilot is not None  # otherwise it has let go
         if telemetry.mode == autopilot.own_mode:
             self._authority.we_landed = False
             self._enter(Phase.ARMING, now_s)
@@ -214,7 +214,7 @@ class MavlinkPilot:
         telemetry = self._telemetry
         here, home = self._area.here(now_s), self._area.home()
         autopilot = telemetry.autopilot
-        assert autopilot is not None  # else it had let go, as in all that follows
+        assert autopilot is not None  # otherwise it has let go; also below
         assert here is not None
         assert home is not None
         height_m = home.height + min(TAKE_OFF_M, self._limits.max_height_m)

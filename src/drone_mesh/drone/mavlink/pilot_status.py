@@ -1,4 +1,4 @@
-"""What the drone is doing for this program, and one look at it."""
+"""The activity of the drone under this program, and a snapshot of its status."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drone_mesh.drone.interfaces import Location
 
 
 class Phase(enum.Enum):
-    """What the drone is doing for this program."""
+    """The activity of the drone under this program."""
 
     IDLE = "idle"
     CHANGING_MODE = "changing mode"
@@ -25,7 +25,7 @@ UNDER_WAY = frozenset(Phase) - {Phase.IDLE, Phase.HOLDING}
 
 @dataclass(frozen=True)
 class PilotStatus:
-    """One look at the drone. Never changes, so any thread may keep it."""
+    """A snapshot of the drone's status. Immutable, so any thread may keep it."""
 
     phase: Phase = Phase.IDLE
     location: Location | None = None
@@ -37,7 +37,7 @@ class PilotStatus:
     armed: bool = False
     on_ground: bool | None = None
     battery_percent: float | None = None
-    complaints: tuple[str, ...] = ()  # parameters that are not safe
+    complaints: tuple[str, ...] = ()  # parameters with unsafe values
     goal: Location | None = None
 
     @property

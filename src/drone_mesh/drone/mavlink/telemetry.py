@@ -1,4 +1,4 @@
-"""What an autopilot reports, and how old that is."""
+"""The reports of an autopilot, and their age."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from drone_mesh.drone.mavlink.autopilots import Autopilot, autopilot_of
 Message = Any  # one of pymavlink's generated classes
 
 HEARTBEAT_LOST_S = 3.0  # of the autopilot, at 1 Hz: three are missing
-FRESH_S = 2.0  # a position, and what says that it is good
+FRESH_S = 2.0  # a position, and the reports of its quality
 STATUS_FRESH_S = 10.0  # our choice: battery, landed state, fence
-STICKS_MOVED_US = 100  # our choice: a fifth of the way; trim and noise are below a tenth of this
-STICKS_REST_S = 5.0  # our choice: so long after its last move a stick counts as let go
+STICKS_MOVED_US = 100  # our choice: a fifth of the travel; trim and noise are below a tenth of this
+STICKS_REST_S = 5.0  # our choice: time after its last movement until a stick counts as released
 
 FIX_3D = mavlink.GPS_FIX_TYPE_3D_FIX
 GOOD_ESTIMATE = (
@@ -39,7 +39,7 @@ MULTIROTORS = frozenset(
         mavlink.MAV_TYPE_DODECAROTOR,
         mavlink.MAV_TYPE_DECAROTOR,
     )
-)  # mode numbers of other vehicles mean something else
+)  # mode numbers of other vehicles have other meanings
 
 STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0,
@@ -51,11 +51,11 @@ STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_FENCE_STATUS: 1.0,
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 2.0,  # ArduPilot
     mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,  # PX4
-}  # what the autopilot is asked for
+}  # requested from the autopilot
 
 
 class Telemetry:
-    """The last word of one autopilot on each subject. Times are of the caller's clock."""
+    """The latest report of one autopilot on each subject. Times are of the caller's clock."""
 
     def __init__(self) -> None:
         self.autopilot: Autopilot | None = None  # None until one was heard
@@ -67,7 +67,7 @@ class Telemetry:
         self.failsafe = False
         self.home: EarthPlace | None = None
         self.foreign = 0  # messages of other systems
-        self._other_vehicle = False  # its autopilot was heard, and cannot be flown
+        self._other_vehicle = False  # an unsupported autopilot was heard
         self._place: EarthPlace | None = None
         self._place_s = -math.inf
         self._fix = 0
@@ -95,7 +95,7 @@ class Telemetry:
         }
 
     def on_message(self, message: Message, now_s: float) -> bool:
-        """Take note; False for a message of another system, or of an autopilot not known yet."""
+        """Store a message; False if another system sent it, or an autopilot not identified yet."""
         is_heartbeat = message.get_type() == "HEARTBEAT"
         if is_heartbeat and self.autopilot is None:
             if message.type in MULTIROTORS:
@@ -113,10 +113,10 @@ class Telemetry:
             take(message, now_s)
         return True
 
-    # What it comes to ------------------------------------------------------------------------
+    # Conclusions -----------------------------------------------------------------------------
 
     def link_trouble(self, now_s: float) -> str:
-        """Why the autopilot cannot be relied on now; empty if it can."""
+        """Why the autopilot is unreliable now; empty if it is not."""
         if self.autopilot is None:
             if self._other_vehicle:
                 return "the vehicle is not a multirotor with ArduPilot or PX4"
@@ -127,7 +127,7 @@ class Telemetry:
         return ""
 
     def position_trouble(self, now_s: float) -> str:
-        """Why the position cannot be used now; empty if it can."""
+        """Why the position is unusable now; empty if it is usable."""
         if now_s - self._fix_s > FRESH_S:
             return "no report from the GPS for more than 2 s"
         if self._fix < FIX_3D:
@@ -141,15 +141,15 @@ class Telemetry:
         return ""
 
     def place(self, now_s: float) -> EarthPlace | None:
-        """Where the drone is; None while `position_trouble` has an answer."""
+        """The drone's position; None while `position_trouble` has a reason."""
         return None if self.position_trouble(now_s) else self._place
 
     def battery_percent(self, now_s: float) -> float | None:
-        """What is left; None: not reported."""
+        """The remaining charge; None: not reported."""
         return self._battery_percent if now_s - self._battery_s <= STATUS_FRESH_S else None
 
     def on_ground(self, now_s: float) -> bool | None:
-        """Whether it stands on the ground; None: not reported."""
+        """Whether it is on the ground; None: not reported."""
         if (
             now_s - self._landed_s > STATUS_FRESH_S
             or self._landed == mavlink.MAV_LANDED_STATE_UNDEFINED
@@ -162,11 +162,11 @@ class Telemetry:
         return self._fence_breached
 
     def sticks_moved(self, now_s: float) -> bool:
-        """Whether a stick of the pilot's transmitter has just moved."""
+        """Whether a stick of the pilot's transmitter has moved recently."""
         return now_s - self._sticks_moved_s <= STICKS_REST_S
 
     def streams_missing(self, now_s: float) -> bool:
-        """Whether something that a flight needs is not being reported."""
+        """Whether a report that a flight needs is missing."""
         times = (self._fix_s, self._estimate_s, self._place_s, self._battery_s, self._landed_s)
         return self.home is None or any(now_s - then > FRESH_S for then in times)
 

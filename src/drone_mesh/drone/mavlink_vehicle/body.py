@@ -1,4 +1,4 @@
-"""The simulated drone itself: where it is, how it moves, what is left in its battery."""
+"""The body of the simulated drone: position, movement, battery."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ ARRIVED_M = 0.05  # our choice
 
 
 class Body:
-    """Moves in straight lines at one speed, as the in-process drone does. Places are about home."""
+    """Moves in straight lines at one speed, as the in-process drone does, relative to home."""
 
     def __init__(self, speed_m_s: float, drain_percent_s: float) -> None:
-        """`drain_percent_s` is what a second in the air takes out of the battery."""
+        """`drain_percent_s` is the discharge per second in the air."""
         self.place = Location(0.0, 0.0, 0.0)
         self.armed = False
         self.battery_percent = 100.0
@@ -23,11 +23,11 @@ class Body:
 
     @property
     def on_ground(self) -> bool:
-        """Whether it stands on the ground, which is level here."""
+        """Whether it is on the ground, which is level here."""
         return self.place.height <= 0.0
 
     def move(self, target: Location | None, passed_s: float, speed_m_s: float) -> bool:
-        """Move towards `target` (None: stay); whether it is there."""
+        """Move towards `target` (None: stay); returns whether it has arrived."""
         before = self.place
         if self.armed and target is not None:
             distance_m = before.distance_m(target)

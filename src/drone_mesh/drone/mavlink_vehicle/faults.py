@@ -1,4 +1,4 @@
-"""What can be wrong with a simulated vehicle; set at any time."""
+"""Faults of a simulated vehicle, which may be set at any time."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass
 class Faults:
-    """All is well at first."""
+    """No faults by default."""
 
-    silent: bool = False  # the link is broken: nothing goes out, nothing comes in
+    silent: bool = False  # the link is broken in both directions
     fix_type: int = 3  # GPS_FIX_TYPE
     estimate_good: bool = True
     positions_stop: bool = False

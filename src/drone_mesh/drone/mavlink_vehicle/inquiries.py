@@ -1,4 +1,4 @@
-"""Inquiries: what a ground station may ask of a vehicle without moving it."""
+"""Inquiries: requests of a ground station that do not move the vehicle."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Inquiries:
         self._now_s = now_s
 
     def set_interval(self, message: Message) -> int:
-        """MAV_CMD_SET_MESSAGE_INTERVAL; a MAV_RESULT, as for all commands."""
+        """Handle MAV_CMD_SET_MESSAGE_INTERVAL; returns a MAV_RESULT, as all commands do."""
         if not math.isfinite(message.param1):
             return int(mavlink.MAV_RESULT_DENIED)
         known = self._reports.set_interval(int(message.param1), message.param2)
@@ -80,7 +80,7 @@ class Inquiries:
             self._send(self._parameters.message(message.param_id))
 
     def take_mission_request(self, message: Message) -> None:
-        """MISSION_REQUEST_LIST: it has no mission."""
+        """Handle MISSION_REQUEST_LIST: it has no mission."""
         self._send(
             mavlink.MAVLink_mission_count_message(
                 message.get_srcSystem(), message.get_srcComponent(), 0

@@ -1,4 +1,4 @@
-"""The modes that the simulated vehicle has, for each kind of autopilot."""
+"""The modes of the simulated vehicle, for each kind of autopilot."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4, Autopilot, px4_m
 
 
 class Mode(enum.Enum):
-    """What the vehicle's autopilot is doing."""
+    """The activity of the vehicle's autopilot."""
 
     PILOT = "its pilot flies"
     HOLD = "holds its position"
     FOLLOW = "follows targets"  # GUIDED, OFFBOARD
-    TAKE_OFF = "takes off"  # PX4 alone
+    TAKE_OFF = "takes off"  # PX4 only
     LAND = "lands"
     RETURN = "returns home and lands"
 
@@ -45,7 +45,7 @@ def mode_number(autopilot: Autopilot, mode: Mode) -> int:
 
 
 def mode_of(autopilot: Autopilot, number: int) -> Mode | None:
-    """The mode that `custom_mode` means; None: the vehicle does not have it."""
+    """The mode with this `custom_mode`; None if the vehicle does not have it."""
     for mode, its_number in _NUMBERS[autopilot.name].items():
         if its_number == number:
             return mode

@@ -1,4 +1,4 @@
-"""The parameters of the simulated vehicle; a safe set at first."""
+"""The parameters of the simulated vehicle; initially a safe set."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ class Parameters:
         return name in self._all
 
     def names(self) -> list[str]:
-        """All, in the order of their indices."""
+        """All names, in the order of their indices."""
         return sorted(self._all)
 
     def message(self, name: str) -> mavlink.MAVLink_param_value_message:
-        """The PARAM_VALUE of one."""
+        """The PARAM_VALUE of a parameter."""
         value, kind = self._all[name]
         names = self.names()
         return mavlink.MAVLink_param_value_message(
@@ -63,6 +63,6 @@ class Parameters:
         )
 
     def take(self, name: str, raw: float) -> None:
-        """A PARAM_SET for one that there is."""
+        """Apply a PARAM_SET for an existing parameter."""
         kind = self._all[name][1]
         self._all[name] = (self._autopilot.parameter_value(raw, kind), kind)

@@ -1,4 +1,4 @@
-"""The messages that the simulated vehicle sends by itself, each at its own rate."""
+"""The periodic messages of the simulated vehicle, each at its own rate."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FULL_CELL_MV, EMPTY_CELL_MV, CELLS = 4200, 3300, 4
 
 
 class Reported(Protocol):
-    """What the reports are about."""
+    """The state that the reports describe."""
 
     autopilot: Autopilot
     home: Origin
@@ -43,7 +43,7 @@ class Reported(Protocol):
 
 
 class Reports:
-    """Which message is due when. An interval of 0 or less: not sent."""
+    """Schedules the messages. An interval of 0 or less: not sent."""
 
     def __init__(self, vehicle: Reported) -> None:
         self._vehicle = vehicle
@@ -71,19 +71,19 @@ class Reports:
         self._boot_s = math.nan
 
     def set_interval(self, message_id: int, interval_us: float) -> bool:
-        """SET_MESSAGE_INTERVAL: 0 for the default, below 0 for never; False: not one of ours."""
+        """SET_MESSAGE_INTERVAL: 0: default, below 0: never. False: message not supported."""
         if message_id not in self._makers or not math.isfinite(interval_us):
             return False
         self._interval_s[message_id] = 1.0 if interval_us == 0 else interval_us / 1e6
         return True
 
     def make(self, message_id: int) -> Message | None:
-        """One message now; None: not one of ours."""
+        """One message now; None: not supported."""
         maker = self._makers.get(message_id)
         return maker() if maker is not None else None
 
     def due(self, now_s: float) -> list[Message]:
-        """The messages of this moment."""
+        """The messages due now."""
         if math.isnan(self._boot_s):
             self._boot_s = now_s
         messages = []

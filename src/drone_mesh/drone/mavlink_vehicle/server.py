@@ -1,4 +1,4 @@
-"""VehicleServer: simulated vehicles over UDP, in the time of the wall."""
+"""VehicleServer: simulated vehicles over UDP, in real time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Port:
-    """One vehicle on a UDP port of its own; it answers every peer."""
+    """One vehicle on its own UDP port; it answers every peer."""
 
     def __init__(
         self, system_id: int, autopilot: Autopilot, home: Origin, ground_stations: Sequence[Address]
@@ -44,15 +44,15 @@ class _Port:
 
     @property
     def address(self) -> str:
-        """Where an engine finds it."""
+        """The address for an engine."""
         return f"udpout:{LOOPBACK}:{self.socket.getsockname()[1]}"
 
     def read(self, now_s: float) -> None:
-        """Take what has arrived."""
+        """Process the messages that have arrived."""
         while True:
             try:
                 data, sender = self.socket.recvfrom(MOST_BYTES)
-            except OSError:  # nothing left, or a peer that is gone
+            except OSError:  # nothing left, or a peer has gone
                 return
             self._heard_s[sender] = now_s
             for message in self._codec.parse_buffer(data) or ():
@@ -72,7 +72,7 @@ class _Port:
             try:
                 self.socket.sendto(data, peer)
             except OSError:
-                continue  # no listener there now; a datagram may be lost
+                continue  # no listener there now; datagrams may get lost
 
 
 class VehicleServer:
@@ -81,7 +81,7 @@ class VehicleServer:
     def __init__(
         self, autopilot: Autopilot, homes: Sequence[Origin], ground_stations: Sequence[Address] = ()
     ) -> None:
-        """Each vehicle stands at its home; `ground_stations` are sent everything."""
+        """Each vehicle starts at its home; `ground_stations` receive all messages."""
         self._ports = [
             _Port(number, autopilot, home, ground_stations)
             for number, home in enumerate(homes, start=1)
@@ -94,12 +94,12 @@ class VehicleServer:
 
     @property
     def addresses(self) -> list[str]:
-        """Where the engines find the vehicles, in the order of their homes."""
+        """The addresses of the vehicles for engines, in the order of their homes."""
         return [port.address for port in self._ports]
 
     @property
     def vehicles(self) -> list[MavlinkVehicle]:
-        """The vehicles themselves; while the server runs, for its thread alone, or to look at."""
+        """The vehicles themselves; while the server runs, for its thread, or read-only."""
         return [port.vehicle for port in self._ports]
 
     def start(self) -> None:
@@ -107,7 +107,7 @@ class VehicleServer:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread and give the ports back."""
+        """End the thread and close the ports."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join()

@@ -21,7 +21,7 @@ from drone_mesh.drone.mavlink_vehicle.reports import Reports
 RETURN_HEIGHT_M = 15.0  # ArduPilot's RTL_ALT
 GROUND_STATION_LOST_S = 5.0  # ArduPilot's FS_GCS_TIMEOUT
 LOW_BATTERY_PERCENT = 15.0  # PX4's BAT_LOW_THR
-MOST_DISTANCE_M = 100_000.0  # our choice: a target beyond is noise
+MOST_DISTANCE_M = 100_000.0  # our choice: a target farther away is invalid
 DISARMS_AFTER_S = 10.0  # on the ground, armed, nothing to do: both autopilots disarm
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
@@ -31,7 +31,7 @@ REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
 class MavlinkVehicle:
-    """Driven from outside: messages and ticks come in, messages go out through `send`.
+    """Driven from outside: receives messages and ticks, sends messages through `send`.
 
     The ground is level, at the height of home. Nothing here reads a clock.
     """
@@ -45,10 +45,10 @@ class MavlinkVehicle:
         speed_m_s: float = 5.0,
         drain_percent_s: float = 0.05,
     ) -> None:
-        """Stands at home, disarmed, in its mode for holding.
+        """At home, disarmed, in its holding mode.
 
-        `speed_m_s` is its own; targets may lead it slower. `drain_percent_s` is what a second in
-        the air takes out of the battery.
+        `speed_m_s` is its speed unless targets are slower. `drain_percent_s` is the discharge per
+        second in the air.
         """
         self.autopilot = autopilot
         self.system_id = system_id
@@ -80,10 +80,10 @@ class MavlinkVehicle:
             "TIMESYNC": inquiries.take_timesync,
         }
 
-    # What its human pilot does ---------------------------------------------------------------
+    # Actions of the human pilot --------------------------------------------------------------
 
     def choose_mode(self, mode: Mode) -> None:
-        """The pilot turns the switch."""
+        """The pilot selects a mode."""
         self.in_failsafe = False
         self._enter(mode)
 
@@ -93,7 +93,7 @@ class MavlinkVehicle:
         self._stands_since_s = self.now_s
 
     def lift(self, height_m: float) -> None:
-        """The pilot has brought it to this height, and lets it hover there."""
+        """The pilot has taken it to this height, where it hovers."""
         self.arm()
         self.body.place = self.body.place._replace(height=height_m)
         self.choose_mode(Mode.HOLD)
@@ -101,7 +101,7 @@ class MavlinkVehicle:
     # From outside ----------------------------------------------------------------------------
 
     def on_message(self, message: Message, now_s: float) -> None:
-        """Take a message from the link."""
+        """Process a message from the link."""
         self.now_s = now_s
         addressee = getattr(message, "target_system", 0)
         if self.faults.silent or addressee not in (0, self.system_id):
@@ -111,7 +111,7 @@ class MavlinkVehicle:
             take(message)
 
     def tick(self, now_s: float) -> None:
-        """Fly on to this time, and send what is due."""
+        """Fly on to this time and send what is due."""
         passed_s = min(1.0, max(0.0, now_s - self.now_s))
         self.now_s = now_s
         self._watch_for_failsafes()
@@ -219,11 +219,11 @@ class MavlinkVehicle:
         if self.mode is not Mode.FOLLOW:
             return
         if self.autopilot is not PX4 and self.body.on_ground:
-            return  # ArduPilot wants a take-off first
+            return  # ArduPilot requires a take-off first
         self._target = target
 
     def _place(self, lat: int, lon: int, altitude_m: float, frame: int) -> Location | None:
-        """About home; None: not on the earth, or too far to be meant."""
+        """Relative to home; None: not on the earth, or implausibly far away."""
         if abs(lat) > 90e7 or abs(lon) > 180e7:
             return None
         relative = frame in (
@@ -283,7 +283,7 @@ class MavlinkVehicle:
         if mode is None:
             return int(DENIED)
         if mode is Mode.FOLLOW and self.autopilot is PX4 and self.now_s - self._target_s > 1.0:
-            return int(REJECTED)  # PX4 wants targets first
+            return int(REJECTED)  # PX4 requires targets first
         self._enter(mode)
         return int(ACCEPTED)
 
