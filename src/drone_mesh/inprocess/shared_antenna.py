@@ -23,6 +23,7 @@ from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, MediumAccess, Outgoi
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
+from drone_mesh.nrf24.trains import place_in_train
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
 SETTLING_S = SETTLING_NS / NS_PER_S
@@ -253,8 +254,8 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         if mesh is None or not self.powered:
             return
         broadcast = packet.receiver == ALL_NODES
-        data = is_data(packet.payload) and not broadcast
-        self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast, data=data)
+        train = place_in_train(packet.payload, self.node_id)
+        self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))

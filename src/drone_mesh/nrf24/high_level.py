@@ -26,6 +26,7 @@ from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.nrf24.sender import Sender
 from drone_mesh.nrf24.settings import BROADCAST_PIPE
 from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
+from drone_mesh.nrf24.trains import place_in_train
 from drone_mesh.nrf24.transceiver import Received
 
 logger = logging.getLogger(__name__)
@@ -212,8 +213,8 @@ class NRF24HighLevelInterface(IWirelessCommunication):
             return
         self._note(payload)
         broadcast = received.pipe == BROADCAST_PIPE
-        data = is_data(payload) and not broadcast
-        self._sender.heard(sender(payload), broadcast=broadcast, data=data)
+        train = place_in_train(payload, self._radio.node_id)
+        self._sender.heard(sender(payload), broadcast=broadcast, train=train)
         if received.pipe == BROADCAST_PIPE:
             payload = readdressed(payload, self._radio.node_id)
         if self._on_payload is not None:

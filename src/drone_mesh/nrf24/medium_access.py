@@ -17,9 +17,11 @@ air (`inprocess.shared_air`) both follow this one implementation.
 4. A node leaves a gap after each of its packets, so that a burst of them (a check of all
    neighbours) does not occupy the channel as a block.
 5. Users' packets for one receiver follow each other in trains, without the gap between them: a pair
-   that is alone gets most of the channel. Trains get shorter as the channel gets busier, and end
+   that is alone gets most of the channel. Trains get shorter as the channel gets busier, and stop
    when a packet of the mesh waits. A node that hears a train waits for its end, and the sender
-   leaves time for that: so an answer gets through, and a relay takes its turn.
+   leaves time for that: so an answer gets through, and a relay takes its turn. For a relay the end
+   is a packet (see trains.py), and a pause is none: the sender was interrupted, and if the relay
+   sent on what it has, it would disturb the rest, which it cannot hear while it sends.
 6. Each receiver has a line of its own: waiting for one of them does not delay the others. A
    receiver that let a packet fail and was not heard since gets fewer tries for the next one.
 """
@@ -36,6 +38,7 @@ from typing import Any
 from drone_mesh.errors import ConfigurationError
 
 ALL_NODES = -1  # receiver of a broadcast
+NO_SENDER = -1
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,9 @@ class AccessRules:
     gap_s: float  # mean distance between two packets of one node
     train: int  # users' packets without a gap between them, at most
     train_pause_s: float  # a train that was not heard for so long is over
+    train_hold_s: float  # if its end is announced: it was interrupted, and goes on within that time
     most_yield_s: float  # wait for the end of trains at most so long
+    most_hold_s: float  # and if their end is announced
     broadcast_jitter_s: float  # a broadcast waits for a random part of this
     answer_jitter_s: float  # as does whatever is sent within that time after a broadcast was heard
     lifetime_s: float  # a packet that waited for so long is of no use to anyone
@@ -73,7 +78,9 @@ class AccessRules:
             gap_s=2 * cycle_s,
             train=64,
             train_pause_s=1.1 * cycle_s,
+            train_hold_s=30 * cycle_s,
             most_yield_s=60 * cycle_s,
+            most_hold_s=200 * cycle_s,
             broadcast_jitter_s=60 * cycle_s,
             answer_jitter_s=60 * cycle_s,
             lifetime_s=10.0,
@@ -94,6 +101,15 @@ class Priority(enum.IntEnum):
 
     CONTROL = 0  # packets of the mesh itself
     DATA = 1
+
+
+class InTrain(enum.Enum):
+    """What a packet that is heard says of the train that it belongs to."""
+
+    NO = "no"  # it belongs to none
+    PERHAPS = "perhaps"  # another packet may follow at once
+    MORE = "more"  # another packet follows, and the last one will say so
+    LAST = "last"
 
 
 class Fate(enum.Enum):
@@ -143,6 +159,7 @@ class MediumAccess:
         self._train_left = 0  # packets that may still follow in the train that is being sent
         self._yields_since_s = -math.inf  # to the trains of others
         self._yields_until_s = -math.inf
+        self._yields_to = NO_SENDER  # whose train is under way
         self._has_yielded = False  # for long enough: it is this node's turn
         self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
         self._heard_s: dict[int, float] = {}
@@ -189,18 +206,34 @@ class MediumAccess:
         """How many packets of priority DATA it would take now."""
         return self.rules.data_queue_length - self._waiting_data
 
-    def heard(self, sender: int, now_s: float, *, broadcast: bool, data: bool = False) -> None:
-        """A packet came in; `data`: one of a user, for this node."""
+    def heard(
+        self, sender: int, now_s: float, *, broadcast: bool, train: InTrain = InTrain.NO
+    ) -> None:
+        """A packet came in; `train`: what it says of the train that it belongs to."""
         self._silent.discard(sender)
         self._heard_s[sender] = now_s
-        if data and not self._has_yielded:
-            if now_s > self._yields_until_s:
-                self._yields_since_s = now_s
-            last_s = self._yields_since_s + self.rules.most_yield_s
-            self._yields_until_s = min(now_s + self.rules.train_pause_s, last_s)
-            self._has_yielded = self._waiting > 0 and self._yields_until_s == last_s
+        if train is not InTrain.NO and not self._has_yielded:
+            self._yield_to(sender, now_s, train)
         if broadcast:
             self._broadcast_heard_s = now_s
+
+    def _yield_to(self, sender: int, now_s: float, train: InTrain) -> None:
+        """Wait for the end of the train that `sender` sends."""
+        rules = self.rules
+        if now_s > self._yields_until_s:
+            self._yields_since_s, self._yields_to = now_s, NO_SENDER
+        if train is InTrain.LAST:
+            if sender == self._yields_to:
+                self._yields_until_s, self._yields_to = now_s, NO_SENDER
+            return
+        if train is InTrain.MORE:
+            self._yields_to = sender
+        announced = self._yields_to != NO_SENDER
+        pause_s = rules.train_hold_s if announced else rules.train_pause_s
+        last_s = self._yields_since_s + (rules.most_hold_s if announced else rules.most_yield_s)
+        until_s = min(now_s + pause_s, last_s)
+        self._yields_until_s = until_s
+        self._has_yielded = self._waiting > 0 and until_s == last_s
 
     @property
     def next_try_s(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Callable
 
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, Outgoing, Priority
+from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, InTrain, Outgoing, Priority
 from drone_mesh.nrf24.runtime import Runtime, Task
 
 
@@ -65,10 +65,10 @@ class Sender:
         with self._lock:
             return self._access.data_room()
 
-    def heard(self, sender: int, *, broadcast: bool, data: bool) -> None:
-        """A packet of that node came in; `data`: one of a user, for this node."""
+    def heard(self, sender: int, *, broadcast: bool, train: InTrain) -> None:
+        """A packet of that node came in."""
         with self._lock:
-            self._access.heard(sender, self._runtime.now_s(), broadcast=broadcast, data=data)
+            self._access.heard(sender, self._runtime.now_s(), broadcast=broadcast, train=train)
 
     def clear(self) -> None:
         """Give up what waits, without a report."""

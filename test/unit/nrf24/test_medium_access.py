@@ -11,7 +11,14 @@ import random
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.nrf24.medium_access import ALL_NODES, AccessRules, Fate, MediumAccess, Priority
+from drone_mesh.nrf24.medium_access import (
+    ALL_NODES,
+    AccessRules,
+    Fate,
+    InTrain,
+    MediumAccess,
+    Priority,
+)
 
 CYCLE_S = 0.0026
 RULES = AccessRules.for_cycle(CYCLE_S)
@@ -294,13 +301,34 @@ def test_after_a_train_there_is_time_for_an_answer():
 def test_who_hears_a_train_waits_for_its_end_but_not_for_ever():
     node = loaded(0, control=1)
     now_s = 1.0
-    node.heard(5, now_s, broadcast=False, data=True)
+    node.heard(5, now_s, broadcast=False, train=InTrain.PERHAPS)
     while node.due(now_s) is None:
         assert now_s < 1.0 + 2 * RULES.most_yield_s, "it waits for ever"
         now_s += RULES.train_pause_s / 2
-        node.heard(5, now_s, broadcast=False, data=True)
+        node.heard(5, now_s, broadcast=False, train=InTrain.PERHAPS)
     assert now_s >= 1.0 + RULES.most_yield_s - RULES.train_pause_s
     quiet = loaded(0, control=1)
-    quiet.heard(5, 1.0, broadcast=False, data=True)
+    quiet.heard(5, 1.0, broadcast=False, train=InTrain.PERHAPS)
     assert quiet.due(1.0) is None
     assert quiet.due(1.0 + RULES.train_pause_s) is not None
+
+
+def test_a_relay_takes_no_pause_for_the_end_of_a_train_whose_end_is_announced():
+    relay = loaded(1)
+    relay.heard(5, 1.0, broadcast=False, train=InTrain.MORE)
+    assert relay.due(1.0 + 2 * RULES.train_pause_s) is None
+    relay.heard(6, 1.01, broadcast=False, train=InTrain.LAST)  # the end of another one
+    assert relay.due(1.01) is None
+    relay.heard(5, 1.02, broadcast=False, train=InTrain.LAST)
+    assert relay.due(1.02) is not None
+
+
+def test_a_relay_does_not_wait_for_ever_for_an_end_that_got_lost():
+    relay = loaded(1)
+    relay.heard(5, 1.0, broadcast=False, train=InTrain.MORE)
+    assert relay.due(1.0 + RULES.train_hold_s) is not None
+    now_s = 2.0
+    while relay.due(now_s) is None or now_s == 2.0:
+        assert now_s < 2.0 + 2 * RULES.most_hold_s, "it waits for ever"
+        relay.heard(5, now_s, broadcast=False, train=InTrain.MORE)
+        now_s += RULES.train_pause_s

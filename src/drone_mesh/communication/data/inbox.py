@@ -65,6 +65,8 @@ class Inbox:
 
     def poll(self, poll: Poll, now_s: float) -> None:
         """The sender asks what is here."""
+        if poll.nonce == packets.NO_ANSWER:
+            return
         if poll.session == self._session:
             self._unacknowledged, self.ack_due_s = 0, math.inf
         self._acknowledge(self._ack(poll.number, poll.nonce, poll.session))

@@ -15,7 +15,7 @@ from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, Outgoing
-from drone_mesh.communication.data.packets import COMPLETE, Ack, Head, Poll
+from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Head, Poll
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
@@ -77,6 +77,11 @@ class Lane:
         yield from self._open.values()
         yield from self._waiting
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether it has nothing to send, now or later."""
+        return not len(self) and (self._train is None or not self._train.is_open)
+
     def add(self, message: Outgoing) -> None:
         """A message for this destination."""
         self._waiting.append(message)
@@ -104,7 +109,7 @@ class Lane:
             return poll
         if train.is_full and self._has_more():
             return self._end_of_train()
-        return self._fragment(now_s)
+        return self._fragment(now_s) or self._mark_of_end(train)
 
     def _timely_poll(self, now_s: float) -> DataPacket | None:
         """A POLL for a message of which no ACK came in time."""
@@ -140,15 +145,21 @@ class Lane:
         message = packet.message
         if packet.ends_train:
             assert self._train is not None
-            self._train.asked(self._nonce, now_s)
+            poll = packets.poll_of(packet.body)
+            self._train.is_open = False
+            if poll.nonce != NO_ANSWER:
+                self._train.asked(poll.nonce, now_s)
             return
         if packet.kind == packets.POLL:
+            if self._train is not None:
+                self._train.is_open = False
             message.asked_s, message.asks = now_s, message.asks + 1
             return
         self._latest = message
         message.ticket.reason = ""
         if self._train is not None:
             self._train.left += 1
+            self._train.is_open |= packet.kind != packets.FRAGMENTS.start
         index = message.to_send.popleft()
         message.sent |= 1 << index
         if message.to_send:
@@ -202,7 +213,7 @@ class Lane:
     def due_s(self, now_s: float) -> float:
         """When to look after this lane next; infinity while nothing waits in it."""
         due_s = math.inf
-        if not len(self):
+        if self.is_idle:
             return due_s
         train = self._train
         waits = train is not None and train.waits
@@ -230,6 +241,8 @@ class Lane:
 
     def hindered(self, reason: str) -> None:
         """Nothing can be sent now: reliable messages wait, the others are given up."""
+        if self._train is not None:
+            self._train.is_open = False
         for message in list(self):
             if message.ticket.reliable:
                 message.ticket.reason = reason
@@ -309,6 +322,15 @@ class Lane:
     def _end_of_train(self) -> DataPacket:
         assert self._latest is not None
         return self._asking(self._latest)._replace(ends_train=True)
+
+    def _mark_of_end(self, train: Train) -> DataPacket | None:
+        """For the relays, behind a train that is not full."""
+        if not train.is_open:
+            return None
+        assert self._latest is not None
+        assert self._latest.head is not None
+        poll = Poll(self._session, NO_ANSWER, self._latest.head.number)
+        return DataPacket(packets.POLL, packets.poll_body(poll), self._latest, ends_train=True)
 
     def _asking(self, message: Outgoing) -> DataPacket:
         assert message.head is not None

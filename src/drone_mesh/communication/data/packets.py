@@ -19,7 +19,8 @@ MAX_MESSAGE_BYTES = 1024
 SEAL_BYTES = 6  # behind the payload of a message in a mesh with a key
 FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
 ACK = 192  # what its creator has of a message
-POLL = 193  # asks for an ACK
+POLL = 193  # asks for an ACK, and ends a train
+NO_ANSWER = 0  # nonce of a POLL that only ends a train
 ECHO = ROUTE_RECORD  # asks for an ECHO_ANSWER; each node that forwards it adds its id
 ECHO_ANSWER = 195
 LEAST_ROOM = 20  # bytes of a body; with fewer, a long message would need more than 64 fragments
@@ -78,7 +79,7 @@ class Poll(NamedTuple):
     """Asks what the receiver has of a message."""
 
     session: int
-    nonce: int  # 1..255, another one each time: no two polls have the same bytes
+    nonce: int  # another one each time, 1..255: no two have the same bytes; or NO_ANSWER
     number: int
 
 

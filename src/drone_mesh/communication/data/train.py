@@ -21,6 +21,7 @@ class Train:
     def __init__(self) -> None:
         self.length = FIRST_LENGTH
         self.left = 0  # fragments that left
+        self.is_open = False  # relays wait for more of it
         self.nonce = 0  # of its latest POLL; 0: none
         self.asks = 0  # POLLs without an answer
         self.asked_s = math.inf

@@ -237,7 +237,7 @@ class Transport:
 
     def _send_one(self, lane: Lane, now_s: float) -> bool:
         """One packet of a lane; False if it has none now."""
-        if not len(lane) or now_s < lane.not_before_s:
+        if lane.is_idle or now_s < lane.not_before_s:
             return False
         if lane.to != TO_ALL and not self._may_reach(lane, now_s):
             return False

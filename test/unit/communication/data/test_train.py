@@ -47,6 +47,21 @@ def test_behind_relays_no_more_than_a_train_leaves_without_an_answer(chain, reli
     assert sum(map(len, trains)) == 4 * 40
 
 
+@pytest.mark.parametrize("reliable", [True, False])
+def test_relays_are_informed_of_the_end_of_a_short_train_too(chain, reliable):
+    kinds = left_node(chain, 3)
+    chain.send(3, 0, bytes(199), reliable=reliable)
+    assert chain.run_until(lambda: len(chain.received.get(0, [])) == 1, 30.0)
+    assert kinds == [*packets.FRAGMENTS[:8], packets.POLL]
+
+
+def test_a_message_of_one_fragment_is_one_packet(chain):
+    kinds = left_node(chain, 3)
+    chain.send(3, 0, b"21.5")
+    assert chain.run_until(lambda: len(chain.received.get(0, [])) == 1, 30.0)
+    assert kinds == [packets.FRAGMENTS[0]]
+
+
 def test_to_a_neighbour_everything_leaves_without_waiting(chain):
     kinds = left_node(chain, 1)
     tickets = [chain.send(1, 0, bytes(1024), reliable=False) for _ in range(4)]

@@ -1,0 +1,18 @@
+"""Trains on the air: what a packet says of the packets that its sender sends after it."""
+
+from __future__ import annotations
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.nrf24.medium_access import InTrain
+
+
+def place_in_train(payload: bytes, receiver: int) -> InTrain:
+    """What `receiver` learns from a packet about the train that it belongs to."""
+    _creator, _from, kind, _to, addressee = messages.header(payload)
+    if not messages.is_data(payload) or addressee == BROADCAST:
+        return InTrain.NO
+    if addressee == receiver or kind == packets.FRAGMENTS.start:
+        return InTrain.PERHAPS
+    return InTrain.MORE if kind in packets.FRAGMENTS else InTrain.LAST
