@@ -63,7 +63,7 @@ export function chartsCsv(mesh) {
   );
 }
 
-/** The present places, as a file that `casus:=` and "Fly to the places of a file" read. */
+/** The present places, as a file that `casus:=` and "Fly to the positions of a layout file" read. */
 export function placesYaml(mesh, number) {
   const lines = [...mesh.nodes.values()]
     .filter((node) => node.role === 0 && node.position)
