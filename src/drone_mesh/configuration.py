@@ -128,7 +128,7 @@ def load_configuration(
         raise ConfigurationError(
             f"{where(name)}: invalid {name} {shown}: expected {_allowed(name)}"
         ) from None
-    _log.info("seed %d: seed:=%d repeats this run", configuration.seed, configuration.seed)
+    _log.info("random seed: to repeat this run, use seed:=%d", configuration.seed)
     return configuration
 
 

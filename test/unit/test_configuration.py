@@ -199,7 +199,7 @@ def test_a_long_value_is_not_repeated_whole(write):
 def test_the_seed_of_the_file_is_used_and_shown(write, caplog):
     caplog.set_level(logging.INFO)
     assert load_configuration(write("seed: 42")).seed == 42
-    assert "seed:=42 repeats this run" in caplog.text
+    assert "to repeat this run, use seed:=42" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_without_a_seed_a_new_one_is_chosen_each_time_and_shown(write, caplog, t
     path = write(text)
     seeds = [load_configuration(path, overrides).seed for _ in range(5)]
     assert len(set(seeds)) == 5
-    assert all(f"seed:={seed} repeats this run" in caplog.text for seed in seeds)
+    assert all(f"to repeat this run, use seed:={seed}" in caplog.text for seed in seeds)
 
 
 def test_the_shipped_file_is_plain_yaml():
