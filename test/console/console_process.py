@@ -10,6 +10,7 @@ import time
 
 from inprocess_mesh import InProcessMesh
 
+from drone_mesh.console.dots import RecordedDots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayControls
 from drone_mesh.console.history import History
@@ -37,7 +38,7 @@ def feed(mesh: InProcessMesh, store: FrameStore) -> None:
 def recorded(options: argparse.Namespace) -> History:
     """All of a run of the same mesh; node 5 goes off in its middle."""
     mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
-    states, events = [], []
+    states, events, packets = [], [], []
     steps = int(options.recorded * 2)
     for step in range(steps):
         if step == steps // 2:
@@ -46,7 +47,10 @@ def recorded(options: argparse.Namespace) -> History:
         state, happened = mesh.look()
         states.append(state)
         events += happened
-    return History.of(states, events)
+        packets.append(RecordedDots.of(state.stamp_s, *mesh.packets(0.5)))
+    history = History.of(states, events)
+    history.add_packets(packets)
+    return history
 
 
 def main() -> None:

@@ -95,6 +95,11 @@ def test_all_of_a_recording_that_is_played_can_be_looked_at_at_once(start_consol
     drag_to(page, 0.9)
     page.wait_for("later than what was played", lambda: clock_s(page) > 65.0)
     page.wait_for("5 is off by then", lambda: page.row(5, 2) == "off")
+    before = int(page.page.get_attribute("#packets", "data-drawn") or 0)
+    page.wait_for(
+        "dots of that time",
+        lambda: int(page.page.get_attribute("#packets", "data-drawn") or 0) > before,
+    )
     page.page.click("#time-play")
     page.wait_for("it is paused", lambda: page.page.inner_text("#time-play") == "Play")
     page.page.click("#time-live")

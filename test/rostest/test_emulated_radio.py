@@ -12,7 +12,7 @@ import rospy
 import rostest
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
 
-from drone_mesh.msg import NRF24
+from drone_mesh.msg import NRF24, PacketSample
 from drone_mesh.srv import AddDrone, RemoveDrone
 
 GATEWAY_URL = "http://127.0.0.1:9080"
@@ -37,10 +37,15 @@ class EmulatedRadioTest(unittest.TestCase):
         mesh = MeshWatch(6)
         received: list[NRF24] = []
         rospy.Subscriber("/Node/2", NRF24, received.append)
+        packets: set[tuple[int, int]] = set()  # the hops of those that were sampled
+        rospy.Subscriber(
+            "/mesh/packets", PacketSample, lambda m: packets.update(zip(m.senders, m.receivers))
+        )
         mesh.wait("all connected over the chips", 30, mesh.connected)
         # A frame that is lost when they meet costs a detour until the next rounds.
         shortest = {0: 0, 1: 1, 2: 1, 3: 2, 4: 3, 5: 4}
         mesh.wait("the shortest ways found", 45, lambda: mesh.hops() == shortest)
+        wait_for("a packet from 3 to 2 in a sample", WALL_LIMIT_S, lambda: (3, 2) in packets)
         wait_for("/Node/2 shows what was received", WALL_LIMIT_S, lambda: received)
 
         with urllib.request.urlopen(f"{GATEWAY_URL}/nodes", timeout=ANSWER_WITHIN_S) as answer:

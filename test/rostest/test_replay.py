@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Clock
 from rostest_support import WALL_LIMIT_S, wait_for
 
 from drone_mesh.lab.command import main as lab_command
-from drone_mesh.msg import MeshState, NodeState
+from drone_mesh.msg import MeshState, NodeState, PacketSample
 from drone_mesh.ros.views.bag import read_events, read_states
 
 BEGIN_S, LENGTH_S = 100.0, 4.0
@@ -48,6 +48,7 @@ def record(path: Path) -> None:
                 state = MeshState(nodes=[NodeState(id=0)])
                 state.header.stamp = now
                 bag.write("/mesh/state", state, arrived)
+                bag.write("/mesh/packets", PacketSample(carried=1), arrived)
 
 
 class ReplayTest(unittest.TestCase):
@@ -129,9 +130,9 @@ class ReplayTest(unittest.TestCase):
                         lines.append(json.loads(page.recv(timeout=1.0)))
             except (OSError, TimeoutError, websockets.exceptions.WebSocketException):
                 return False
-            return lines[-1]["end"] > BEGIN_S + LENGTH_S - 0.5
+            return lines[-1]["end"] > BEGIN_S + LENGTH_S - 0.5 and lines[-1]["packets"]
 
-        wait_for("the end of the bag on the time line", 60, looked)
+        wait_for("the end of the bag and its packets on the time line", 60, looked)
         self.assertEqual(lines[-1]["start"], BEGIN_S)
         self.assertLess(lines[-1]["now"], BEGIN_S + LENGTH_S - 0.5)
         self.assertTrue(lines[-1]["live"])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import Iterator, NamedTuple, Sequence
+from array import array
+from typing import Iterable, Iterator, NamedTuple, Sequence
 
 from drone_mesh.state.packets import MOST_SAMPLED, kind_of
 
@@ -17,6 +18,31 @@ class Dot(NamedTuple):
     receiver: int
     type: int  # byte 2
     age_s: float  # wall seconds since it arrived
+
+
+def make_dots(senders: bytes, receivers: bytes, types: bytes, ages_s: Iterable[float]) -> list[Dot]:
+    """The packets of a sample, given as columns; each byte is an id or a type."""
+    return [Dot(*packet) for packet in zip(senders, receivers, types, ages_s)]
+
+
+class RecordedDots(NamedTuple):
+    """A sample of packets in a recording: an hour has millions, so they are packed."""
+
+    stamp_s: float  # simulated
+    carried: int  # packets that arrived since the previous sample
+    packets: bytes  # of each packet in the sample: sender, receiver, type
+    ages_s: Sequence[float]  # of each: seconds since it arrived
+
+    @classmethod
+    def of(cls, stamp_s: float, carried: int, dots: Sequence[Dot]) -> RecordedDots:
+        """Pack these."""
+        packets = bytes(byte for dot in dots for byte in dot[:3])
+        return cls(stamp_s, carried, packets, array("f", (dot.age_s for dot in dots)))
+
+    def dots(self, age_s: float) -> list[Dot]:
+        """The packets, so many seconds after the sample."""
+        senders, receivers, types = (self.packets[field::3] for field in range(3))
+        return make_dots(senders, receivers, types, (age + age_s for age in self.ages_s))
 
 
 class PacketDots:
@@ -33,11 +59,15 @@ class PacketDots:
             self._carried += carried
             self._waiting = [*self._waiting, *dots][-MOST_WAITING:]
 
-    def messages(self, is_live: bool) -> Iterator[str]:
-        """New packets for the page, as JSON; none for a page that shows the past."""
-        carried, waiting = self._carried, self._waiting
+    def clear(self) -> None:
+        """Drop the packets not yet sent: the page now shows another moment."""
         self._carried, self._waiting = 0, []
-        if is_live and carried:
+
+    def messages(self) -> Iterator[str]:
+        """New packets for the page, as JSON."""
+        carried, waiting = self._carried, self._waiting
+        self.clear()
+        if carried:
             dots = [
                 [dot.sender, dot.receiver, kind_of(dot.type).value, round(dot.age_s, 3)]
                 for dot in waiting

@@ -233,8 +233,9 @@ class FrameStore:
         self._cache.clear()
 
     def _forget_run(self) -> None:
-        """Simulated time went back: a new world. Charts and logs of all pages start over."""
+        """Simulated time jumped: a different world. Charts and logs of all pages start over."""
         self._run_began_at = self.version
+        self._lost_links = LostLinks()
         self._orders.forget()
         self._events.clear()
         self._samples.clear()

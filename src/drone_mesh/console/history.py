@@ -10,6 +10,7 @@ from dataclasses import fields, replace
 from typing import Any, Iterable, Sequence
 
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.console.dots import RecordedDots
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.outages import MeshSample, take_sample
 
@@ -41,6 +42,8 @@ class History:
         self._samples: list[MeshSample] = []  # one per state
         self._events: list[EventRecord] = []  # oldest first
         self._event_times: list[float] = []
+        self._packets: list[RecordedDots] = []  # oldest first
+        self._packet_times: list[float] = []
         self.marks: list[dict[str, Any]] = []  # what a time line shows: t, node and kind
 
     @classmethod
@@ -82,6 +85,22 @@ class History:
             if event.kind in _MARKED:
                 mark = {"t": event.stamp_s, "kind": _MARKED[event.kind], "node": event.node}
                 self.marks = [*self.marks[1 - MOST_MARKS :], mark]
+
+    @property
+    def has_packets(self) -> bool:
+        """Whether samples of packets were recorded."""
+        return bool(self._packets)
+
+    def add_packets(self, samples: Iterable[RecordedDots]) -> None:
+        """Keep these of a recording, oldest first."""
+        for sample in samples:
+            self._packets.append(sample)
+            self._packet_times.append(sample.stamp_s)
+
+    def packets_between(self, after_s: float, until_s: float) -> Sequence[RecordedDots]:
+        """The samples of packets of this time, oldest first."""
+        first, end = (bisect.bisect_right(self._packet_times, t) for t in (after_s, until_s))
+        return self._packets[first:end]
 
     def index_at(self, at_s: float) -> int:
         """Index of the state that shows the mesh at this time."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
-from typing import Any, Iterator
+from typing import Any, Iterator, Sequence
 
 from starlette.websockets import WebSocket
 
-from drone_mesh.console.dots import PacketDots
+from drone_mesh.console.dots import Dot, PacketDots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import TimeLine
@@ -49,9 +49,14 @@ class Page:
             yield frame
             if self.watching is not None:
                 yield self.detail(self.watching)
-        yield from self.packets.messages(self._player is None)
+        yield from self.packets.messages()
         if self._history.times:
             yield from self._time_line_messages()
+
+    def show_packets(self, carried: int, dots: Sequence[Dot]) -> None:
+        """So many packets arrived in the present; `dots` are a sample of them."""
+        if self._player is None:
+            self.packets.add(carried, dots)
 
     def move(self, request: TimeLine) -> None:
         """Move to another moment."""
@@ -82,7 +87,11 @@ class Page:
         if not self._history.times or self._history.times[-1] < player.now_s:
             self._look_at(None)  # another run has begun
             return
+        before_s = player.now_s
         player.advance(wall_s)
+        for sample in self._history.packets_between(before_s, player.now_s):
+            age_s = (player.now_s - sample.stamp_s) / player.factor
+            self.packets.add(sample.carried, sample.dots(age_s))
         if self._is_live and player.at_end and not player.paused:
             mesh = self._live.mesh
             if mesh is not None and mesh.stamp_s >= player.now_s:
@@ -95,6 +104,7 @@ class Page:
 
     def _look_at(self, player: Player | None) -> None:
         self._player, self._version = player, 0
+        self.packets.clear()
 
     def _time_line_messages(self) -> Iterator[str]:
         times, player = self._history.times, self._player
@@ -107,6 +117,7 @@ class Page:
             "live": player is None,
             "paused": player is not None and player.paused,
             "factor": 1.0 if player is None else player.factor,
+            "packets": self._history.has_packets,
         }
         if time_line != self._time_line:
             self._time_line = time_line

@@ -162,7 +162,7 @@ class ConsoleServer:
     def show_packets(self, carried: int, dots: Sequence[Dot]) -> None:
         """`carried` packets arrived; `dots` are a sample of them."""
         for page in self._pages:
-            page.packets.add(carried, dots)
+            page.show_packets(carried, dots)
 
     def close(self) -> None:
         """Accept no more orders. Running ones end by themselves."""

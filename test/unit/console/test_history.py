@@ -109,3 +109,13 @@ def test_the_store_fills_the_history_that_it_is_given():
 def test_a_recording_keeps_one_state_of_each_time_and_none_that_goes_back():
     history = History.of([mesh(1.0), mesh(1.0), mesh(2.0), mesh(1.5), mesh(3.0)], [])
     assert history.times == [1.0, 2.0, 3.0]
+
+
+def test_a_jump_in_time_is_no_loss_of_links():
+    alone = [NodeStatus(0), NodeStatus(1)]
+    linked = [NodeStatus(0, neighbours=b"\x01"), NodeStatus(1, neighbours=b"\x00")]
+    history = History.of([MeshStatus(1.0, alone), MeshStatus(2.0, linked)], [])
+    player = Player(history, 2.0)
+    assert shown(player)["nodes"]["0"]["known_links"] != "0"
+    player.show(1.0)
+    assert shown(player)["nodes"]["0"]["lost_links"] == "0"

@@ -32,7 +32,7 @@ export class Mesh extends EventTarget {
     this.samples = [];
     this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}}
     this.recording = ""; // its name, if the console shows one
-    this.timeline = {}; // {start, end, now, live, paused, factor} of what can be looked at again
+    this.timeline = {}; // {start, end, now, live, paused, factor, packets} of what can be looked at again
     this.marks = []; // on the time line: [{t, kind, node}]
     this.hasPresent = false; // whether there is a present to return to
     this.selected = null;

@@ -51,7 +51,8 @@ export class PacketDots {
 
   /** Packets are sampled only while a page shows them. */
   #ask() {
-    const offered = this.mesh.canOrder && this.mesh.actions.includes("packets");
+    const { canOrder, timeline, actions } = this.mesh;
+    const offered = actions.includes("packets") && (canOrder || timeline.packets);
     this.box.parentElement.hidden = !offered;
     const shown = this.box.checked && offered;
     document.body.toggleAttribute("data-packets", shown);

@@ -16,6 +16,7 @@ from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.statistics import RadioStatistics
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.host.antenna_panel import AntennaPanel
 
 _RECEIVED_QUEUE = 32  # packets that may wait for a slow subscriber of /Node/<id>
@@ -30,9 +31,16 @@ class EmulatedNRF24(IWirelessCommunication):
     A send only queues the packet; two threads of the antenna send and receive.
     """
 
-    def __init__(self, node_id: int, radio: NRF24LowLevelInterface, slot: ExecutorSlot) -> None:
-        """`slot` drives the mesh component of this node."""
+    def __init__(
+        self,
+        node_id: int,
+        radio: NRF24LowLevelInterface,
+        slot: ExecutorSlot,
+        samples: PacketSamples,
+    ) -> None:
+        """`slot` drives the mesh component of this node; `samples` are of what arrives."""
         self._slot = slot
+        self._samples = samples
         self._received = rospy.Publisher(
             names.node_topic(node_id), NRF24, queue_size=_RECEIVED_QUEUE
         )
@@ -91,5 +99,7 @@ class EmulatedNRF24(IWirelessCommunication):
         self._slot.submit(lambda _now_s: self._antenna.switch_power(on))
 
     def _show(self, payload: bytes) -> None:
+        if self._samples.watched:
+            self._samples.note(payload)
         if not rospy.is_shutdown():
             self._received.publish(NRF24(payload))

@@ -15,6 +15,7 @@ from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
+from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.host.emulated_nrf24 import EmulatedNRF24
 from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
@@ -54,6 +55,7 @@ class EmulatedRadios:
         self._seed = seed
         self._executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_node")
         self._airtime_s, self._measured_s = 0.0, 0.0
+        self._samples = PacketSamples()
         self._chips: dict[int, EmulatedChip] = {}
         self._antennas: dict[int, EmulatedNRF24] = {}
         for drone in drones:
@@ -97,6 +99,7 @@ class EmulatedRadios:
     def start(self) -> None:
         """Start the worker."""
         self._executor.start()
+        self._samples.start()
 
     def slot(self) -> ExecutorSlot:
         """A slot in the worker of all nodes."""
@@ -114,7 +117,7 @@ class EmulatedRadios:
             runtime=self._wall_clock.runtime,
             rng=random.Random(f"{self._seed} radio {node_id}"),
         )
-        antenna = EmulatedNRF24(node_id, radio, slot)
+        antenna = EmulatedNRF24(node_id, radio, slot, self._samples)
         self._antennas[node_id] = antenna
         return antenna
 

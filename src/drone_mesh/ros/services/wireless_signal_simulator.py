@@ -20,9 +20,9 @@ from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.figures import Figures
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
+from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.graph.parameters import configured_obstacles, factory_configuration, or_exit
 from drone_mesh.ros.services.antenna_topic import AntennaTopic
-from drone_mesh.ros.services.packet_samples import PacketSamples
 from drone_mesh.srv import (
     AreaScan,
     AreaScanRequest,

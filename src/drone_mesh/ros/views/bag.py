@@ -1,4 +1,4 @@
-"""Reads and writes the states and events of a mesh in a rosbag."""
+"""Reads states, events and packets of a mesh from a rosbag; writes states and events into one."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Iterable, Iterator
 
 import rosbag
 
+from drone_mesh.console.dots import RecordedDots, make_dots
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import (
@@ -37,6 +38,14 @@ def read_events(path: Path) -> Iterator[EventRecord]:
     with _open(path) as bag:
         for _topic, message, _time in bag.read_messages([names.EVENTS_TOPIC]):
             yield event_record(message)
+
+
+def read_packets(path: Path) -> Iterator[RecordedDots]:
+    """Every sample of packets in the bag, oldest first. Raises BagUnusable."""
+    with _open(path) as bag:
+        for _topic, message, time in bag.read_messages([names.PACKETS_TOPIC]):
+            dots = make_dots(message.senders, message.receivers, message.types, message.ages)
+            yield RecordedDots.of(time.to_sec(), message.carried, dots)
 
 
 def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> None:

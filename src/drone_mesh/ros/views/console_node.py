@@ -13,7 +13,7 @@ from pathlib import Path
 import rosgraph
 import rospy
 
-from drone_mesh.console.dots import Dot
+from drone_mesh.console.dots import make_dots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import LayoutOffer, MeshControls, Recorded, places_of
@@ -116,8 +116,7 @@ class MeshFeed:
         self._runner.in_loop(partial(self._store.add_events, [event_record(message)]))
 
     def _on_packets(self, message: PacketSample) -> None:
-        packets = zip(message.senders, message.receivers, message.types, message.ages)
-        dots = [Dot(*packet) for packet in packets]
+        dots = make_dots(message.senders, message.receivers, message.types, message.ages)
         self._runner.in_loop(partial(self._server.show_packets, message.carried, dots))
 
 

@@ -6,12 +6,13 @@ import itertools
 import logging
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from typing import Sequence
 
 from drone_mesh.console.history import History
 from drone_mesh.console.runner import ConsoleRunner
-from drone_mesh.ros.views.bag import BagUnusable, read_events, read_states
+from drone_mesh.ros.views.bag import BagUnusable, read_events, read_packets, read_states
 from drone_mesh.state.model import MeshStatus
 
 STATES_AT_ONCE = 10  # our choice: 254 nodes keep the server's loop busy for some 50 ms
@@ -46,6 +47,8 @@ class Recording:
             while not self._stopped.is_set():
                 batch = list(itertools.islice(states, STATES_AT_ONCE))
                 if not batch:
+                    packets = list(read_packets(self._path))
+                    self._runner.in_loop(partial(self._history.add_packets, packets))
                     took_s = time.monotonic() - begun_s
                     _log.info("%s: on the time line as a whole after %.1f s", self._path, took_s)
                     return
