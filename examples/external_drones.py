@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Drones flown by a node of your own: roslaunch drone_mesh factory.launch drones:=external
+"""A node that flies the drones: for roslaunch drone_mesh factory.launch drones:=external
 
-Run this one with the same fleet as its parameters. It takes the goals of all drones, moves each
-straight to its goal at 2 m/s, answers for their positions and reports them. Put your simulator or
-your autopilots where `Drone.step` is.
+Give it the same fleet, as parameters. It receives the goals of all drones, moves each straight to
+its goal at 2 m/s, answers requests for their positions and reports these. Replace `Drone.step` by
+your own simulator or autopilots.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ CENTRE_M = 0.05  # of a drone's box above its underside
 
 
 class Drone:
-    """One drone: where it is and where it goes."""
+    """One drone: its position and its goal."""
 
     def __init__(self, place: Location) -> None:
         self.place = self.goal = place
 
     def step(self, passed_s: float) -> None:
-        """Move on."""
+        """Move towards the goal for one step."""
         distance_m = self.place.distance_m(self.goal)
         share = min(1.0, SPEED_M_S * passed_s / distance_m) if distance_m else 1.0
         self.place = Location(*(a + (b - a) * share for a, b in zip(self.place, self.goal)))

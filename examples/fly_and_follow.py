@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Orders a drone to a place and follows the order until the drone has arrived.
 
-Beside a running simulation: examples/fly_and_follow.py ID X Y [HEIGHT]
+While a simulation is running: examples/fly_and_follow.py ID X Y [HEIGHT]
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def main(drone: int, x: float, y: float, height: int) -> int:
         print("no gateway is running" if status == 0 else f"no gateway has a route to {drone}")
         return 1
     if not over.wait(LIMIT_S):
-        print(f"no news for {LIMIT_S:.0f} s")
+        print(f"the order had no outcome within {LIMIT_S:.0f} s")
     return 0 if outcome[0] == MeshEvent.ORDER_ARRIVED else 1
 
 

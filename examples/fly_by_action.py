@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Flies a drone to a place through its action, and prints how far it is.
+"""Flies a drone to a place through its action, and prints its progress.
 
-Beside a simulation that was started with actions:=true:
-examples/fly_by_action.py ID X Y [HEIGHT]. Ctrl-C cancels the flight, and the drone stops.
+While a simulation with actions:=true is running: examples/fly_by_action.py ID X Y [HEIGHT].
+Ctrl-C cancels the flight, and the drone stops.
 """
 
 from __future__ import annotations

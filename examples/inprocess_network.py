@@ -1,4 +1,4 @@
-"""A hundred drones in one process, without ROS: a third of them fails, the others heal the mesh."""
+"""A hundred drones in one process, without ROS: a third fail, the others repair the mesh."""
 
 from drone_mesh.inprocess import Network
 
@@ -10,4 +10,4 @@ for node in range(3, 100, 3):
     network.power(node, on=False)
 network.run_for(10.0)
 healed = network.run_until(lambda: network.all_connected(network.shortest_hops()), within_s=60.0)
-print(f"all that still have a way connected: {healed}, {network.clock.now_s:.1f} s")
+print(f"all nodes with a path are connected: {healed}, {network.clock.now_s:.1f} s")

@@ -1,6 +1,6 @@
 """An engine of your own: PYTHONPATH=examples raspberry_router --id 3 --drone own_engine:OwnEngine
 
-This drone takes the line "goto X Y Z" over TCP and answers each with "at X Y Z", in metres.
+This drone accepts lines "goto X Y Z" over TCP and sends lines "at X Y Z", in metres.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class OwnEngine(IDroneEngine):
 
     def __init__(self, node_id: int) -> None:
         self._line = socket.create_connection(ADDRESS, timeout=2.0).makefile("rw", newline="\n")
-        self._location: Location | None = None  # written by the reader alone
+        self._location: Location | None = None  # written only by the thread of _read
         threading.Thread(target=self._read, name=f"drone {node_id}", daemon=True).start()
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:

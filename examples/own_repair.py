@@ -1,4 +1,4 @@
-"""A repair of your own: the lowest id of a group flies, wherever it stands.
+"""A repair strategy of your own: of a group, the drone with the lowest id flies.
 
 PYTHONPATH=src python3 examples/own_repair.py --runs 20
 """
@@ -13,15 +13,15 @@ from drone_mesh.lab.sequence import run_sequence
 
 
 class LowestId(Thesis):
-    """As Thesis, with another score."""
+    """Like Thesis, with another score."""
 
     def _score(self, step: Step) -> float:
-        """Higher for lower ids; only the first choice of the others can beat a second choice."""
+        """Higher for lower ids; a second choice scores less than any first choice."""
         return 1000.0 - self.mesh.node_id if not step.home else 1.0
 
 
 def main() -> None:
-    """Both repairs over the same misfortunes."""
+    """Compare both strategies over the same random faults."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=5, help="sequences (default: %(default)s)")
     runs = parser.parse_args().runs

@@ -1,4 +1,4 @@
-"""Try a routing technique of your own against ChildTableTree: numbers, and a page with pictures.
+"""Compares a routing technique of your own with ChildTableTree: numbers, and a page with pictures.
 
 PYTHONPATH=src python3 examples/own_routing.py                    the numbers
 PYTHONPATH=src python3 examples/own_routing.py --page run.html    and a page about one run
@@ -19,10 +19,10 @@ from drone_mesh.state.model import MeshStatus
 
 
 class SteadyTree(ChildTableTree):
-    """Keeps the way it knows until that fails; ChildTableTree follows the latest heartbeat."""
+    """Keeps a route until it fails; ChildTableTree follows the latest heartbeat."""
 
     def proven_path_to_node(self, other: int, node: int) -> None:
-        """`node` was just reached from behind `other`: news only if there was no way to it."""
+        """A packet from `node` came through `other`: used only if there was no route to `node`."""
         if self.get_direction_to_node(node) == NO_ROUTE:
             self.other_can_communicate_with_node(other, node)
 
@@ -33,7 +33,7 @@ FAILING = 0.3  # of all drones
 
 
 def run(technique: str, seed: int, gridsize: int) -> tuple[list[MeshStatus], Network]:
-    """A gateway and a grid of routers, of which some fail: the state of each second, and all."""
+    """A gateway and a grid of routers, some of which fail: the state every second."""
     network = Network(seed=seed, routing=technique)
     network.add_fleet(gateways=1, routers=gridsize**2 - 1, gridsize=gridsize, spacing=6.0)
     failing = random.Random(seed).sample(range(1, gridsize**2), int(FAILING * gridsize**2))
@@ -65,11 +65,11 @@ def numbers(states: Sequence[MeshStatus], network: Network) -> tuple[float, floa
 
 
 def main() -> None:
-    """Compare, and draw."""
+    """Print the comparison; with --page, also write a page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=5, help="seeds per technique; default: 5")
     parser.add_argument("--gridsize", type=int, default=10, help="drones in a row; default: 10")
-    parser.add_argument("--page", type=Path, help="write a page about the last run there")
+    parser.add_argument("--page", type=Path, help="write a page about the last run to this file")
     options = parser.parse_args()
     print("technique                   connected   healed after   packets   most by one router")
     for technique in TECHNIQUES:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Reacts to what happens in the mesh: reports each outage, and switches lost power on again.
 
-Beside a running simulation, after `source scripts/env.bash`: examples/react_to_events.py
+While a simulation is running, after `source scripts/env.bash`: examples/react_to_events.py
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ def run_example(tmp_path):
 
 def test_a_mesh_in_process_heals(run_example):
     printed = run_example("inprocess_network.py")
-    assert "all that still have a way connected: True" in printed
+    assert "all nodes with a path are connected: True" in printed
 
 
 def test_ten_lines_are_enough_for_a_network_of_ones_own():

@@ -9,15 +9,15 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import NAME_PATTERN
 
 TEMPLATE = """\
-# {name}: what is tried here, and why.
-#   lab plan {file}      cells, runs, time; stores nothing
-#   lab run {file}       runs what is missing in results/{name}
+# {name}: write here what this experiment compares, and why.
+#   lab plan {file}      shows cells, runs and time; writes nothing
+#   lab run {file}       executes the runs missing from results/{name}
 #   lab report results/{name}
 name: {name}
-seed: 1        # of everything random
+seed: 1        # of all random choices
 seeds: 20      # repetitions: the r-th has the same layout, victims and losses in every cell
 
-base:          # one run; whatever is left out has its default
+base:          # one run; keys that are left out have their defaults
   layout:
     kind: uniform        # uniform, clusters, grid, line, casus or file
     drones: 50           # gateways included
@@ -26,7 +26,7 @@ base:          # one run; whatever is left out has its default
     gateway_at: middle   # middle, corner or random
   range_m: 9.0
   radio: {{loss: 0.0}}
-  routing: child_table_tree      # or your_module:YourTechnique, beside this file
+  routing: child_table_tree      # or your_module:YourTechnique, in a file beside this one
   repair: thesis                 # or your_module:YourStrategy
   timing: {{check_period_s: 10, connection_lost_after_s: 30}}
   faults:
@@ -42,7 +42,7 @@ sweep:         # every combination of these values is a cell
   faults.kill.share: [0.1, 0.3]
   timing.connection_lost_after_s: [10, 30]
 
-metrics: [healed, t_total_s, uptime, distance_total_m, packets]   # `lab metrics` lists all
+metrics: [healed, t_total_s, uptime, distance_total_m, packets]   # `lab metrics` lists all metrics
 compare: {{over: timing.connection_lost_after_s, baseline: 30}}
 """
 
