@@ -15,7 +15,7 @@ import math
 import operator
 import struct
 from dataclasses import dataclass
-from typing import Callable, ClassVar, Mapping, NamedTuple, Union
+from typing import Callable, ClassVar, Iterable, Mapping, NamedTuple, Union
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.drone.interfaces import Location
@@ -24,6 +24,8 @@ from drone_mesh.errors import PacketError
 _CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # places of the header bytes
 HEADER_BYTES = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
+_BYTE = tuple(bytes((value,)) for value in range(256))
+_TWICE = tuple(bytes((value, value)) for value in range(256))
 TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
 REPORT_TYPES = range(64, 128)
 DATA_TYPES = range(128, 256)  # of users; their bodies are described in data/packets.py
@@ -329,11 +331,14 @@ class GatewayPlace(NamedTuple):
         return cls(gateway, Location(*place), age - 1.0)
 
 
-# Read for each packet: these four and `header` cost no call of a Python function.
+# Read for each packet: none of these costs a call of a Python function.
 
 header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct("<5B").unpack_from
 """Creator, from, type, to and forward of a packet."""
 
+
+hop: Callable[[bytes], tuple[int, int]] = struct.Struct("<xBxB").unpack_from
+"""The sender and the receiver of this hop."""
 
 sender: Callable[[bytes], int] = operator.itemgetter(_FROM)
 """The node that sends this hop."""
@@ -355,12 +360,18 @@ def is_data(payload: bytes) -> bool:
 
 def readdressed(payload: bytes, to: int) -> bytes:
     """The same packet with `to` as the receiver of this hop."""
-    return payload[:_TO] + bytes((to,)) + payload[_TO + 1 :]
+    return payload[:_TO] + _BYTE[to] + payload[_TO + 1 :]
+
+
+def copies_for(payload: bytes, receivers: Iterable[int]) -> list[bytes]:
+    """For each of these nodes the same packet with it as the receiver of this hop."""
+    start, end = payload[:_TO], payload[_TO + 1 :]
+    return [start + _BYTE[to] + end for to in receivers]
 
 
 def addressed(payload: bytes, other: int) -> bytes:
     """The same packet for the neighbour `other`, as receiver of this hop and as addressee."""
-    return payload[:_TO] + bytes((other, other)) + payload[_FORWARD + 1 :]
+    return payload[:_TO] + _TWICE[other] + payload[_FORWARD + 1 :]
 
 
 def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: bytes = b"") -> bytes:

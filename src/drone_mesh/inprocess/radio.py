@@ -12,7 +12,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.communication.messages import readdressed, receiver, sender
+from drone_mesh.communication.messages import copies_for, hop
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.inprocess.clock import VirtualClock
 
@@ -48,6 +48,8 @@ class InProcessAir:
         self._cut: set[frozenset[int]] = set()
         # Whether two places within range hear each other: obstacles say so before the nodes start.
         self.sees: Callable[[Location, Location], bool] | None = None
+        # Whether a packet may arrive at all: experiments count packets and lose some.
+        self.carries: Callable[[bytes], bool] | None = None
         # The links between nodes that stand still: looked up for each packet, and changed only when
         # a node appears, disappears or flies.
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
@@ -128,13 +130,25 @@ class InProcessAir:
 
     def send(self, payload: bytes) -> bool:
         """Hand a packet over; True when the receiver has it, or will in a moment."""
-        from_, to = sender(payload), receiver(payload)
+        if self.carries is not None and not self.carries(payload):
+            return False
+        from_, to = hop(payload)
         if self._flying and (from_ in self._flying or to in self._flying):
             other = self._heard_by(from_, self._places((to,))).get(to)
         else:
             links = self._links.get(from_)
             other = links.get(to) if links else None
-        if other is None or not other.powered:
+        return other is not None and self._hand_over(payload, other)
+
+    def broadcast(self, payload: bytes, node: int) -> None:
+        """Hand a packet to each antenna in range of `node`, with its id in byte 3."""
+        others, carries = self.in_range(node), self.carries
+        for copy, other in zip(copies_for(payload, others), others.values()):
+            if carries is None or carries(copy):
+                self._hand_over(copy, other)
+
+    def _hand_over(self, payload: bytes, other: InProcessAntenna) -> bool:
+        if not other.powered:
             return False
         if self.loss and self._rng.random() < self.loss:
             return False
@@ -178,8 +192,7 @@ class InProcessAntenna(IWirelessCommunication):
     def broadcast_message(self, payload: bytes) -> None:
         """Send to each node in range."""
         if self.powered:
-            for other in self._air.in_range(self.node_id):
-                self._air.send(readdressed(payload, other))
+            self._air.broadcast(payload, self.node_id)
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Does nothing: the owner of the network can read its nodes."""

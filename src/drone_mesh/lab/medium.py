@@ -33,7 +33,7 @@ class Jamming:
 
 @dataclass
 class Medium:
-    """Stands before `air.send`, through which all packets pass.
+    """Counts the packets that are handed to the air, and loses some.
 
     The n-th packet from one drone to another meets the same fate in every cell of an experiment,
     whatever is sent elsewhere: each link has a random stream of its own.
@@ -52,8 +52,7 @@ class Medium:
         self._links: dict[tuple[int, int], random.Random] = {}
         air = self.network.air
         if isinstance(air, InProcessAir):
-            self._send = air.send
-            air.send = self.send  # type: ignore[method-assign]
+            air.carries = self.carries
         else:
             for node in self.network.nodes.values():
                 self._watch(node.antenna)
@@ -79,13 +78,13 @@ class Medium:
         antenna.send_message_to = counted_send  # type: ignore[method-assign]
         antenna.broadcast_message = counted_broadcast  # type: ignore[method-assign]
 
-    def send(self, payload: bytes) -> bool:
-        """As the air's."""
+    def carries(self, payload: bytes) -> bool:
+        """Whether a packet is not lost."""
         sender, to = self._count(payload)
         if (self.loss or self.jams or self.arrives) and self._is_lost(sender, to):
             self.lost += 1
             return False
-        return self._send(payload)
+        return True
 
     def _count(self, payload: bytes) -> tuple[int, int]:
         """Returns the sender and the receiver of this hop."""
