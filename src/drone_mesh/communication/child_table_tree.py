@@ -11,17 +11,15 @@ class ChildTableTree(IRoutingTechnique):
 
     def __init__(self) -> None:
         self._children: dict[int, set[int]] = {}
-        # The same table the other way round, so that no packet has to search it.
+        # The same table the other way round, and what follows from it: no packet has to search.
         self._children_with: dict[int, set[int]] = {}
+        self._next_hops: dict[int, int] = {}
         self._entries = 0  # grandchildren in all sets together
         self._essentials: IRoutingEssentials | None = None
 
     def get_direction_to_node(self, node: int) -> int:
         """The node itself if it is a child, else the child with the lowest id that has it."""
-        if node in self._children:
-            return node
-        holders = self._children_with.get(node)
-        return min(holders) if holders else NO_ROUTE
+        return self._next_hops.get(node, NO_ROUTE)
 
     def start_routing(self, essentials: IRoutingEssentials) -> None:
         """Introduce this node to its surroundings."""
@@ -42,6 +40,7 @@ class ChildTableTree(IRoutingTechnique):
         """Forget everything."""
         self._children.clear()
         self._children_with.clear()
+        self._next_hops.clear()
         self._entries = 0
 
     def cant_communicate_with_node(self, node: int) -> int:
@@ -51,6 +50,7 @@ class ChildTableTree(IRoutingTechnique):
             return 0
         for grandchild in grandchildren:
             self._forget_holder(grandchild, node)
+        self._choose_next_hop(node)
         return int(node not in self._children_with)
 
     def other_cant_communicate_with_node(self, other: int, node: int) -> int:
@@ -68,6 +68,7 @@ class ChildTableTree(IRoutingTechnique):
         """`node` becomes a child."""
         if node not in self._children:
             self._children[node] = set()
+            self._next_hops[node] = node
 
     def other_can_communicate_with_node(self, other: int, node: int) -> None:
         """`other` becomes a child and `node` its grandchild."""
@@ -76,6 +77,7 @@ class ChildTableTree(IRoutingTechnique):
             self._children[other].add(node)
             self._children_with.setdefault(node, set()).add(other)
             self._entries += 1
+            self._choose_next_hop(node)
 
     def proven_path_to_node(self, other: int, node: int) -> None:
         """List `node` under `other` and under no other child."""
@@ -109,3 +111,14 @@ class ChildTableTree(IRoutingTechnique):
         holders.remove(child)
         if not holders:
             del self._children_with[node]
+        self._choose_next_hop(node)
+
+    def _choose_next_hop(self, node: int) -> None:
+        """The entries for `node` have changed."""
+        holders = self._children_with.get(node)
+        if node in self._children:
+            self._next_hops[node] = node
+        elif holders:
+            self._next_hops[node] = min(holders)
+        else:
+            self._next_hops.pop(node, None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+import math
 from typing import Tuple
 
 from drone_mesh.communication.timing import CIRCULATION_S
@@ -20,7 +20,7 @@ class CirculationGuard:
 
     def __init__(self) -> None:
         self._passages: dict[bytes, _Passage] = {}
-        self._ages: deque[tuple[float, bytes]] = deque()
+        self._clear_up_s = -math.inf  # when passages that are too old are forgotten
 
     def came_round(
         self, identity: bytes, came_from: int, now_s: float, hops: int = 0
@@ -29,20 +29,23 @@ class CirculationGuard:
 
         A heartbeat counts its hops: only with more `hops` than before has it come round.
         """
-        while self._ages and now_s - self._ages[0][0] >= CIRCULATION_S:
-            at_s, old = self._ages.popleft()
-            if old in self._passages and self._passages[old][2] == at_s:
-                del self._passages[old]
         passage = self._passages.get(identity)
         if passage is None:
             return None
-        first_from, went_to, _at_s, first_hops = passage
-        return None if first_from == came_from or (hops and hops <= first_hops) else went_to
+        first_from, went_to, at_s, first_hops = passage
+        if first_from == came_from or (hops and hops <= first_hops):
+            return None
+        return None if now_s - at_s >= CIRCULATION_S else went_to
 
     def passed(
         self, identity: bytes, came_from: int, went_to: int, now_s: float, hops: int = 0
     ) -> None:
         """The packet was handed on. The first passage is the one that counts."""
-        if identity not in self._passages:
-            self._passages[identity] = (came_from, went_to, now_s, hops)
-            self._ages.append((now_s, identity))
+        passages = self._passages
+        if now_s >= self._clear_up_s:
+            self._clear_up_s = now_s + CIRCULATION_S
+            for old in [p for p, first in passages.items() if now_s - first[2] >= CIRCULATION_S]:
+                del passages[old]
+        first = passages.get(identity)
+        if first is None or now_s - first[2] >= CIRCULATION_S:
+            passages[identity] = (came_from, went_to, now_s, hops)

@@ -22,8 +22,6 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.mesh_node import MeshNode
 from drone_mesh.communication.messages import (
     TYPES_WITH_NUMBERS,
-    HeartbeatMessage,
-    IntroduceMessage,
     MessageType,
 )
 from drone_mesh.communication.observer import MeshEventKind
@@ -126,17 +124,19 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node whose origin is another, or not known yet", payload)
             return
-        if forward not in (me, BROADCAST):
+        if forward != me and forward != BROADCAST:
             if kind == _HEARTBEAT:
                 if self._shared:
-                    self._on_passing_heartbeat(creator, *HeartbeatMessage.body(payload))
+                    self._on_passing_heartbeat(creator, *messages.heartbeat_body(payload))
             elif kind == _LOCATION:
                 self._on_passing_location(creator, payload)
-            self._forwarding.forward(payload, now_s)
+            self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
         elif kind == _HEARTBEAT:
-            self._on_heartbeat(creator, from_, *HeartbeatMessage.body(payload))
+            know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
+            self._on_heartbeat(creator, from_, know_gateway, preferred_gateway, hops)
         elif kind == _PRESENT:
-            self._on_present(creator, *IntroduceMessage.body(payload))
+            hops, know_gateway = messages.present_body(payload)
+            self._on_present(creator, hops, know_gateway)
         else:
             self._process(payload, creator, from_, kind)
 

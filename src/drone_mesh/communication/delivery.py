@@ -72,17 +72,19 @@ class Delivery:
         if self._shared:
             return self._hand_over(payload, to)
         antenna, transmissions, attempts = self._antenna, failures, self._attempts
-        if messages.is_data(payload):
-            attempts *= DATA_PERSISTENCE
-        for _attempt in range(failures, attempts):
+        while failures < attempts or failures < self._most_attempts(payload):
             taken = antenna.send_message_to(payload)
             transmissions += antenna.transmissions_of_last_send()
             if taken:
                 self._sent(to, transmissions)
                 return True
+            failures += 1
         self._routing.sent(to, False, transmissions)
         self._neighbour_lost(to, came_from)
         return False
+
+    def _most_attempts(self, payload: bytes) -> int:
+        return self._attempts * (DATA_PERSISTENCE if messages.is_data(payload) else 1)
 
     def _hand_over(self, payload: bytes, to: int) -> bool:
         """Have the antenna queue a packet; what becomes of it is known later."""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.communication.keys import Keys
-from drone_mesh.communication.messages import HeartbeatMessage, MessageType
+from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.replay import ReplayWindow
 from drone_mesh.communication.seal import SEAL_AT, SEAL_BYTES
 from drone_mesh.errors import PacketError
@@ -206,7 +206,7 @@ class EndToEnd:
 
 
 def _preferred_gateway(heartbeat: bytes) -> int:
-    return HeartbeatMessage.body(heartbeat)[1]
+    return messages.heartbeat_body(heartbeat)[1]
 
 
 def _use(windows: dict[int, ReplayWindow], creator: int, sequence: int) -> bool:

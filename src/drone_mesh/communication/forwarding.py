@@ -13,6 +13,8 @@ from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 
+_HEARTBEAT = int(MessageType.HEARTBEAT)
+
 
 class Forwarding:
     """Hands the packets of other nodes to the next hop. Only the component of its node calls it."""
@@ -32,9 +34,13 @@ class Forwarding:
         self._report = report
         self._circulation = CirculationGuard()
 
-    def forward(self, payload: bytes, now_s: float) -> None:
-        """Forward a packet to its addressee; drop it if it circulates or has no route."""
-        creator, from_, kind, _to, forward = messages.header(payload)
+    def forward(
+        self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float
+    ) -> None:
+        """Forward a packet to its addressee; drop it if it circulates or has no route.
+
+        `creator`, `from_`, `kind` and `forward` are those of its header.
+        """
         routing = self._routing
         if routing.FLOODS:
             if creator == self._node_id:
@@ -45,7 +51,7 @@ class Forwarding:
             self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
             return
         identity = messages.identity(payload)
-        hops = messages.hops(payload) if kind == MessageType.HEARTBEAT else 0
+        hops = messages.hops(payload) if kind == _HEARTBEAT else 0
         went_to = self._circulation.came_round(identity, from_, now_s, hops)
         if went_to is not None:
             self._drop_circulating(payload, went_to, now_s)

@@ -139,12 +139,6 @@ class IntroduceMessage:
     hops_until_gateway: int  # 255 while not known
     know_gateway: bool  # whether its creator is connected
 
-    @classmethod
-    def body(cls, payload: bytes) -> tuple[int, bool]:
-        """Hops until the gateway, and whether a gateway is known: faster than from_payload."""
-        hops, know_gateway = cls.BODY.unpack_from(payload, HEADER_BYTES)
-        return hops, know_gateway
-
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
         return _packed(self, self.hops_until_gateway, self.know_gateway)
@@ -169,12 +163,6 @@ class HeartbeatMessage:
     know_gateway: bool  # whether its creator is connected
     preferred_gateway: int  # 255 while not known
     hops: int  # number of nodes that forwarded it
-
-    @classmethod
-    def body(cls, payload: bytes) -> tuple[bool, int, int]:
-        """Whether a gateway is known, which, and hops: faster than from_payload."""
-        know_gateway, preferred_gateway, hops = cls.BODY.unpack_from(payload, HEADER_BYTES)
-        return know_gateway, preferred_gateway, hops
 
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
@@ -339,6 +327,12 @@ header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct("<5B")
 
 hop: Callable[[bytes], tuple[int, int]] = struct.Struct("<xBxB").unpack_from
 """The sender and the receiver of this hop."""
+
+heartbeat_body: Callable[[bytes], tuple[bool, int, int]] = struct.Struct("<5x?BB").unpack_from
+"""Whether the creator of a HEARTBEAT knows a gateway, which, and the hops so far."""
+
+present_body: Callable[[bytes], tuple[int, bool]] = struct.Struct("<5xB?").unpack_from
+"""The hops of the creator of a PRESENT to its gateway, and whether it knows one."""
 
 sender: Callable[[bytes], int] = operator.itemgetter(_FROM)
 """The node that sends this hop."""

@@ -13,6 +13,8 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.interfaces import Location
 
+_HEARTBEAT = int(messages.MessageType.HEARTBEAT)
+
 
 class IRoutingEssentials(abc.ABC):
     """What a routing technique may ask of the component that it serves."""
@@ -160,7 +162,7 @@ class IRoutingTechnique(abc.ABC):
         """
         self.can_communicate_with_node(from_)
         if creator != from_:
-            if kind == messages.MessageType.HEARTBEAT:
+            if kind == _HEARTBEAT:
                 self.proven_path_to_node(from_, creator)
             elif self.get_direction_to_node(creator) == NO_ROUTE:
                 self.other_can_communicate_with_node(from_, creator)
