@@ -66,7 +66,8 @@ class Delivery:
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
         """
-        if self._strangers.ignores(to, self._deadlines.now_s):
+        strangers = self._strangers
+        if to not in strangers.known and strangers.ignores(to, self._deadlines.now_s):
             self._ignore(to)
             return False
         if self._shared:
@@ -124,11 +125,11 @@ class Delivery:
         """Send a packet of our own towards its addressee, over one route after the other."""
         other = messages.addressee(payload)
         untried = self._routing.directions(other, NO_ROUTE, self._node_id)
-        tried: set[int] = set()
+        tried: list[int] = []
         while untried:
             if self.send_to_each(payload, untried):
                 return True
-            tried.update(untried)
+            tried += untried
             directions = self._routing.directions(other, NO_ROUTE, self._node_id)
             untried = [to for to in directions if to not in tried]
         return False

@@ -51,7 +51,7 @@ class Forwarding:
             self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
             return
         identity = messages.identity(payload)
-        hops = messages.hops(payload) if kind == _HEARTBEAT else 0
+        hops = messages.heartbeat_body(payload)[2] if kind == _HEARTBEAT else 0
         went_to = self._circulation.came_round(identity, from_, now_s, hops)
         if went_to is not None:
             self._drop_circulating(payload, went_to, now_s)

@@ -33,8 +33,8 @@ class CommonFrame:
 
     def heard(self, neighbour: int, present: bytes) -> bool:
         """Take a neighbour's PRESENT; whether its frame is ours."""
-        self._of[neighbour] = frame_digest(present)
-        return self._of[neighbour] == self.digest
+        self._of[neighbour] = digest = frame_digest(present)
+        return digest == self.digest
 
     def refuses(self, from_: int) -> bool:
         """Whether a packet with places from this neighbour may mean another frame.

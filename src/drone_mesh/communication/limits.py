@@ -35,16 +35,16 @@ class Strangers:
     """Nodes that never acknowledged a packet. When too many are lost, others are sent none."""
 
     def __init__(self) -> None:
-        self._known: set[int] = set()
+        self.known: set[int] = set()  # have taken one; read for each packet
         # Called for each packet, hence not a function of Python: `took_packet(node)`, it exists.
-        self.took_packet: Callable[[int], None] = self._known.add
+        self.took_packet: Callable[[int], None] = self.known.add
         self._losses = RateLimit(STRANGERS)
 
     def gave_up(self, node: int, now_s: float) -> None:
         """It took no packet."""
-        if node not in self._known:
+        if node not in self.known:
             self._losses.count(0, now_s)
 
     def ignores(self, node: int, now_s: float) -> bool:
         """Whether no packet is to be spent on it now."""
-        return node not in self._known and self._losses.reached(0, now_s)
+        return node not in self.known and self._losses.reached(0, now_s)

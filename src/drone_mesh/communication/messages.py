@@ -273,6 +273,7 @@ _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
+_NEW_HEARTBEAT = struct.Struct("<5B?BB24x")
 _EXTENSIONS = {  # the bytes behind a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
@@ -371,6 +372,15 @@ def addressed(payload: bytes, other: int) -> bytes:
 def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: bytes = b"") -> bytes:
     """The 32 bytes of header and body."""
     return (bytes((creator, from_, kind, to, forward)) + body).ljust(PAYLOAD_BYTES, b"\0")
+
+
+def heartbeat(
+    creator: int, from_: int, to: int, forward: int, know_gateway: bool, preferred_gateway: int
+) -> bytes:
+    """The bytes of a new HeartbeatMessage, without the object: every fifth packet is one."""
+    return _NEW_HEARTBEAT.pack(
+        creator, from_, _HEARTBEAT, to, forward, know_gateway, preferred_gateway, 0
+    )
 
 
 def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:

@@ -9,7 +9,7 @@ from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.communication.messages import HeartbeatMessage, MessageType
+from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
 from drone_mesh.communication.places import KnownPlaces
@@ -35,7 +35,7 @@ class NodeParts:
     def heartbeat(self, to: int, forward: int, connected: bool, gateway: int) -> bytes:
         """A heartbeat of this node for `forward`, with what the routing technique adds to it."""
         me = self.node_id
-        payload = HeartbeatMessage(me, me, to, forward, connected, gateway, 0).to_payload()
+        payload = messages.heartbeat(me, me, to, forward, connected, gateway)
         room = messages.EXTENSION_ROOM[MessageType.HEARTBEAT]
         room -= self.antenna.reserved_bytes(MessageType.HEARTBEAT)
         extension = self.routing.extension(MessageType.HEARTBEAT, room)
