@@ -122,7 +122,7 @@ class EndToEnd:
         return payload[: SEAL_AT - len(proof)] + proof + payload[SEAL_AT:]
 
     def _with_nonce(self, payload: bytes, at: int, now_s: float) -> bytes:
-        to_gateway = payload[2] == _HEARTBEAT and payload[4] == _preferred_gateway(payload)
+        to_gateway = payload[2] == _HEARTBEAT and payload[4] == messages.heartbeat_body(payload)[1]
         if to_gateway and now_s - self._changed_s >= NEW_NONCE_AFTER_S:
             self._nonces.appendleft(_Nonce(self._rng.getrandbits(32)))
             self._changed_s = now_s
@@ -185,10 +185,13 @@ class EndToEnd:
 
     def _key(self, payload: bytes, creator: int, forward: int) -> bytes | None:
         """The key that a packet from `creator` to `forward` needs; None: it needs none."""
-        kind = payload[2]
         if forward > MAX_NODE_ID or creator > MAX_NODE_ID:
             return None
-        if kind == _ORDER or (kind == _HEARTBEAT and creator == _preferred_gateway(payload)):
+        kind = payload[2]
+        if kind == _HEARTBEAT:
+            from_gateway = creator == messages.heartbeat_body(payload)[1]
+            return self._keys.authority_over(forward) if from_gateway else None
+        if kind == _ORDER:
             return self._keys.authority_over(forward)
         if kind in _PLACES or kind in _REPORTS:
             return self._keys.pair(creator, forward)
@@ -203,10 +206,6 @@ class EndToEnd:
             _NONCE.pack(nonce) + number + what, key=key, digest_size=size, person=b"end2end"
         )
         return tag.digest() + number
-
-
-def _preferred_gateway(heartbeat: bytes) -> int:
-    return messages.heartbeat_body(heartbeat)[1]
 
 
 def _use(windows: dict[int, ReplayWindow], creator: int, sequence: int) -> bool:

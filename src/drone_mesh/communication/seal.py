@@ -35,7 +35,6 @@ CHALLENGE_OUT_S = 0.5  # our choice: after that another node may have its place
 _COUNT_BYTES = 2**16
 _EPOCH_BITS, _NONCE_BITS = 64, 64
 _COUNT = struct.Struct("<I")
-_LOW = struct.Struct("<H")
 _CHALLENGE = struct.Struct("<Q")  # nonce
 _ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
 _NO_SEAL = bytes(SEAL_BYTES)
@@ -98,8 +97,9 @@ class HopSeal:
         else:
             known = self._states.get(payload[_TO])
             state = (known or self._state_to(payload[_TO])).copy()
-        state.update(_COUNT.pack(count) + covered)
-        return head + _LOW.pack(count % _COUNT_BYTES) + state.digest()
+        number = _COUNT.pack(count)
+        state.update(number + covered)
+        return head + number[:2] + state.digest()  # little-endian: the low bytes come first
 
     def open(self, payload: bytes, now_s: float) -> bytes | None:
         """The packet with zeros in place of its seal; None unless it is authentic and new."""
