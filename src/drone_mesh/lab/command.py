@@ -13,10 +13,10 @@ from typing import Callable, Sequence
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.attacks import ATTACKS
 from drone_mesh.lab.campaign import Campaign
-from drone_mesh.lab.damage import KEY, table
+from drone_mesh.lab.damage import KEY, keys_of, table
 from drone_mesh.lab.estimate import Estimate, estimate
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.fuzz import NODES, fuzz
+from drone_mesh.lab.fuzz import NODES, crowd, fuzz
 from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
@@ -141,7 +141,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     attack.set_defaults(run=_attack)
 
     fuzzing = commands.add_parser(
-        "fuzz", help="send mutated packets to a small mesh, without and with a key"
+        "fuzz", help="send mutated packets, and those of invented nodes, to a small mesh"
     )
     fuzzing.add_argument(
         "--packets",
@@ -209,7 +209,16 @@ def _fuzz(options: argparse.Namespace) -> int:
         result = fuzz(options.packets, options.seed, key, progress)
         print(
             f"{case}: {result.packets} packets, no exception; {result.moved} drones moved, "
-            f"{result.connected} of {NODES - 1} routers connected a minute later"
+            f"{result.connected} of {NODES - 1} routers connected a minute later",
+            flush=True,
+        )
+    for case, keys in (("without a key", None), ("with a key", keys_of)):
+        half, end = crowd(options.packets, options.seed, keys, progress)
+        print(
+            f"{case}: {options.packets} packets of 254 invented nodes; the tables of {NODES} nodes "
+            f"hold {end.entries} entries, {half.entries} after half of the packets, the largest "
+            f"table {end.largest}",
+            flush=True,
         )
     return 0
 

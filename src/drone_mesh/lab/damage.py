@@ -20,7 +20,8 @@ SPACING_M = 6.0
 STRANGER = 200
 LURED_M = 50.0  # further than any repair flies here
 OFF_ORDER_M = 3.0  # of a drone that its owner ordered to a place
-KEY = MeshKey(b"the key of a lab")
+_SECRET = b"the key of a lab"
+KEY = MeshKey(_SECRET)
 
 
 class Case(enum.Enum):
@@ -50,7 +51,7 @@ def trial(name: str, case: Case, seed: int) -> Damage:
     shared = attack is invented_ids  # where an answer to an absent node costs airtime
     radio = "shared" if shared else "disc"
     network = Network(
-        seed, radio=radio, key=_keys_of if case in (Case.WITH_KEY, Case.CAPTURED) else None
+        seed, radio=radio, key=keys_of if case in (Case.WITH_KEY, Case.CAPTURED) else None
     )
     if attack in (highest_bid, plausible_bid):
         network.add_gateway(0, 0.0, 0.0)
@@ -116,10 +117,11 @@ def _in_words(damage: Sequence[Damage]) -> str:
     return text
 
 
-def _keys_of(node_id: int) -> Keys | None:
+def keys_of(node_id: int) -> Keys | None:
+    """Routers have their own keys; the one of the stranger beside the mesh has none."""
     if node_id == BESIDE:
         return None
-    return KEY if node_id == 0 else KEY.for_node(node_id)
+    return MeshKey(_SECRET) if node_id == 0 else KEY.for_node(node_id)
 
 
 def _get_acquainted(stranger: Stranger) -> None:

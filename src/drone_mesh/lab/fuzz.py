@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import random
-from typing import Callable, NamedTuple
+from collections import deque
+from typing import Callable, Iterable, NamedTuple
 
-from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.keys import Keys
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.network import Network
@@ -15,6 +16,7 @@ NODES = 6
 SPACING_M = 6.0
 PACKETS_PER_S = 500  # what a channel at 250 kbit/s takes
 REPORT_EVERY = 10_000
+_CORE = "drone_mesh.communication"
 _ROUND = 50  # packets between which simulated time passes
 
 
@@ -24,6 +26,13 @@ class FuzzResult(NamedTuple):
     packets: int
     moved: int  # drones that are not where they were
     connected: int  # routers, a minute after the last packet
+
+
+class Tables(NamedTuple):
+    """How much the tables of some nodes hold."""
+
+    largest: int  # entries of the largest one
+    entries: int  # of all together
 
 
 def fuzz(
@@ -63,6 +72,57 @@ def fuzz(
             progress(done)
     network.run_for(60.0)
     return FuzzResult(packets, _moved(network, places), sum(map(network.connected, places)) - 1)
+
+
+def crowd(
+    packets: int,
+    seed: int,
+    key: Callable[[int], Keys | None] | None = None,
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[Tables]:
+    """Send packets of 254 invented nodes, all types and any bodies, to a small mesh.
+
+    Returns what the tables of all nodes held after each half.
+    """
+    rng = random.Random(seed)
+    network = Network(seed, key=key)
+    network.add_fleet(1, NODES - 1, 3, SPACING_M)
+    network.run_until(network.all_connected, within_s=60.0)
+    held = []
+    for done in range(packets):
+        receiver = rng.randrange(NODES)
+        head = [rng.randrange(254), rng.randrange(254), rng.randrange(256), receiver]
+        head.append(rng.choice((receiver, BROADCAST, rng.randrange(254))))
+        network.inject(
+            receiver,
+            bytes(head) + bytes(rng.getrandbits(8) for _ in range(PAYLOAD_BYTES - len(head))),
+        )
+        if done % _ROUND == 0:
+            network.run_for(_ROUND / PACKETS_PER_S)
+        if done % REPORT_EVERY == 0:
+            progress(done)
+        if done + 1 in (packets // 2, packets):
+            held.append(tables(node.receiver for node in network.nodes.values()))
+    return held
+
+
+def tables(roots: Iterable[object]) -> Tables:
+    """All tables of these objects and of the objects of the mesh core that they hold."""
+    waiting, seen = list(roots), set()
+    largest = entries = 0
+    while waiting:
+        item = waiting.pop()
+        if id(item) in seen:
+            continue
+        seen.add(id(item))
+        if isinstance(item, (dict, list, tuple, set, frozenset, deque)):
+            largest, entries = max(largest, len(item)), entries + len(item)
+            waiting += item.values() if isinstance(item, dict) else item
+        elif type(item).__module__.startswith(_CORE):
+            slots = [name for cls in type(item).__mro__ for name in getattr(cls, "__slots__", ())]
+            waiting += [getattr(item, name) for name in slots if hasattr(item, name)]
+            waiting += getattr(item, "__dict__", {}).values()
+    return Tables(largest, entries)
 
 
 def mutated(payload: bytes, rng: random.Random) -> bytes:

@@ -6,10 +6,11 @@ import functools
 
 import pytest
 
+from drone_mesh.inprocess import Network
 from drone_mesh.lab.attacks import ATTACKS, RECORDING
 from drone_mesh.lab.command import main
-from drone_mesh.lab.damage import KEY, Case, table, trial
-from drone_mesh.lab.fuzz import fuzz
+from drone_mesh.lab.damage import KEY, Case, keys_of, table, trial
+from drone_mesh.lab.fuzz import crowd, fuzz, tables
 
 # Of what an attack may not have effects: what the scenario costs by itself differs a little with
 # the moments at which packets travel.
@@ -97,3 +98,23 @@ def test_no_mutated_packet_stops_a_node(key):
     assert result.packets == 10_000
     if key is not None:
         assert (result.moved, result.connected) == (0, 5)
+
+
+MOST_FLOODS = 1024  # messages to all that a node remembers; the other tables are per node id
+
+
+@pytest.mark.parametrize("keys", [None, keys_of], ids=["without key", "with key"])
+def test_no_table_grows_beyond_what_254_invented_nodes_can_fill(keys):
+    for held in crowd(4_000, seed=1, key=keys):
+        assert held.largest <= MOST_FLOODS
+
+
+def test_the_tables_of_an_object_are_those_of_all_its_parts():
+    network = Network(seed=1)
+    network.add_gateway(0, 0.0, 0.0)
+    node = network.nodes[0]
+    before = tables([node.receiver])
+    node.component.complaints.counts.update(f"reason {n}" for n in range(2_000))
+    after = tables([node.receiver])
+    assert after.largest == 2_000
+    assert after.entries == before.entries + 2_000
