@@ -119,8 +119,8 @@ def make_parser() -> argparse.ArgumentParser:
         "--key-file",
         type=Path,
         metavar="FILE",
-        help="seal all packets of the runs in process with this mesh key (over ROS: "
-        "--launch key:=FILE)",
+        help="seal all packets of the runs in process with this mesh key, and compare with and "
+        "without it (over ROS: --launch key:=FILE)",
     )
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="also write all figures to this file"
@@ -146,6 +146,7 @@ class Benchmark:
         self._inprocess: list[inprocess.InProcessResult] = []
         self._soak: soak.SoakResult | None = None
         self._overload: list[overload.OverloadResult] = []
+        self._seal_cost: inprocess.SealCost | None = None
         self._key = None if options.key_file is None else read_key_file(options.key_file)
 
     def run(self) -> int:
@@ -191,6 +192,9 @@ class Benchmark:
         for drones in inprocess.SIZES:
             result = inprocess.measure(drones, runs, self._progress.say, key=self._key)
             self._inprocess.append(result)
+        if self._key is not None:
+            drones = inprocess.SIZES[len(inprocess.SIZES) // 2]
+            self._seal_cost = inprocess.seal_cost(drones, runs, self._progress.say, self._key)
         self._progress.clear()
 
     def _run_soak(self) -> None:
@@ -248,6 +252,8 @@ class Benchmark:
             sections.append(report.ros_tables(self._ros))
         if self._inprocess:
             sections.append(report.inprocess_table(self._inprocess))
+        if self._seal_cost is not None:
+            sections.append(report.seal_line(self._seal_cost))
         if self._soak is not None:
             sections.append(report.verdict_lines(self._soak))
         sections += [
@@ -265,6 +271,7 @@ class Benchmark:
             "machine": asdict(self._machine),
             "ros": [asdict(result) for result in self._ros],
             "inprocess": [asdict(result) for result in self._inprocess],
+            "seal": None if self._seal_cost is None else asdict(self._seal_cost),
             "overload": [asdict(result) for result in self._overload],
             "soak": None if self._soak is None else soak.as_json(self._soak),
             "failed": self._failed,

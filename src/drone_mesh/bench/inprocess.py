@@ -37,6 +37,18 @@ class InProcessResult:
 
 
 @dataclass(frozen=True)
+class SealCost:
+    """Packets per second of processor time, best of several runs taken in turns."""
+
+    drones: int
+    spacing_m: float
+    runs: int
+    simulated_s: float
+    without_key: float
+    with_key: float
+
+
+@dataclass(frozen=True)
 class _Pace:
     per_cpu_s: float
     per_wall_s: float
@@ -91,3 +103,27 @@ def measure(
         packets=packets,
         all_connected=connected,
     )
+
+
+def seal_cost(
+    drones: int,
+    runs: int,
+    say: Callable[[str], None],
+    key: Keys,
+    simulated_s: float = SIMULATED_S,
+) -> SealCost:
+    """The pace of a running network without and with a key, `runs` times each."""
+    case = Case(drones, SPACING_M)
+    without_key, with_key = 0.0, 0.0
+    for run in range(runs):
+        say(f"{drones} drones in process, without and with a key: run {run + 1} of {runs}")
+        for keys in (None, key):
+            network = Network(seed=run, key=keys)
+            network.add_fleet(1, case.routers, case.gridsize, SPACING_M)
+            network.run_for(simulated_s)
+            pace = _pace(network, simulated_s).packets_per_cpu_s
+            if keys is None:
+                without_key = max(without_key, pace)
+            else:
+                with_key = max(with_key, pace)
+    return SealCost(drones, SPACING_M, runs, simulated_s, without_key, with_key)

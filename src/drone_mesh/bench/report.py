@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Sequence
 
-from drone_mesh.bench.inprocess import InProcessResult
+from drone_mesh.bench.inprocess import InProcessResult, SealCost
 from drone_mesh.bench.measurement import RosResult
 from drone_mesh.bench.overload import OverloadResult
 from drone_mesh.bench.soak import Sample, SoakResult
@@ -193,6 +193,16 @@ def inprocess_table(results: Sequence[InProcessResult]) -> str:
                 for result in results
             ],
         )
+    )
+
+
+def seal_line(cost: SealCost) -> str:
+    """What a key costs."""
+    return (
+        f"{cost.drones} nodes, {cost.spacing_m:g} m, in process: "
+        f"{cost.without_key:.0f} packets per second of processor time without a key, "
+        f"{cost.with_key:.0f} with one: {1e6 / cost.with_key - 1e6 / cost.without_key:.1f} "
+        f"microseconds more per packet (best of {cost.runs} runs)"
     )
 
 

@@ -5,6 +5,8 @@ import json
 import pytest
 
 from drone_mesh.bench import command
+from drone_mesh.communication.key_file import write_key_file
+from drone_mesh.communication.keys import MeshKey
 
 
 def run(capsys, *arguments):
@@ -29,6 +31,21 @@ def test_in_process_needs_no_ros_and_prints_the_same_as_table_and_json(
     assert result["all_connected"] is True
     assert f"{result['running_per_cpu_s']:.0f} ({result['running_per_wall_s']:.0f})" in out
     assert "in process" in err
+
+
+def test_with_a_key_one_line_compares_packets_per_core_second_without_and_with_it(
+    capsys, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(command.inprocess, "SIZES", (4,))
+    write_key_file(tmp_path / "mesh.key", MeshKey(bytes(range(16))))
+    figures = tmp_path / "figures.json"
+    arguments = ("--only", "inprocess", "--quick", "--key-file", str(tmp_path / "mesh.key"))
+    code, out, _err = run(capsys, *arguments, "--json", str(figures))
+    assert code == 0
+    cost = json.loads(figures.read_text())["seal"]
+    (line,) = [line for line in out.splitlines() if line.startswith("4 nodes, 6 m, in process: ")]
+    assert f"{cost['without_key']:.0f} packets per second of processor time without a key" in line
+    assert f"{cost['with_key']:.0f} with one" in line
 
 
 def test_without_ros_it_says_what_to_do(capsys, tmp_path, monkeypatch):
