@@ -183,7 +183,8 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         mesh.on_msg(opened, now_s)
 
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        if self._mesh is not None:
+        """A radio that acknowledged a challenge and never answered it is no neighbour."""
+        if self._mesh is not None and self._seal.knows(neighbour, now_s):
             self._mesh.on_delivered(neighbour, tries, now_s)
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:

@@ -179,12 +179,16 @@ class UsersDesk:
     def echo(self, to: int, timeout_s: float) -> EchoAnswer | None:
         """Request an echo and wait for it; None: no answer.
 
-        Raises MessageRefused if there is no route to it.
+        Raises MessageRefused if there is no route to it, or if a key is the likely reason that no
+        answer came.
         """
         transport = self._require()
         answers: queue.Queue[EchoAnswer | str] = queue.Queue()
+        hint = ""
 
         def ask(now_s: float) -> None:
+            nonlocal hint
+            hint = transport.hint()
             try:
                 if transport.echo(to, answers.put, now_s) is None:
                     answers.put(transport.unreachable(to))
@@ -195,6 +199,8 @@ class UsersDesk:
         try:
             answer = answers.get(timeout=timeout_s)
         except queue.Empty:
+            if hint:
+                raise MessageRefused(f"no answer within {timeout_s:g} s{hint}") from None
             return None
         if isinstance(answer, str):
             raise MessageRefused(answer)

@@ -47,3 +47,15 @@ def test_an_echo_is_answered_or_refused_with_the_reason(rig):
         rig.desks[0].echo(77, 1.0)
     rig.network.nodes[2].component.on_msg = lambda payload, now_s: None
     assert rig.desks[0].echo(2, 0.01) is None
+
+
+def test_an_echo_without_an_answer_names_the_neighbour_with_another_key(rig):
+    network = rig.network
+    network.nodes[2].component.data.on_packet = lambda _payload: None
+    assert rig.desks[0].echo(2, 0.01) is None
+    reason = "a neighbour, node 9, sends packets without a seal: it has no key"
+    network.nodes[0].component.complaints.foreign(reason, b"", network.now_s())
+    with pytest.raises(MessageRefused, match=f"^no answer within 0.01 s; {reason}$"):
+        rig.desks[0].echo(2, 0.01)
+    with pytest.raises(MessageRefused, match=f"^no route to node 77; {reason}$"):
+        rig.desks[0].echo(77, 0.01)

@@ -150,10 +150,11 @@ class Transport:
     def unreachable(self, to: int) -> str:
         """Why nothing can be sent to `to` now, in words."""
         if to == TO_GATEWAY:
-            return f"this node knows no gateway{self._hint()}"
-        return f"no route to {destination_in_words(to)}{self._hint()}"
+            return f"this node knows no gateway{self.hint()}"
+        return f"no route to {destination_in_words(to)}{self.hint()}"
 
-    def _hint(self) -> str:
+    def hint(self) -> str:
+        """That a neighbour has another key or none, to be added to what went wrong; or empty."""
         foreign = self._parts.antenna.foreign_neighbour()
         foreign = foreign or self._complaints.foreign_neighbour(self._parts.now_s)
         return f"; {foreign}" if foreign else ""
@@ -304,7 +305,7 @@ class Transport:
         lane = self._lanes.get(to)
         if lane is None:
             seal = functools.partial(self._parts.antenna.seal_message, self._parts.node_id, to)
-            lane = Lane(to, self._session, self._room, self._ended, seal, self._hint)
+            lane = Lane(to, self._session, self._room, self._ended, seal, self.hint)
             self._lanes[to] = lane
         return lane
 

@@ -190,3 +190,13 @@ def test_a_relay_takes_no_place_that_only_its_addressee_can_check():
         packet("00 00 01 01 02 00 00 80 3f 00 00 80 3f 00 00 ff ff ff 7f"), network.now_s()
     )
     assert relay.places.gateway == network.location(0)
+
+
+def test_a_radio_that_acknowledges_a_challenge_and_does_not_answer_it_becomes_no_neighbour():
+    network = line(3, radio="shared")
+    assert network.run_until(network.all_connected, within_s=30.0)
+    node = network.nodes[2]
+    assert node.component.get_direction_to(0) == 1
+    node.receiver.on_delivered(0, 1, network.now_s())  # it poses as the gateway
+    assert node.component.get_direction_to(0) == 1
+    assert 0 not in node.component.get_neighbours()
