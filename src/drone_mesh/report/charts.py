@@ -36,7 +36,7 @@ def timeline_figure(story: RunStory) -> str:
     _mark_events(share, story)
     most = with_gaps(sample.most_hops for sample in story.samples)
     mean = with_gaps(sample.mean_hops for sample in story.samples)
-    hops.plot(times, most, color=LIGHT.accent, label="most")
+    hops.plot(times, most, color=LIGHT.accent, label="maximum")
     hops.plot(times, mean, color=LIGHT.gateway, label="mean")
     hops.set_ylabel("hops")
     hops.set_ylim(bottom=0)
