@@ -1,1 +1,1 @@
-"""The mesh software: no ROS, no pybullet, no SPI; no clock, threads or chance of its own."""
+"""The mesh software: no ROS, pybullet or SPI; no clock, threads or randomness of its own."""

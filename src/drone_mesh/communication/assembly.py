@@ -1,4 +1,4 @@
-"""How a mesh component is put together, the same way on every host."""
+"""Builds a mesh component, in the same way for every host."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def assemble_component(
     repair: str | IRepairStrategy = DEFAULT_REPAIR,
     repair_options: RepairOptions | None = None,
 ) -> MeshnetworkComponent:
-    """A gateway if it has an `internet` side, else a router; not started yet.
+    """A gateway if `internet` is given, otherwise a router; not started yet.
 
-    `routing` is a routing technique or the name of one, `repair` a repair strategy or the name of
-    one. Raises ConfigurationError for an unknown name and ValueError for a node id outside 0..253.
+    `routing` is a routing technique or its name, `repair` a repair strategy or its name. Raises
+    ConfigurationError for an unknown name and ValueError for a node id outside 0..253.
     """
     technique = create_routing_technique(routing) if isinstance(routing, str) else routing
     if internet is None:

@@ -1,7 +1,7 @@
-"""BidCredit: which bids to believe (docs/protocol.md, "Negotiation").
+"""BidCredit: decides which bids to trust (docs/protocol.md, "Negotiation").
 
-A key proves that a bid comes from the mesh, not that its creator exists or means to fly: a captured
-node can relay the bids of any number of others.
+A key proves that a bid comes from the mesh, not that its creator exists or intends to fly: a
+captured node can relay bids of any number of others.
 """
 
 from __future__ import annotations
@@ -11,29 +11,29 @@ from collections import Counter
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.drone.interfaces import Location
 
-WINNERS_IN_VAIN = 3  # our choice: a winner may fail to fly for reasons of its own
+WINNERS_IN_VAIN = 3  # our choice: a winner may also fail to fly for honest reasons
 
 
 class BidCredit:
-    """Which neighbours a router trusts to relay bids."""
+    """The neighbours that a router trusts to relay bids."""
 
     def __init__(self) -> None:
         self._brought_by: dict[int, int] = {}  # creator of a bid -> neighbour that brought it
         self._in_vain: Counter[int] = Counter()  # by neighbour: winners that did not fly
 
     def believes(self, node: int, score: float, from_: int, most: float) -> bool:
-        """Whether a bid of `node` that `from_` brought counts; `most`: see highest_plausible."""
+        """Whether to count a bid of `node` relayed by `from_`; `most`: see highest_plausible."""
         if score > most or self._in_vain[from_] >= WINNERS_IN_VAIN:
             return False
         self._brought_by[node] = from_
         return True
 
     def did_not_fly(self, winner: int) -> None:
-        """The winner was passed over."""
+        """The winner did not take off."""
         self._in_vain[self._brought_by.get(winner, NO_ROUTE)] += 1
 
     def clear(self) -> None:
-        """The router is connected: all are believed again."""
+        """The router is connected: trust all neighbours again."""
         self._brought_by.clear()
         self._in_vain.clear()
 

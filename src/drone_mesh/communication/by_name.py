@@ -1,4 +1,4 @@
-"""Parts that a launch argument chooses: by a short name, or as package.module:Class."""
+"""Creates parts that a launch argument selects: by a short name, or as package.module:Class."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Part = TypeVar("Part")
 def create_by_name(
     what: str, name: str, known: Mapping[str, Callable[[], Part]], interface: type[Any]
 ) -> Part:
-    """A new part: a name of `known`, or "package.module:Class" for one of your own.
+    """Create a part: a name in `known`, or "package.module:Class" for your own.
 
-    `what` it is goes into the messages. Raises ConfigurationError for anything that is not an
-    `interface`, with the known names.
+    `what` names the part in messages. Raises ConfigurationError, with the known names, for anything
+    that does not implement `interface`.
     """
     module_name, colon, class_name = name.partition(":")
     make = _from_module(what, module_name, class_name) if colon else known.get(name)

@@ -44,7 +44,7 @@ class ChildTableTree(IRoutingTechnique):
         self._entries = 0
 
     def cant_communicate_with_node(self, node: int) -> int:
-        """Remove child `node` with all that is behind it."""
+        """Remove child `node` and its grandchildren."""
         grandchildren = self._children.pop(node, None)
         if grandchildren is None:
             return 0
@@ -54,7 +54,7 @@ class ChildTableTree(IRoutingTechnique):
         return int(node not in self._children_with)
 
     def other_cant_communicate_with_node(self, other: int, node: int) -> int:
-        """Remove `node` from behind `other`."""
+        """Remove `node` from the grandchildren of `other`."""
         if other == node:
             return self.cant_communicate_with_node(node)
         grandchildren = self._children.get(other)

@@ -8,14 +8,15 @@ from typing import Tuple
 from drone_mesh.communication.timing import CIRCULATION_S
 
 _Passage = Tuple[int, int, float, int]
-"""How a packet was handed on when it came for the first time: the neighbour that it came from, the
-next hop, the time and the hops that it counted. A plain tuple, as there is one for each packet."""
+"""A packet's first passage: the neighbour that it came from, the next hop, the time and its hop
+count. A plain tuple, as there is one for each packet."""
 
 
 class CirculationGuard:
     """Remembers for half a second which packets passed through this node.
 
-    A packet is known by what does not change on its way: creator, type, final addressee and body.
+    A packet is identified by what does not change on its way: creator, type, final addressee and
+    body.
     """
 
     def __init__(self) -> None:
@@ -25,7 +26,7 @@ class CirculationGuard:
     def came_round(
         self, identity: bytes, came_from: int, now_s: float, hops: int = 0
     ) -> int | None:
-        """The next hop that a packet was handed to before, if it now comes from another neighbour.
+        """The next hop of the packet's first passage, if it now comes from another neighbour.
 
         A heartbeat counts its hops: only with more `hops` than before has it come round.
         """

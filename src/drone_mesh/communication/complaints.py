@@ -13,7 +13,7 @@ _log = logging.getLogger(__name__)
 
 
 class Complaints:
-    """Counts of problems, by reason. Belongs to the thread that works in the node."""
+    """Counts problems of one node, by reason. Belongs to the thread that runs the node."""
 
     def __init__(self, node_id: int) -> None:
         self._node_id = node_id
@@ -22,7 +22,7 @@ class Complaints:
         self.counts: Counter[str] = Counter()
 
     def add(self, reason: str, detail: str, now_s: float) -> None:
-        """Count `reason`, and log it with `detail` unless it was logged a short while ago."""
+        """Count `reason`; log it with `detail` unless it was logged within the last period."""
         self.counts[reason] += 1
         logged_s = self._logged_s.get(reason)
         if logged_s is not None and 0 <= now_s - logged_s < COMPLAINT_PERIOD_S:
@@ -43,5 +43,5 @@ class Complaints:
         return reason if now_s - at_s <= FOREIGN_FOR_S else ""
 
     def dropped(self, reason: str, payload: bytes, now_s: float) -> None:
-        """A packet was dropped."""
+        """Count and log a dropped packet."""
         self.add(f"dropped {reason}", payload.hex(), now_s)

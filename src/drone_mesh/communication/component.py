@@ -1,8 +1,8 @@
-"""MeshnetworkComponent: what a router and a gateway have in common (docs/protocol.md).
+"""MeshnetworkComponent: the common part of router and gateway (docs/protocol.md).
 
-It takes in packets, time and orders, and hands each to the part that deals with it. A component
-has no thread, no clock and no randomness of its own. One thread at a time calls into it; the
-getters of IMeshDebugInfo may be read from any other.
+It receives packets, time and orders, and passes each to the part that handles it. A component has
+no thread, clock or randomness of its own. One thread at a time calls it; any thread may call the
+getters of IMeshDebugInfo.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _LOCATION = int(MessageType.LOCATION)
 
 
 class MeshnetworkComponent(MeshNode, IMeshNetwork):
-    """One node: receives, learns, and dispatches."""
+    """One node: receives packets, learns from them, dispatches them."""
 
     # Driven from outside ---------------------------------------------------------------------
 
     def start(self, now_s: float) -> None:
-        """Antenna on, debugging on if asked, then look for others. The first check comes later."""
+        """Antenna on, debugging on if configured, introduce the node. The first check follows."""
         self._deadlines.now_s = now_s
         self._antenna.start_antenna(self)
         if self._debug:
@@ -52,7 +52,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self._routing.start_routing(self)
 
     def stop(self) -> None:
-        """Antenna and debugging off; nothing is due any more."""
+        """Antenna and debugging off; nothing is due from now on."""
         self._pilot.forget_flight()
         self._deadlines.clear()
         if self._debug:
@@ -61,7 +61,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     @property
     def next_tick_s(self) -> float:
-        """When `tick` wants to be called next. May change with every call into the component."""
+        """When to call `tick` next. Any call into the component may change it."""
         return self._deadlines.next_s
 
     def tick(self, now_s: float) -> None:
@@ -141,7 +141,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._process(payload, creator, from_, kind)
 
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        """The routes learn from this."""
+        """A neighbour has received a packet; the routes learn from this."""
         self._deadlines.now_s = now_s
         self._delivery.delivered(neighbour, tries)
 
@@ -152,7 +152,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._forwarding.stranded(payload, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
-        """Switched on: introduce soon. Switched off: a router is not connected at once."""
+        """Switched on: introduce the node soon. Switched off: a router disconnects at once."""
         self._deadlines.now_s = now_s
         self._report(MeshEventKind.POWER_ON if on else MeshEventKind.POWER_OFF)
         self._introduction.on_power(on)
@@ -160,19 +160,19 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._antenna_is_off()
 
     def on_antenna_registered(self, now_s: float) -> None:
-        """The medium came back: introduce soon, each node at its own moment."""
+        """The medium is back: introduce the node soon, each node at a different moment."""
         self._deadlines.now_s = now_s
         if self._antenna.on():
             self._introduction.on_registered()
 
-    # For the router and the gateway to fill in -----------------------------------------------
+    # Implemented by router and gateway -------------------------------------------------------
 
     def _begin(self) -> None:
-        """The start of this kind of node, before routing starts."""
+        """Start this kind of node, before routing starts."""
 
     @abc.abstractmethod
     def _check(self, due_s: float) -> None:
-        """What is to be done once a period while the antenna is on; it was due at `due_s`."""
+        """Do the periodic work while the antenna is on; it was due at `due_s`."""
 
     @abc.abstractmethod
     def _antenna_is_off(self) -> None:
@@ -192,7 +192,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _on_negotiation(
         self, bid: messages.MovementNegotiationMessage, gateway: messages.GatewayPlace | None
     ) -> None:
-        """A neighbour bids for the flight; `gateway`: the place that its announcement is about."""
+        """A neighbour bids for the flight; `gateway`: the gateway's place in the announcement."""
 
     def _on_passing_heartbeat(
         self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
@@ -206,13 +206,13 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _on_location(
         self, node: int, location: Location, gateway: messages.GatewayPlace | None
     ) -> None:
-        """`node` says where it is, and perhaps where a gateway was."""
+        """`node` reports its place, and perhaps that of a gateway."""
 
     def _on_gateway_place(self, gateway: messages.GatewayPlace) -> None:
-        """A node says where a gateway was."""
+        """A node reports where a gateway was."""
 
     def _on_goal(self, neighbour: int, goal: Location) -> None:
-        """A neighbour says where it is about to fly."""
+        """A neighbour announces where it is about to fly."""
 
     def _on_neighbour_found(self, node: int) -> None:
         """A packet arrived from a node that was not a neighbour."""
@@ -234,7 +234,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         elif kind == MessageType.MISSING:
             missing = messages.MissingMessage.from_payload(payload).missing
             if missing != self._node_id:
-                self._on_missing(creator, missing, told_by=from_)
+                self._on_missing(creator, missing, reported_by=from_)
         elif kind == MessageType.MOVE_TO_LOCATION:
             order = messages.GoToLocationMessage.from_payload(payload)
             self._orders.on_order(order, messages.order_number(payload))
@@ -262,15 +262,15 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         else:
             self._drop("a type that is not processed", payload)
 
-    def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
-        """`creator` says that it cannot reach the node `missing`."""
-        self._delivery.forget_route(creator, missing, told_by)
+    def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
+        """`creator` reports that it cannot reach the node `missing`."""
+        self._delivery.forget_route(creator, missing, reported_by)
 
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._deadlines.now_s)
 
     def _send_location(self, asker: int) -> None:
-        location = self._pilot.goal or self._pilot.location()  # where it will stand counts
+        location = self._pilot.goal or self._pilot.location()  # its destination counts
         if location is not None:
             me, now_s, places = self._node_id, self._deadlines.now_s, self.places
             answer = messages.LocationMessage.of(location, now_s, me, me, asker, asker).to_payload()
@@ -290,7 +290,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._landed()
 
     def _landed(self) -> None:
-        """The drone is somewhere else, with other neighbours."""
+        """The drone is at another place and has other neighbours."""
         self._neighbours.forget_all()
         self._routing.node_moved_location()
         self._report(MeshEventKind.LANDED)

@@ -1,4 +1,4 @@
-"""GatewayConnection: how a router finds, keeps and judges its gateway.
+"""GatewayConnection: how a router finds, keeps and assesses its gateway.
 
 docs/protocol.md, "Connection" and "Places to step back to".
 """
@@ -19,13 +19,13 @@ from drone_mesh.communication.swallowing import Detours, Swallowing
 
 _log = logging.getLogger(__name__)
 
-_HOPS_UNTIL_KNOWN = 10  # our choice: for how many hops to wait for the first answer
+_HOPS_UNTIL_KNOWN = 10  # our choice: the number of hops for which to wait for the first answer
 
 
 MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
 
 
-AVOIDED_S = 60.0  # our choice: a neighbour whose shortcut brought no answer
+AVOIDED_S = 60.0  # our choice: for a neighbour whose shortcut brought no answer
 SWALLOWER_AVOIDED_S = 600.0  # our choice: one that may carry heartbeats only
 
 
@@ -39,7 +39,7 @@ class Shortcut(NamedTuple):
 class GatewayConnection:
     """The preferred gateway of one router, the hops to it, and whether it answers.
 
-    It moves the `Link` of the router's states.
+    It drives the `Link` of the router's states.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class GatewayConnection:
         self._answered_s = -math.inf
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
-        self._tried = NO_ROUTE  # the neighbour over which the latest heartbeat took a shortcut
+        self._tried = NO_ROUTE  # the neighbour of the latest heartbeat's shortcut
         self._detours = Detours(parts.neighbours)
         self._swallowing = Swallowing(parts.timing.check_period_s)
         self._detour = NO_ROUTE  # the neighbour over which the next heartbeat goes
@@ -63,13 +63,13 @@ class GatewayConnection:
         self._asked_neighbour_s = -math.inf  # for its gateway
 
     def next_hop(self) -> int:
-        """The neighbour that leads to the preferred gateway, or NO_ROUTE."""
+        """The next hop to the preferred gateway, or NO_ROUTE."""
         if self.gateway == NO_ROUTE:
             return NO_ROUTE
         return self._parts.routing.get_direction_to_node(self.gateway)
 
     def may_use(self, gateway: int) -> bool:
-        """Whether news of `gateway` is of use: it is the preferred one, or there is none yet."""
+        """Whether `gateway` is relevant: it is the preferred one, or there is none yet."""
         if self.gateway == NO_ROUTE and gateway <= MAX_NODE_ID and gateway != self._parts.node_id:
             self.gateway = gateway
         return gateway == self.gateway
@@ -77,7 +77,7 @@ class GatewayConnection:
     # Heartbeats out --------------------------------------------------------------------------
 
     def send_heartbeat(self) -> bool:
-        """A heartbeat to the preferred gateway, unless one is under way. False: not sent."""
+        """Send a heartbeat to the preferred gateway, unless one is under way. False: not sent."""
         now_s, gateway = self._parts.now_s, self.gateway
         window_s = self._answer_window_s()
         if now_s - self._heartbeat_sent_s < window_s:
@@ -96,18 +96,18 @@ class GatewayConnection:
         return False
 
     def _sent_over_shortcut(self, connected: bool) -> bool:
-        """Send the heartbeat through a neighbour with fewer hops; True if it suffices.
+        """Send the heartbeat through a neighbour with fewer hops; returns whether that suffices.
 
-        Fewer hops may be those to another gateway: then the neighbour's gateway is asked as well,
-        and its answer decides. The neighbour might send a heartbeat for this node's gateway
-        straight back.
+        The fewer hops may lead to another gateway. In that case the neighbour's gateway is asked as
+        well, and its answer decides, because the neighbour might send a heartbeat for this node's
+        gateway straight back.
         """
         shortcut, self._shortcut = self._shortcut, None
         if shortcut is None or shortcut.hops + 1 >= self.hops:
             return False
         to = shortcut.neighbour
         if self._parts.neighbours.hops_of(to) > shortcut.hops:
-            return False  # it had to take another way since
+            return False  # it has been rerouted since
         its_gateway = self._parts.neighbours.gateway_of(to)
         if its_gateway == NO_ROUTE:
             its_gateway = self.gateway
@@ -129,7 +129,7 @@ class GatewayConnection:
         return True
 
     def answer_missed(self) -> None:
-        """The time for the gateway's answer is over.
+        """The gateway did not answer in time.
 
         It is asked again if the medium is lossy, or if the heartbeat took a shortcut or a detour: a
         neighbour over which no answer comes is avoided for a while, and the route in use still
@@ -152,22 +152,22 @@ class GatewayConnection:
         self._states.happened(RouterEvent.ANSWER_MISSED)
         self._show()
         if was_connected and self._parts.antenna.medium.shared:
-            self._introduce()  # a neighbour may know another route, and answers
+            self._introduce()  # neighbours that know another route answer
 
     def on_route_lost(self) -> None:
-        """A route does not work. If it was the only one to the gateway, others are asked at once.
+        """A route failed. If it was the only one to the gateway, look for another one at once.
 
-        On a medium that is not shared the next check is soon enough.
+        On a medium that is not shared, the next check is soon enough.
         """
         medium = self._parts.antenna.medium
         if medium.shared and self._states.connected and self.next_hop() == NO_ROUTE:
             self._heartbeat_sent_s = -math.inf
             self.send_heartbeat()
 
-    # What neighbours and gateways say --------------------------------------------------------
+    # Reports of neighbours and gateways ------------------------------------------------------
 
     def on_present(self, neighbour: int, hops: int, know_gateway: bool) -> bool:
-        """A neighbour introduced itself. True if it should be sent a heartbeat."""
+        """A neighbour introduced itself. Returns whether to send it a heartbeat."""
         connected = self._states.connected
         if know_gateway != connected:
             return connected or not (self._states.awaiting or self._asks_a_neighbour())
@@ -183,7 +183,7 @@ class GatewayConnection:
         return False
 
     def on_gateway_heartbeat(self, gateway: int, hops: int) -> bool:
-        """A gateway is `hops` away. True if that made the router connected."""
+        """A gateway is `hops` away. Returns whether that connected the router."""
         now_s = self._parts.now_s
         if gateway != self.gateway:
             recent = now_s - self._answered_s <= self._parts.timing.check_period_s
@@ -203,7 +203,7 @@ class GatewayConnection:
         return is_new
 
     def take_gateway_of(self, neighbour: int, gateway: int) -> None:
-        """Try the gateway of a neighbour; other routes to it did not work."""
+        """Try the gateway of a neighbour; other routes to it have failed."""
         if gateway > MAX_NODE_ID or gateway == self._parts.node_id:
             return
         if self._detours.passes_by(neighbour, self._parts.now_s):
@@ -218,7 +218,7 @@ class GatewayConnection:
         return self._answered_s > since_s
 
     def look_after(self, patience: float) -> None:
-        """The part of a periodic check that is about a connection."""
+        """The part of the periodic check for a connected router."""
         asked = self._look_for_swallowing()
         if self.proven(patience):
             return
@@ -279,7 +279,7 @@ class GatewayConnection:
     # The end of a connection -----------------------------------------------------------------
 
     def end(self, event: RouterEvent) -> None:
-        """Not connected, because of `event`; earlier hop counts are void."""
+        """Disconnect because of `event`; earlier hop counts are void."""
         self._states.happened(event)
         self.hops = NO_ROUTE
         self._shortcut = None
@@ -287,7 +287,7 @@ class GatewayConnection:
         self._show()
 
     def give_up_routes(self) -> None:
-        """Forget each route to the gateway, and inform the neighbours."""
+        """Forget every route to the gateway and inform the neighbours."""
         if self.gateway != NO_ROUTE:
             self._parts.delivery.gateway_lost(self.gateway)
 
@@ -297,7 +297,7 @@ class GatewayConnection:
         return medium.answer_s + medium.answer_per_hop_s * hops
 
     def _asks_a_neighbour(self) -> bool:
-        """Whether a neighbour was asked for its gateway a moment ago; else it is asked now."""
+        """Whether a neighbour was recently asked for its gateway; if not, ask it now."""
         medium, now_s = self._parts.antenna.medium, self._parts.now_s
         if medium.shared and now_s - self._asked_neighbour_s < medium.answer_s:
             return True
@@ -305,7 +305,7 @@ class GatewayConnection:
         return False
 
     def ask_for_place(self, node: int) -> None:
-        """Ask `node` where it is, along the route to it."""
+        """Request the place of `node`, along the route to it."""
         me = self._parts.node_id
         self._parts.delivery.send_own(
             Message(me, me, MessageType.REQUESTLOCATION, node, node).to_payload()
@@ -320,7 +320,7 @@ class GatewayConnection:
             self._swallowing.give_up()  # it may not know its place
 
     def _show(self) -> None:
-        """Report a change of the connection; wait for an answer no longer than is needed."""
+        """Report a change of the connection; do not wait for an answer longer than needed."""
         if self._states.link in (Link.SEARCHING, Link.CONNECTED):
             self._parts.deadlines.set(Due.ANSWER, math.inf)
         connected = self._states.connected

@@ -1,4 +1,4 @@
-"""What a component has to do at which time, and what time it is."""
+"""The current time of a component, and when it must do what."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ import math
 
 
 class Due(enum.IntEnum):
-    """What a component may have to do at some time."""
+    """The things that a component may have to do at some time."""
 
     CHECK = 0  # the periodic check of routes and connection
     INTRODUCE = 1  # after the antenna came back
     ASK_POSITION = 2  # in flight
     ANSWER = 3  # the latest moment for the gateway's answer to a heartbeat
-    REPAIR = 4  # what the repair waits for
-    ROUTING = 5  # what the routing technique asked for
-    ORDER_REPLIES = 6  # what a drone still has to say of its orders
-    ORDERS = 7  # what a gateway does about orders under way
-    DATA = 8  # what users' messages wait for
+    REPAIR = 4  # the repair's timer
+    ROUTING = 5  # the routing technique's timer
+    ORDER_REPLIES = 6  # a drone's outstanding replies to orders
+    ORDERS = 7  # a gateway's open orders
+    DATA = 8  # users' messages
     NODE_REPORT = 9  # the next report to the gateway
-    GOAL = 10  # a drone that took off says again where to
+    GOAL = 10  # repeats a drone's goal after take-off
 
 
 class Deadlines:
-    """The time of the component's latest call, and one time per thing to do.
+    """The time of the component's latest call, and one deadline per kind of work.
 
-    Read for each packet and rarely changed, so the earliest of all is kept.
+    Read for each packet and rarely changed, so the earliest deadline is cached.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Delivery: handing packets to neighbours, and informing them of nodes that are lost.
+"""Delivery: sends packets to neighbours, and informs them of lost nodes.
 
 docs/protocol.md, "Sending" and "Missing nodes".
 """
@@ -20,13 +20,13 @@ from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
 
 NodeReport = Callable[[MeshEventKind, int], None]
-"""Takes what happened, and which other node it concerns."""
+"""Called with an event and the other node concerned."""
 
 
 class Delivery:
-    """Sends the packets of one node; the routes learn from what succeeds and what fails.
+    """Sends the packets of one node; the routes learn from success and failure.
 
-    Only the component of its node and that component's parts call it.
+    Called only by the node's component and its parts.
     """
 
     def __init__(
@@ -50,8 +50,10 @@ class Delivery:
         self._attempts = attempts
         self._report = report
         self._on_neighbour_lost = on_neighbour_lost
-        self._told_s: dict[int, float] = {}  # on a shared medium: when a node was announced missing
-        self._gave_up: set[int] = set()  # neighbours that took nothing lately, though heard
+        self._reported_s: dict[
+            int, float
+        ] = {}  # shared medium: when each was announced
+        self._gave_up: set[int] = set()  # neighbours that took no packets, though heard
         self._strangers = Strangers()
         self._announced = RateLimit(REPEATS)
         self._missing_to_tell: deque[tuple[int, int, int]] = deque()
@@ -61,7 +63,7 @@ class Delivery:
     # Sending ---------------------------------------------------------------------------------
 
     def send(self, payload: bytes, to: int, failures: int = 0, came_from: int = NO_ROUTE) -> bool:
-        """Hand a packet to neighbour `to`, with retransmissions. The routes learn from it.
+        """Send a packet to neighbour `to`, with retransmissions. The routes learn from the outcome.
 
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
@@ -99,10 +101,10 @@ class Delivery:
         self._routing.sent(to, True, tries)
 
     def undelivered(self, payload: bytes, tries: int) -> bool:
-        """The antenna gave a packet up. True if it takes another route.
+        """The antenna gave a packet up. Returns whether it takes another route.
 
-        A neighbour that was heard a moment ago is not lost by that: the channel was busy. The
-        second time in a row it is.
+        A neighbour that was heard recently is not lost after one failure, because the channel may
+        be busy; after a second failure in a row it is.
         """
         to, other = messages.receiver(payload), messages.addressee(payload)
         self.total_sent -= 1
@@ -110,7 +112,7 @@ class Delivery:
         silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
         heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
         if heard and messages.is_data(payload):
-            pass  # users' packets crowd the channel, and judge no neighbour that is heard
+            pass  # users' packets crowd the channel; their loss says little about a heard neighbour
         elif heard and to not in self._gave_up:
             self._gave_up.add(to)
         else:
@@ -122,7 +124,7 @@ class Delivery:
         return self.send(messages.readdressed(payload, detour), detour)
 
     def send_own(self, payload: bytes) -> bool:
-        """Send a packet of our own towards its addressee, over one route after the other."""
+        """Send this node's own packet to its addressee, trying one route after the other."""
         other = messages.addressee(payload)
         untried = self._routing.directions(other, NO_ROUTE, self._node_id)
         tried: list[int] = []
@@ -135,14 +137,14 @@ class Delivery:
         return False
 
     def send_to_each(self, payload: bytes, next_hops: Sequence[int]) -> bool:
-        """The same packet to each of these neighbours. True: at least one of them has it."""
+        """Send the same packet to each of these neighbours. True: at least one received it."""
         taken = False
         for to in next_hops:
             taken |= self.send(messages.readdressed(payload, to), to)
         return taken
 
     def send_own_to_each(self, payload: bytes, others: Sequence[int]) -> None:
-        """As `send_own`, to each of these; the packets for direct neighbours leave together."""
+        """Like `send_own`, to each of these; packets for direct neighbours leave together."""
         routing = self._routing
         if self._shared:
             for other in others:
@@ -165,48 +167,50 @@ class Delivery:
 
     # Lost nodes ------------------------------------------------------------------------------
 
-    def forget_route(self, other: int, node: int, told_by: int) -> None:
-        """`other` cannot reach `node`; if that was the last route, inform the other neighbours."""
+    def forget_route(self, other: int, node: int, reported_by: int) -> None:
+        """`other` cannot reach `node`; if no route is left, inform the other neighbours."""
         if other == node:
             self._neighbours.lost(node, self._deadlines.now_s)
         if self._routing.other_cant_communicate_with_node(other, node):
             self._report(MeshEventKind.NODE_MISSING, node)
-            self.tell_missing(node, told_by=told_by)
+            self.report_missing(node, reported_by=reported_by)
 
     def gateway_lost(self, gateway: int) -> None:
-        """The routes to `gateway` do not work: forget them, and inform the neighbours."""
+        """The routes to `gateway` do not work: forget them and inform the neighbours."""
         if self._routing.get_direction_to_node(gateway) == gateway:
             self._neighbours.lost(gateway, self._deadlines.now_s)
         if self._routing.gateway_lost(gateway):
-            self.tell_missing(gateway)
+            self.report_missing(gateway)
 
     def gateway_taken(self, neighbour: int, gateway: int) -> None:
-        """Try `gateway` through `neighbour`; other routes to it did not work."""
+        """Try `gateway` through `neighbour`, because other routes to it failed."""
         if self._routing.get_direction_to_node(gateway) == gateway:
             self._neighbours.lost(gateway, self._deadlines.now_s)
         self._routing.gateway_taken(neighbour, gateway)
 
-    def tell_missing(self, missing: int, first: int = NO_ROUTE, told_by: int = NO_ROUTE) -> None:
-        """MISSING to every neighbour, `first` before the others and `told_by` not at all.
+    def report_missing(
+        self, missing: int, first: int = NO_ROUTE, reported_by: int = NO_ROUTE
+    ) -> None:
+        """MISSING to every neighbour, `first` before the others and `reported_by` not at all.
 
-        A neighbour that does not take the packet is lost itself. The loss is queued and not
-        handled within this call, so that the call depth does not grow with the neighbours.
+        A neighbour that does not take the packet is itself lost. Its loss is queued, not handled
+        within this call, so that the call depth does not grow with the number of neighbours.
         """
         if self._antenna.medium.shared:
             self._announce_missing(missing)
             return
         if not self._announced.count(missing, self._deadlines.now_s):
             return
-        self._missing_to_tell.append((missing, first, told_by))
+        self._missing_to_tell.append((missing, first, reported_by))
         if self._telling:
             return
         self._telling = True
         me = self._node_id
         try:
             while self._missing_to_tell:
-                missing, first, told_by = self._missing_to_tell.popleft()
+                missing, first, reported_by = self._missing_to_tell.popleft()
                 packet = messages.MissingMessage(me, me, me, me, missing).to_payload()
-                neighbours = self._routing.get_set_of_children() - {missing, told_by}
+                neighbours = self._routing.get_set_of_children() - {missing, reported_by}
                 for neighbour in sorted(neighbours, key=lambda n: (n != first, n)):
                     if self._routing.get_direction_to_node(neighbour) == neighbour:
                         self.send_own(messages.addressed(packet, neighbour))
@@ -214,33 +218,34 @@ class Delivery:
             self._telling = False
 
     def came_back(self, missing: int, neighbour: int) -> None:
-        """`neighbour` sent a packet for `missing` that could only go straight back to it.
+        """`neighbour` sent a packet for `missing` that this node could only send straight back.
 
-        On a shared medium only that neighbour hears of it: for all others the route still works.
+        On a shared medium only that neighbour is informed, because for all others the route still
+        works.
         """
         if not self._antenna.medium.shared:
-            self.tell_missing(missing, first=neighbour)
+            self.report_missing(missing, first=neighbour)
             return
         me = self._node_id
         packet = messages.MissingMessage(me, me, neighbour, neighbour, missing)
         self.send(packet.to_payload(), neighbour)
 
     def _announce_missing(self, missing: int) -> None:
-        """One MISSING to all neighbours, unless the same was said a moment ago."""
+        """Send one MISSING to all neighbours, unless the same was sent a moment ago."""
         now_s, me = self._deadlines.now_s, self._node_id
-        if now_s - self._told_s.get(missing, -math.inf) < self._antenna.medium.missing_quiet_s:
+        if now_s - self._reported_s.get(missing, -math.inf) < self._antenna.medium.missing_quiet_s:
             return
-        self._told_s[missing] = now_s
+        self._reported_s[missing] = now_s
         self._antenna.broadcast_message(
             messages.MissingMessage(me, me, BROADCAST, BROADCAST, missing).to_payload()
         )
 
     def neighbour_leaves(self, node: int) -> None:
-        """A neighbour is about to fly out of reach: other routes are needed from now on."""
+        """A neighbour is about to fly out of reach, so other routes are needed."""
         self._neighbour_lost(node, NO_ROUTE)
 
     def _ignore(self, node: int) -> None:
-        """Too many nodes that never took a packet were lost: this one is dropped without a word."""
+        """Too many nodes that never took a packet were lost: drop this one, unannounced."""
         self._neighbours.lost(node, self._deadlines.now_s)
         self._routing.cant_communicate_with_node(node)
 
@@ -250,5 +255,5 @@ class Delivery:
             self._report(MeshEventKind.NEIGHBOUR_LOST, node)
         if self._routing.cant_communicate_with_node(node):
             self._report(MeshEventKind.NODE_MISSING, node)
-            self.tell_missing(node, first=came_from)
+            self.report_missing(node, first=came_from)
         self._on_neighbour_lost(node)

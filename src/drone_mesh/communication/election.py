@@ -1,4 +1,4 @@
-"""Which drone of a group without a gateway flies (docs/protocol.md, "Negotiation")."""
+"""Elects the drone that flies, in a group without a gateway (docs/protocol.md, "Negotiation")."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import AbstractSet, NamedTuple
 from drone_mesh.communication.messages import MovementNegotiationMessage
 
 NO_BID = -1.0  # the score of a node that does not fly
-MAX_SCORE_M = 1e9  # our choice: beyond every place there is, and it fits a float32
-TOOK_OFF = 2e9  # in place of a score: the winner takes off
+MAX_SCORE_M = 1e9  # our choice: beyond every possible place, and it fits a float32
+TOOK_OFF = 2e9  # sent in place of a score: the winner takes off
 TOOK_OFF_HOME = 3e9  # the same, and it flies to the gateway's place
-IN_VAIN = 4e9  # in place of NO_BID: it was at the gateway's place, and no gateway answered
+IN_VAIN = 4e9  # sent in place of NO_BID: no gateway answered at the gateway's place
 
 
 def as_on_the_air(score: float) -> float:
-    """A score as others read it: two scores that are equal must be equal for both nodes."""
+    """A score rounded as in a packet, so that equal scores are equal for both nodes."""
     return MovementNegotiationMessage.from_payload(
         MovementNegotiationMessage(0, 0, 0, 0, score).to_payload()
     ).cost
@@ -31,29 +31,29 @@ class Bid(NamedTuple):
 class Election:
     """The negotiation list of one node, and how long it waits for the bids of others.
 
-    The best bid travels through the whole group: each node relays a bid that beats all bids that
-    it has heard before, so that a group has one winner and not one per neighbourhood.
+    The best bid travels through the whole group: each node relays a bid that beats all bids that it
+    has heard, so a group has one winner and not one per neighbourhood.
     """
 
     def __init__(self, patience_s: float) -> None:
-        """`patience_s`: how long to wait for a bid, and how long a bid stays good."""
+        """`patience_s`: how long to wait for a bid, and how long a bid remains valid."""
         self._patience_s = patience_s
         self._bids: dict[int, Bid] = {}
         self._passed_over: set[int] = set()
         self._started_s = self._settled_s = math.inf
 
     def start(self, own_id: int, own_score: float, now_s: float, settled_s: float) -> None:
-        """Put the own bid into the list and begin to wait.
+        """Put the node's own bid into the list and start waiting.
 
-        It waits until `settled_s` at least, for the bids of nodes farther away.
+        Wait at least until `settled_s` for the bids of nodes farther away.
         """
         self._started_s, self._settled_s = now_s, settled_s
         self.heard(own_id, own_score, now_s)
 
     def heard(self, node: int, score: float, now_s: float) -> bool:
-        """Put a bid into the list and drop those that are too old to count.
+        """Put a bid into the list and drop expired ones.
 
-        True if it is the best bid in the list, and news.
+        Returns whether it is the best bid in the list, and new.
         """
         for other in [n for n, bid in self._bids.items() if now_s - bid.heard_s > self._patience_s]:
             del self._bids[other]
@@ -65,7 +65,7 @@ class Election:
         return is_news and score >= 0 and self.winner() == node
 
     def due_s(self, neighbours: AbstractSet[int]) -> float:
-        """When the election is decided, if no other bid arrives before."""
+        """When the election is decided unless another bid arrives."""
         if neighbours <= self._bids.keys() | self._passed_over:
             return self._settled_s
         return max(self._settled_s, self._started_s + self._patience_s)
@@ -76,7 +76,7 @@ class Election:
         return min(able)[1] if able else None
 
     def pass_over(self, node: int) -> None:
-        """`node` won and did not fly: begin again without it."""
+        """`node` won but did not fly: start again without it."""
         self._passed_over.add(node)
         self._bids.clear()
 

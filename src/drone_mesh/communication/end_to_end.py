@@ -1,9 +1,9 @@
 """EndToEnd: proves which node made a packet, over all relays (docs/security.md, "End-to-end seal").
 
-The hop seal shows that some node of the mesh sent a packet. This one shows which, to the addressee:
-an order comes from a node that holds the mesh key, a place from the node whose place it is. Its tag
-covers a nonce that the addressee announced, so that no packet outlives that, and a sequence number,
-so that none counts twice.
+The hop seal shows that some node of the mesh sent a packet. This one shows the addressee which node
+created it: an order comes from a node that holds the mesh key, a place from the node itself. Its
+tag covers a nonce that the addressee announced, so that no packet outlives it, and a sequence
+number, so that none counts twice.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def reserved_bytes(kind: int) -> int:
 
 
 class _Nonce:
-    """A number that this node announced, and what came in answer to it."""
+    """A nonce that this node announced, and the sequence numbers received for it."""
 
     def __init__(self, value: int) -> None:
         self.value = value
@@ -77,11 +77,11 @@ class _Sealed(NamedTuple):
 
 
 class NotProven(PacketError):
-    """A packet is not what its creator made for this node, or came before."""
+    """A packet is not what its creator sealed for this node, or is a replay."""
 
 
 class EndToEnd:
-    """Seals what one node makes, and checks what is for it. Belongs to its component's thread."""
+    """Seals the packets that one node creates, and checks those for it. Component's thread only."""
 
     def __init__(self, node_id: int, keys: Keys, rng: random.Random) -> None:
         """`rng` draws the nonces."""
@@ -92,14 +92,14 @@ class EndToEnd:
         self._changed_s = 0.0
         self._heard: dict[int, int] = {}  # the nonces of others
         self._sequences: dict[int, int] = {}  # by addressee: the number used last
-        self._gateways: set[int] = set()  # that proved to be one
+        self._gateways: set[int] = set()  # nodes that proved to be one
         self._is_gateway = False
         self._last: _Sealed | None = None
 
     # Own packets -----------------------------------------------------------------------------
 
     def seal(self, payload: bytes, now_s: float) -> bytes | None:
-        """A packet of this node as it leaves; None: its addressee has announced no nonce yet."""
+        """A packet of this node, sealed; None: its addressee has not announced a nonce yet."""
         kind, forward = payload[2], payload[4]
         nonce_at = _WITH_NONCE.get(kind)
         if nonce_at is not None:
@@ -111,7 +111,7 @@ class EndToEnd:
             self._is_gateway = True
         nonce = self._heard.get(forward)
         if nonce is None:
-            # Heartbeats find neighbours even before they can prove anything.
+            # Heartbeats are sent even without a proof, because they find neighbours.
             return payload if kind == _HEARTBEAT else None
         what, last = messages.identity(payload), self._last
         if last is not None and last.what == what and now_s - last.at_s <= SAME_PACKET_S:
@@ -142,9 +142,9 @@ class EndToEnd:
     # Packets of others -----------------------------------------------------------------------
 
     def open(self, payload: bytes) -> bytes:
-        """A packet for this node or for all, without what belongs to this seal.
+        """Check a packet for this node or for all, and remove this seal.
 
-        Raises NotProven for one that is not authentic.
+        Raises NotProven if it is not authentic.
         """
         creator, kind = payload[0], payload[2]
         at = _WITH_NONCE.get(kind)
@@ -155,7 +155,7 @@ class EndToEnd:
         elif kind in _PLACES and creator in self._gateways:
             raise NotProven("a gateway's place that any node could have broadcast")
         elif kind == _MISSING and creator != payload[1] and not self._is_gateway:
-            raise NotProven("a relayed MISSING")  # nodes tell only gateways so, about orders
+            raise NotProven("a relayed MISSING")  # only sent to gateways, about orders
         if at is None:
             return payload
         if kind in _WITH_NONCE:
@@ -198,7 +198,7 @@ class EndToEnd:
         return None
 
     def _proof(self, payload: bytes, key: bytes, nonce: int, sequence: int) -> bytes:
-        """Tag and sequence number, as they stand before the hop seal."""
+        """Tag and sequence number, as placed before the hop seal."""
         size = ORDER_TAG_BYTES if payload[2] == _ORDER else TAG_BYTES
         number = _SEQUENCE.pack(sequence)
         what = messages.identity(payload[: _SEQUENCE_AT - size])

@@ -1,4 +1,4 @@
-"""The drone as the mesh sees it: its place and its flight (docs/protocol.md, "Flight")."""
+"""The drone as the mesh sees it: its position and its flight (docs/protocol.md, "Flight")."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 STANDS_STILL_WITHIN_M = 1e-3  # our choice: far below what a drone flies in a second
-ASKS_WITHOUT_ANSWER = 10  # our choice: then the position stays unknown, and the mesh goes on
+ASKS_WITHOUT_ANSWER = 10  # our choice: then the mesh continues with an unknown position
 
 
 class Flight:
@@ -23,9 +23,9 @@ class Flight:
         self._unanswered = 0
 
     def is_over(self, location: Location | None) -> bool:
-        """Take note of where the drone is (None: unknown); whether it has landed.
+        """Process the drone's location (None: unknown); returns whether it has landed.
 
-        Landed is within 0.1 m of the goal, or no longer moving between two questions.
+        Landed: within 0.1 m of the goal, or not moving between two requests.
         """
         if location is None:
             self._unanswered += 1
@@ -39,7 +39,7 @@ class Flight:
 
 
 class Pilot:
-    """Flies the drone of one node, and watches the flight."""
+    """Flies the drone of one node and watches the flight."""
 
     def __init__(self, engine: IDroneEngine, deadlines: Deadlines, complaints: Complaints) -> None:
         self._engine = engine
@@ -50,12 +50,12 @@ class Pilot:
 
     @property
     def goal(self) -> Location | None:
-        """Where the drone is flying to; None while it is not."""
+        """The goal of the current flight; None without one."""
         flight = self._flight
         return flight.goal if flight is not None else None
 
     def location(self) -> Location | None:
-        """Where the drone is; None, with a line in the log, if it cannot say."""
+        """The drone's position; None, with a log line, if it is unknown."""
         try:
             return self._located()
         except LocationUnknown as error:
@@ -63,23 +63,23 @@ class Pilot:
             return None
 
     def look(self) -> Location | None:
-        """Where the drone is; None if it cannot say, for those who can do without."""
+        """The drone's position; None, without a log line, if it is unknown."""
         try:
             return self._located()
         except LocationUnknown:
             return None
 
     def battery_percent(self) -> int | None:
-        """The charge of its battery; None if that is not known."""
+        """The charge of its battery; None: unknown."""
         percent = self._engine.battery_percent()
         return None if percent is None else round(max(0.0, min(100.0, percent)))
 
     def why_not_fly(self) -> str:
-        """Why the drone would not fly to a goal now; empty while it would."""
+        """Why the drone cannot fly to a goal now; empty if it can."""
         return self._engine.why_not_fly()
 
     def obey(self, goal: Location) -> None:
-        """Start an ordered flight, or change the goal of the present one.
+        """Start an ordered flight, or change the goal of the current one.
 
         Raises GoalRefused, and changes nothing, if the engine refuses the goal.
         """
@@ -87,15 +87,15 @@ class Pilot:
         self._begin(goal)
 
     def step_back_to(self, goal: Location) -> None:
-        """Start a flight for a repair, or change the goal of the present one."""
+        """Start a repair flight, or change the goal of the current one."""
         self._begin(goal)
         try:
             self._engine.step_back_to(*goal)
-        except GoalRefused as error:  # the flight is then over at the first look
+        except GoalRefused as error:  # the flight then ends at the first position request
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
 
     def distance_m(self) -> float:
-        """Straight distance from where the drone last stood to its goal; infinity if unknown."""
+        """Straight distance from the start to the goal of the flight, m; infinity if unknown."""
         if self._flight is None or self._origin is None:
             return math.inf
         return self._origin.distance_m(self._flight.goal)
@@ -107,7 +107,7 @@ class Pilot:
         self._ask_position_later()
 
     def watch(self) -> bool:
-        """Look where the drone is; whether the flight is over now."""
+        """Request the position; returns whether the flight is over."""
         assert self._flight is not None
         location, is_flying = self.location(), self._engine.is_flying()
         is_over = self._flight.is_over(location) if is_flying is None else not is_flying

@@ -17,7 +17,7 @@ _HEARTBEAT = int(MessageType.HEARTBEAT)
 
 
 class Forwarding:
-    """Hands the packets of other nodes to the next hop. Only the component of its node calls it."""
+    """Sends packets of other nodes to their next hop. Called only by the node's component."""
 
     def __init__(
         self,
@@ -64,8 +64,8 @@ class Forwarding:
                 self.stranded(payload, now_s)
                 if to == from_:
                     self._delivery.came_back(forward, from_)
-                elif lost != forward:  # else all were informed when it was lost
-                    self._delivery.tell_missing(forward, first=from_)
+                elif lost != forward:  # otherwise its loss has informed all
+                    self._delivery.report_missing(forward, first=from_)
                 return
             forwarded = messages.next_hop(payload, self._node_id, to)
             if forwarded is None:
@@ -91,7 +91,7 @@ class Forwarding:
         self.stranded(payload, now_s)
 
     def stranded(self, payload: bytes, now_s: float) -> None:
-        """A packet goes no further. An order is reported, also to the gateway that sent it."""
+        """A packet has no next hop. Report an order, also to the gateway that sent it."""
         creator, _from, kind, _to, forward = messages.header(payload)
         if kind != MessageType.MOVE_TO_LOCATION:
             return

@@ -1,15 +1,16 @@
-"""CommonFrame: whether another node's metres are those of this node.
+"""CommonFrame: whether another node uses the same coordinate frame as this one.
 
-Drones that count from different origins must not fly to each other's places. Each node's PRESENT
-carries a digest of its origin; a place is taken only from a neighbour with the same one. As each
-neighbour does the same, no place crosses the border between two frames, over any number of hops.
+Drones whose coordinates have different origins must not fly to each other's places. Each node's
+PRESENT carries a digest of its origin; a place is accepted only from a neighbour with the same
+digest. As every neighbour does this, no place crosses the border between two frames, over any
+number of hops.
 """
 
 from __future__ import annotations
 
 from drone_mesh.communication.messages import MessageType, frame_digest
 
-NO_FRAME = 0  # the digest of a node without an origin, and of nodes that know nothing of origins
+NO_FRAME = 0  # the digest of a node without an origin, or without support for origins
 TYPES_WITH_PLACES = frozenset(
     map(
         int,
@@ -24,7 +25,7 @@ TYPES_WITH_PLACES = frozenset(
 
 
 class CommonFrame:
-    """What the neighbours said of their frames. Belongs to the component's thread."""
+    """The frames of the neighbours. Belongs to the component's thread."""
 
     def __init__(self, digest: int) -> None:
         """`digest` is this node's own."""
@@ -37,9 +38,9 @@ class CommonFrame:
         return digest == self.digest
 
     def refuses(self, from_: int) -> bool:
-        """Whether a packet with places from this neighbour may mean another frame.
+        """Whether places from this neighbour may refer to another frame.
 
-        A node with an origin waits for a neighbour's PRESENT; one without takes a neighbour that
-        has not presented itself for one without an origin too.
+        A node with an origin waits for a neighbour's PRESENT; a node without one assumes that a
+        neighbour that has not introduced itself has no origin either.
         """
         return self._of.get(from_, NO_FRAME) != self.digest

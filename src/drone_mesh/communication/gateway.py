@@ -1,4 +1,4 @@
-"""MeshnetworkGateway: connects the mesh to the world outside (docs/protocol.md, "Gateway")."""
+"""MeshnetworkGateway: connects the mesh to the outside world (docs/protocol.md, "Gateway")."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused
 
-SEARCH_WITHIN_S = 600.0  # our choice: a node that was heard so lately is searched for
+SEARCH_WITHIN_S = 600.0  # our choice: search for nodes that were heard within this time
 
 
 class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
-    """A node that answers heartbeats and brings orders from outside into the mesh."""
+    """A node that answers heartbeats and sends orders from outside into the mesh."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         observer: MeshObserver = ignore_events,
         debug: bool = True,
     ) -> None:
-        """As MeshnetworkComponent; orders come in over `internet`."""
+        """Like MeshnetworkComponent; orders arrive through `internet`."""
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
@@ -69,7 +69,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             self._book.on_due()
 
     def get_connected_to_gateway(self) -> bool:
-        """Always: it is one."""
+        """Always true: it is a gateway."""
         return True
 
     def get_preferred_gateway(self) -> int:
@@ -77,15 +77,16 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         return self._node_id
 
     def get_hops_from_gateway_away(self) -> int:
-        """None: it is one."""
+        """Always 0: it is a gateway."""
         return 0
 
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
-        """Send a drone to a place (metres). True: there was a route and the next hop took it.
+        """Send a drone to a place (metres). True: there was a route and the next hop took the
+        order.
 
-        Raises GoalRefused for an invalid node id or place, and if its own drone cannot fly.
+        Raises GoalRefused for an invalid node id or place, or if its own drone cannot fly.
         """
         self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
@@ -101,7 +102,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         return True
 
     def get_orders(self) -> list[OrderRecord]:
-        """The orders that it remembers, oldest first, and what became of them."""
+        """The orders that it remembers, oldest first, with their outcomes."""
         return self._book.records()
 
     def get_node_reports(self) -> list[ReportedNode]:
@@ -109,7 +110,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         return self._reports.nodes()
 
     def get_known_nodes(self) -> list[KnownNode]:
-        """All other nodes that it has a route to or has heard from, by id."""
+        """All other nodes that it has a route to or has heard, by id."""
         nodes = []
         for node in range(MAX_NODE_ID + 1):
             if node == self._node_id:
@@ -121,9 +122,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
                 nodes.append(KnownNode(node, next_hop, hops, heard_s))
         return nodes
 
-    def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
+    def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
         """A relay that cannot forward an order reports this to the gateway."""
-        super()._on_missing(creator, missing, told_by)
+        super()._on_missing(creator, missing, reported_by)
         self._book.on_missing(missing)
 
     def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
@@ -140,7 +141,8 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             self._book.on_reply(creator, reply)
 
     def _may_find(self, node: int) -> bool:
-        """Whether a search could find this node. One that relays for others, and learns from their
+        """Whether a search could find this node. A node that relays for others, and learns from
+        their
         packets that it is connected, may send nothing to the gateway for minutes."""
         _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
         return self._antenna.medium.shared and self._deadlines.now_s - heard_s < SEARCH_WITHIN_S
@@ -152,7 +154,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._routing.maintain_routing()
 
     def _antenna_is_off(self) -> None:
-        """A gateway stays one without an antenna."""
+        """Nothing changes: without an antenna it is still a gateway."""
 
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
         if not know_gateway:
@@ -169,10 +171,10 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
     ) -> None:
-        """A gateway does not fly for the mesh."""
+        """Ignored: a gateway does not fly for the mesh."""
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
         self._neighbours.is_at(node, location, self._deadlines.now_s)
 
     def _took_off(self) -> None:
-        """A gateway stays connected wherever it is."""
+        """Nothing changes: a gateway is connected wherever it is."""

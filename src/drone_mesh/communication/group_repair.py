@@ -1,6 +1,6 @@
-"""GroupRepair: the drones of a group elect the one that flies one step back.
+"""GroupRepair: the drones of a group elect one that flies one step back.
 
-docs/protocol.md, "Negotiation". The score of a strategy that derives from it decides which one.
+docs/protocol.md, "Negotiation". The score, defined by each derived strategy, decides which one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from drone_mesh.communication.spots import PITCH
 from drone_mesh.drone.interfaces import Location
 
 PLACES_WITHIN_S = 1.0  # docs/protocol.md, "Negotiation": how long to wait for places
-SETTLE_S = 0.5  # our choice: a bid takes some milliseconds per hop; above what 50 hops need
+SETTLE_S = 0.5  # our choice: a bid takes some milliseconds per hop; enough for 50 hops
 TAKE_OFF_WITHIN_S = 5.0  # docs/protocol.md, "Negotiation": then the winner is passed over
 ROUNDS_WITHOUT_FLIER = 2  # docs/protocol.md, "Negotiation": then the second choice counts
 HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a group to a gateway
@@ -38,7 +38,7 @@ class GroupRepair(IRepairStrategy):
     """Asks for places, elects, flies one step back; the gateway's place is the second choice."""
 
     def start(self, mesh: IRepairActions) -> None:
-        """Called once, before everything else."""
+        """Called once, before any other call."""
         super().start(mesh)
         self._election = Election(mesh.check_period_s)
         self._news = FlightNews()
@@ -48,10 +48,10 @@ class GroupRepair(IRepairStrategy):
 
     @abc.abstractmethod
     def _score(self, step: Step) -> float:
-        """The bid to fly `step`: 0 or more, or NO_BID. The highest one of the group flies."""
+        """The bid to fly `step`: 0 or more, or NO_BID. The highest of the group flies."""
 
     def on_emergency(self) -> None:
-        """With neighbours: begin an election. Alone: fly."""
+        """With neighbours: start an election. Alone: fly."""
         if self.mesh.neighbours():
             self._ask_for_places()
             return
@@ -68,21 +68,21 @@ class GroupRepair(IRepairStrategy):
         self._credit.clear()
 
     def on_stopped(self) -> None:
-        """The election goes on without this node."""
+        """The election continues without this node."""
         self._election.clear()
 
     def on_neighbour_lost(self, node: int) -> None:
-        """Nothing waits for it."""
+        """Do not wait for its place or bid."""
         if self.mesh.state in (Repair.ASKING, Repair.NEGOTIATING):
             self.mesh.wait_until(self.mesh.now_s)
 
     def on_place(self, node: int, place: Location) -> None:
-        """Perhaps the last answer that was missing."""
+        """Possibly the last missing answer."""
         if self.mesh.state is Repair.ASKING and self._all_answered():
             self._negotiate()
 
     def on_time(self) -> None:
-        """The time for places, for bids or for the take-off of the winner is over."""
+        """The time for places, bids or the winner's take-off is over."""
         state = self.mesh.state
         if state is Repair.ASKING:
             until_s = self._asked_s + PLACES_WITHIN_S
@@ -98,7 +98,7 @@ class GroupRepair(IRepairStrategy):
     # Where to --------------------------------------------------------------------------------
 
     def _next_step(self, alone: bool) -> tuple[Step | None, str]:
-        """The flight to make, or None and why not."""
+        """The next flight, or None and the reason."""
         mesh = self.mesh
         why_not = mesh.why_not_fly()
         if why_not:
@@ -121,11 +121,11 @@ class GroupRepair(IRepairStrategy):
         return None, reason
 
     def _is_tried(self, place: Location) -> bool:
-        """Whether another drone was so near there that a gateway would have answered it."""
+        """Whether another drone has been so close that a gateway would have answered it."""
         return self._news.is_tried(place, self.mesh.now_s, self.mesh.range_m / 2)
 
     def _occupant(self, step: Step) -> int:
-        """A node in reach that stands where `step` leads, or whose place it is; else NO_ROUTE."""
+        """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE."""
         mesh = self.mesh
         if step.owner in mesh.neighbours():
             return step.owner
@@ -153,7 +153,7 @@ class GroupRepair(IRepairStrategy):
             mesh.ask_place(owner)
 
     def _all_answered(self) -> bool:
-        """Whether all neighbours, and the node whose place it wants, said where they are."""
+        """Whether all neighbours, and the node whose place it wants, have sent their places."""
         mesh = self.mesh
         waited_s = mesh.now_s - self._asked_s
         asked = dict(mesh.neighbours())
@@ -165,7 +165,7 @@ class GroupRepair(IRepairStrategy):
         return all(view.age_s <= waited_s for view in asked.values())
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
-        """A node of the group bids for the flight, or took off; `from_` relays that."""
+        """A node of the group bids for the flight or took off; `from_` relays that."""
         if score in (TOOK_OFF, TOOK_OFF_HOME):
             self._on_take_off_of(node, score, from_, about)
             return
@@ -235,7 +235,7 @@ class GroupRepair(IRepairStrategy):
                 self._fly(step)
 
     def _on_take_off_of(self, node: int, code: float, from_: int, about: Location | None) -> None:
-        """A drone of the group flies: the others wait for the outcome."""
+        """A drone of the group flies: wait for the outcome."""
         mesh = self.mesh
         if mesh.connected or self._news.is_quiet(mesh.now_s):
             return
@@ -260,12 +260,12 @@ class GroupRepair(IRepairStrategy):
         mesh.bid(IN_VAIN, node, but_not_to=from_, about=about)
 
     def _was_home(self) -> Location | None:
-        """The gateway's place, if this drone was there since it was last connected."""
+        """The gateway's place, if this drone has been there since it was last connected."""
         mesh = self.mesh
         return next((s.place for s in mesh.steps if s.home and mesh.was_at(s)), None)
 
     def _pass_over_winner(self) -> None:
-        """The winner did not take off: the next best flies."""
+        """The winner did not take off: the next best bid wins."""
         self._credit.did_not_fly(self.winner)
         self._election.pass_over(self.winner)
         self.mesh.happened(RouterEvent.WINNER_MISSED)

@@ -21,7 +21,7 @@ UNLIMITED_ROOM = 2**31
 
 
 class IMeshNetwork(abc.ABC):
-    """What an antenna may call of the mesh component above it."""
+    """The functions of a mesh component that its antenna may call."""
 
     @abc.abstractmethod
     def on_msg(self, payload: bytes, now_s: float) -> None:
@@ -33,11 +33,11 @@ class IMeshNetwork(abc.ABC):
 
     @abc.abstractmethod
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        """A neighbour has a packet that the antenna had taken over, after so many tries."""
+        """A neighbour received a queued packet, after `tries` attempts."""
 
     @abc.abstractmethod
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
-        """The antenna gives up a packet that it had taken over for the neighbour in byte 3."""
+        """The antenna gives up a queued packet for the neighbour in byte 3."""
 
     @abc.abstractmethod
     def on_antenna_power(self, on: bool, now_s: float) -> None:
@@ -49,7 +49,7 @@ class IMeshNetwork(abc.ABC):
 
 
 class IMeshDebugInfo(abc.ABC):
-    """Read-only snapshots of a component, for people."""
+    """Read-only snapshots of a component, for display."""
 
     @abc.abstractmethod
     def get_node_id(self) -> int:
@@ -61,7 +61,7 @@ class IMeshDebugInfo(abc.ABC):
 
     @abc.abstractmethod
     def get_total_message_sent(self) -> int:
-        """Packets sent successfully, own and forwarded ones, broadcasts not counted."""
+        """Packets sent successfully, own and forwarded ones, not counting broadcasts."""
 
     @abc.abstractmethod
     def get_preferred_gateway(self) -> int:
@@ -69,7 +69,7 @@ class IMeshDebugInfo(abc.ABC):
 
     @abc.abstractmethod
     def get_hops_from_gateway_away(self) -> int:
-        """Hops to the preferred gateway; 0 for a gateway, 255 while not known."""
+        """Hops to the preferred gateway; 0 for a gateway, 255 while unknown."""
 
     @abc.abstractmethod
     def get_last_good_known_location_id(self) -> int:
@@ -77,26 +77,27 @@ class IMeshDebugInfo(abc.ABC):
 
     @abc.abstractmethod
     def get_router_tech_table_size(self) -> int:
-        """Known nodes; one that is known through two neighbours counts twice."""
+        """Known nodes; a node known through two neighbours counts twice."""
 
 
 class KnownNode(NamedTuple):
-    """What a gateway knows of another node."""
+    """What a gateway knows about another node."""
 
     node_id: int
     next_hop: int  # the neighbour that leads to it; NO_ROUTE: there is none now
-    hops: int  # that its last heartbeat to this gateway took; NO_ROUTE: none came
+    hops: int  # of its last heartbeat to this gateway; NO_ROUTE: none yet
     heard_s: float  # when it was last heard, in seconds of the core's clock; -inf: never
 
 
 class IGatewayCommands(abc.ABC):
-    """The commands that a gateway takes from the world outside."""
+    """The commands that a gateway accepts from the outside world."""
 
     @abc.abstractmethod
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
-        """Send a drone to a place (metres). True: there was a route and the next hop took it.
+        """Send a drone to a place (metres). True: there was a route and the next hop took the
+        order.
 
         The arrival is not reported back. Raises GoalRefused for an invalid order.
         """
@@ -107,10 +108,10 @@ class IGatewayCommands(abc.ABC):
 
     @abc.abstractmethod
     def get_known_nodes(self) -> list[KnownNode]:
-        """All other nodes that it has a route to or has heard from, by id."""
+        """All other nodes that it has a route to or has heard, by id."""
 
     def get_orders(self) -> Sequence[OrderRecord]:
-        """The orders that it remembers, oldest first, and what became of them."""
+        """The orders that it remembers, oldest first, with their outcomes."""
         return ()
 
 
@@ -119,11 +120,11 @@ class IWirelessCommunication(abc.ABC):
 
     @property
     def medium(self) -> Medium:
-        """What it sends on. Never changes."""
+        """The properties of the medium. Constant."""
         return UNDISTURBED
 
     def channel_use(self) -> ChannelUse:
-        """What this node does on a shared channel. Any thread."""
+        """This node's use of a shared channel. Any thread."""
         return ChannelUse()
 
     def reserved_bytes(self, kind: int) -> int:
@@ -131,7 +132,7 @@ class IWirelessCommunication(abc.ABC):
         return 0
 
     def seal_message(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
-        """A user's message as only `to` can read it; unchanged without a key."""
+        """A user's message, readable only by `to`; unchanged without a key."""
         return payload
 
     def open_message(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
@@ -139,7 +140,7 @@ class IWirelessCommunication(abc.ABC):
         return sealed
 
     def may_be_gateway(self, node: int) -> bool:
-        """Whether to believe a packet on its way to another node that `node` is a gateway."""
+        """Whether to believe a forwarded packet that `node` is a gateway."""
         return True
 
     def foreign_neighbour(self) -> str:
@@ -147,41 +148,41 @@ class IWirelessCommunication(abc.ABC):
         return ""
 
     def patience(self) -> float:
-        """For how many check periods the mesh should not probe again what is known to work.
+        """The number of check periods for which the mesh should not probe what is known to work.
 
-        0 on a quiet channel: everything is probed in each round. More on a busy one.
+        0 on a quiet channel: everything is probed in each period. More on a busy one.
         """
         return 0.0
 
     def data_room(self) -> int:
-        """How many packets of users it would take now without delaying those of the mesh."""
+        """How many packets of users it would accept now without delaying those of the mesh."""
         return UNLIMITED_ROOM
 
     @abc.abstractmethod
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Start to receive, handing each packet to `mesh`, and to be reachable as its node id."""
+        """Start receiving as this node, and pass each packet to `mesh`."""
 
     @abc.abstractmethod
     def stop_antenna(self) -> None:
-        """Stop and release what start_antenna took. A second call changes nothing."""
+        """Stop and release the resources of start_antenna. A second call changes nothing."""
 
     @abc.abstractmethod
     def send_message_to(self, payload: bytes) -> bool:
-        """Send to the node in byte 3. True: that node has it.
+        """Send to the node in byte 3. True: that node received it.
 
-        On a shared medium True means that the antenna has taken the packet over; it calls
+        On a shared medium True means that the antenna has queued the packet; it calls
         `on_delivered` or `on_undelivered` later.
         """
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
-        """Send each to the node in its byte 3, in this order; for each whether that node has it.
+        """Send each to the node in its byte 3, in this order; returns for each whether it arrived.
 
         A radio that can send many at once overrides this.
         """
         return [self.send_message_to(payload) for payload in payloads]
 
     def transmissions_of_last_send(self) -> int:
-        """How often the last packet that was sent or given up was put on the air; at least 1.
+        """How often the last packet, sent or given up, was transmitted; at least 1.
 
         A radio that retransmits by itself overrides this.
         """
@@ -189,11 +190,11 @@ class IWirelessCommunication(abc.ABC):
 
     @abc.abstractmethod
     def broadcast_message(self, payload: bytes) -> None:
-        """Send to every node in range; each of them finds its own id in byte 3."""
+        """Send to every node in range; each finds its own id in byte 3."""
 
     @abc.abstractmethod
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Show `info`, together with the antenna's own state, to people; or stop doing so."""
+        """Start or stop displaying `info` together with the antenna's own state."""
 
     @abc.abstractmethod
     def on(self) -> bool:
@@ -201,11 +202,11 @@ class IWirelessCommunication(abc.ABC):
 
 
 class IInternetConnection(abc.ABC):
-    """A gateway's connection to the world outside the mesh."""
+    """A gateway's connection to the outside world."""
 
     @abc.abstractmethod
     def connect(self, commands: IGatewayCommands) -> None:
-        """Connect, and hand what comes in to `commands`."""
+        """Connect, and pass incoming orders to `commands`."""
 
     @abc.abstractmethod
     def disconnect(self) -> None:

@@ -13,14 +13,14 @@ from drone_mesh.communication.interfaces import BROADCAST, IMeshDebugInfo
 from drone_mesh.communication.messages import IntroduceMessage, MessageType
 from drone_mesh.communication.parts import NodeParts
 
-AFTER_POWER_S = 0.2  # our choice: the medium has to hear of the antenna first
-SPREAD_S = 1.0  # our choice: after an outage the nodes do not all speak at once
+AFTER_POWER_S = 0.2  # our choice: the medium must register the antenna first
+SPREAD_S = 1.0  # our choice: spreads the nodes' packets after an outage
 
 
 class Introduction:
-    """Broadcasts the PRESENT of one node, at once or after a while.
+    """Broadcasts the PRESENT of one node, at once or later.
 
-    Only the component of its node and that component's parts call it.
+    Called only by the node's component and its parts.
     """
 
     def __init__(
@@ -31,18 +31,18 @@ class Introduction:
         rng: random.Random,
         send_heartbeat: Callable[[int], bool],
     ) -> None:
-        """`node` says whether it is connected and over how many hops."""
+        """`node` provides its connection and hops."""
         self._parts = parts
         self._node = node
         self._frame = frame
         self._rng = rng
         self._send_heartbeat = send_heartbeat
         self._medium = parts.antenna.medium
-        self._search_again_s = self._medium.search_s  # 0: the next check is soon enough
-        self._is_answer = False  # the one that is planned answers a node that needs a gateway
+        self._search_again_s = self._medium.search_s  # 0: no repetition before the next check
+        self._is_answer = False  # the planned one answers a node that needs a gateway
 
     def broadcast(self) -> None:
-        """PRESENT, to each node in range. On a shared channel a search is repeated, ever slower."""
+        """Send PRESENT to each node in range. On a shared channel, repeat a search ever later."""
         parts, node = self._parts, self._node
         hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
         me = parts.node_id
@@ -63,7 +63,7 @@ class Introduction:
             self._plan(wait_s)
 
     def on_due(self) -> None:
-        """The planned moment has come."""
+        """The planned time has come."""
         self._cancel()
         self._is_answer = False
         self.broadcast()
@@ -76,11 +76,11 @@ class Introduction:
             self._cancel()
 
     def on_registered(self) -> None:
-        """The medium came back: each node speaks at its own moment."""
+        """The medium is back: introduce the node, each node at a different moment."""
         self._plan(AFTER_POWER_S + self._rng.random() * SPREAD_S)
 
     def answer_search(self, neighbour: int) -> None:
-        """A neighbour needs a gateway. On a shared channel one PRESENT answers all that do."""
+        """A neighbour needs a gateway. On a shared channel one PRESENT answers all such nodes."""
         spread_s = self._medium.answer_spread_s
         if not spread_s:
             self._send_heartbeat(neighbour)
@@ -89,7 +89,7 @@ class Introduction:
             self._plan(self._rng.random() * spread_s)
 
     def search_is_answered(self) -> None:
-        """Another node answered first."""
+        """Another node answered first: cancel the answer."""
         if self._is_answer:
             self._is_answer = False
             self._cancel()

@@ -1,4 +1,4 @@
-"""Key files: read and written so that other users of the machine cannot."""
+"""Reads and writes key files, inaccessible to other users of the machine."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def read_key_file(path: Path) -> MeshKey | NodeKeys:
 
 
 def write_key_file(path: Path, keys: MeshKey | NodeKeys) -> None:
-    """A new file, mode 600. Raises ConfigurationError if it exists: a key is never overwritten."""
+    """Create a file, mode 600. Raises ConfigurationError if it exists: keys are not overwritten."""
     try:
         with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
             file.write(keys.to_text())

@@ -1,4 +1,4 @@
-"""The keys of a mesh, and what each node holds of them (docs/security.md, "Keys").
+"""The keys of a mesh, and which of them a node holds (docs/security.md, "Keys").
 
 Every key derives from the mesh key by BLAKE2s in keyed mode (RFC 7693).
 """
@@ -17,7 +17,7 @@ _NODES = MAX_NODE_ID + 1
 
 
 class Keys(abc.ABC):
-    """What one node holds. Its text and its representation never show a key."""
+    """The keys that one node holds. Neither str nor repr shows a key."""
 
     @property
     @abc.abstractmethod
@@ -28,26 +28,26 @@ class Keys(abc.ABC):
     def authority_over(self, node: int) -> bytes | None:
         """Seals orders to `node`, and the heartbeats of gateways to it.
 
-        Only `node` itself and those that hold the mesh key have it; None: this node does not.
+        Only `node` itself and holders of the mesh key have it; None: this node does not.
         """
 
     @abc.abstractmethod
     def pair(self, one: int, other: int) -> bytes | None:
-        """Seals what these two nodes send to each other; None: this node is neither."""
+        """Seals what these two nodes send to each other; None: this node is neither of them."""
 
 
 class MeshKey(Keys):
     """The key of the whole mesh, from which all others derive: for gateways."""
 
     def __init__(self, secret: bytes) -> None:
-        """Raises ConfigurationError unless it has 128 bits."""
+        """Raise ConfigurationError unless it has 128 bits."""
         if len(secret) != KEY_BYTES:
             raise ConfigurationError(
                 f"invalid mesh key: must be {8 * KEY_BYTES} bits, has {8 * len(secret)}"
             )
         self._secret = secret
         self._network = _derived(secret, _NETWORK)
-        self._known: dict[bytes, bytes] = {}  # a year of traffic derives no key twice
+        self._known: dict[bytes, bytes] = {}  # cache: no key is derived twice
 
     @property
     def network(self) -> bytes:
@@ -80,7 +80,7 @@ class MeshKey(Keys):
 
 
 class NodeKeys(Keys):
-    """The keys of one node: it can prove to be itself, and nothing else."""
+    """The keys of one node: with them it can prove only its own identity."""
 
     def __init__(self, node: int, network: bytes, authority: bytes, pairs: list[bytes]) -> None:
         """`pairs`: the keys that it shares with nodes 0..253."""

@@ -1,4 +1,4 @@
-"""Limits of what a node spends on others that may not exist (docs/security.md, "Limits")."""
+"""Limits on what a node spends on nodes that may not exist (docs/security.md, "Limits")."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Callable
 
 LIMIT_PERIOD_S = 10.0  # our choice: one check period
 STRANGERS = 16  # our choice: losses per period of nodes that never took a packet
-REPEATS = 64  # our choice: announcements per period of one missing node; lossy links need many
+REPEATS = 64  # our choice: announcements of one missing node per period; lossy links need many
 
 
 class RateLimit:
-    """So many times per period and node. One entry per node id at most."""
+    """At most `times` per period and node. At most one entry per node id."""
 
     def __init__(self, times: int, period_s: float = LIMIT_PERIOD_S) -> None:
         self._times = times
@@ -18,7 +18,7 @@ class RateLimit:
         self._counted: dict[int, tuple[float, int]] = {}  # by node: start of the period, how often
 
     def count(self, node: int, now_s: float) -> bool:
-        """Count one more; False if that is too many."""
+        """Count one more; returns whether it is within the limit."""
         since_s, times = self._counted.get(node, (now_s, 0))
         if now_s - since_s >= self._period_s:
             since_s, times = now_s, 0
@@ -26,13 +26,13 @@ class RateLimit:
         return times < self._times
 
     def reached(self, node: int, now_s: float) -> bool:
-        """Whether one more would be too many."""
+        """Whether one more would exceed the limit."""
         since_s, times = self._counted.get(node, (now_s, 0))
         return times >= self._times and now_s - since_s < self._period_s
 
 
 class Strangers:
-    """Nodes that never acknowledged a packet. When too many are lost, others are sent none."""
+    """Nodes that never acknowledged a packet. If too many of them are lost, they get no packets."""
 
     def __init__(self) -> None:
         self.known: set[int] = set()  # have taken one; read for each packet

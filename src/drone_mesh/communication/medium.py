@@ -1,4 +1,4 @@
-"""What kind of medium an antenna sends on: the mesh keeps its pace accordingly."""
+"""The properties of an antenna's medium, to which the mesh adapts its pace."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S
 class Medium:
     """Properties of a medium. The defaults are those of links that do not disturb each other.
 
-    On a shared channel every packet costs all nodes in range airtime, and one packet that got
-    lost says little. There the antenna queues packets and owns all tries (the mesh adds none), and
-    it reports later what it could not deliver. The mesh sends fewer packets:
+    On a shared channel every packet costs all nodes in range airtime, and one lost packet says
+    little. There the antenna queues packets and makes all attempts itself (the mesh adds none), and
+    later reports what it could not deliver. The mesh sends fewer packets:
 
     * MISSING is one broadcast, and the same node is not announced again within `missing_quiet_s`;
     * a node that looks for a gateway is answered by one PRESENT for all, after a random part of
@@ -28,8 +28,8 @@ class Medium:
     """
 
     shared: bool = False
-    answer_s: float = HEARTBEAT_ANSWER_S  # wait so long for the answer to a heartbeat
-    answer_per_hop_s: float = 0.0  # and so much longer for each hop to the gateway
+    answer_s: float = HEARTBEAT_ANSWER_S  # how long to wait for the answer to a heartbeat
+    answer_per_hop_s: float = 0.0  # additional time for each hop to the gateway
     heartbeats: int = 1
     answer_spread_s: float = 0.0
     search_s: float = 0.0
@@ -48,4 +48,4 @@ class ChannelUse:
     airtime: float = 0.0  # share of the last second or more that the node's frames took
     tries: float = 0.0  # per packet with acknowledgement, since the start
     waiting: int = 0  # packets in its queue now
-    given_up: int = 0  # packets that no try could deliver, since the start
+    given_up: int = 0  # packets given up after all tries, since the start

@@ -1,7 +1,7 @@
-"""MeshNode: the parts of one node, and what others may ask of it.
+"""MeshNode: the parts of one node, and the functions that others may call.
 
-The getters of IMeshDebugInfo may be read from any thread; all else belongs to the thread that
-drives the component.
+Any thread may call the getters of IMeshDebugInfo; everything else belongs to the thread that drives
+the component.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ SILENCE_PERIODS = 1.5  # our choice: each neighbour is asked once a check period
 
 
 class MeshNode(IMeshDebugInfo, IRoutingEssentials):
-    """Owns the parts; MeshnetworkComponent hands them what arrives and what is due."""
+    """Owns the parts; MeshnetworkComponent passes them packets and deadlines."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         observer: MeshObserver = ignore_events,
         debug: bool = True,
     ) -> None:
-        """`rng` spreads what many nodes would do at once; with debug on the antenna shows the node.
+        """`rng` spreads simultaneous actions of many nodes; `debug`: the antenna displays the node.
 
         Raises ValueError for a node id outside 0..253.
         """
@@ -147,23 +147,23 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         return NOTHING_TO_REPAIR
 
     def get_channel_use(self) -> ChannelUse:
-        """What the antenna does on a shared channel."""
+        """The antenna's use of a shared channel."""
         return self._antenna.channel_use()
 
-    # What a routing technique may ask for ----------------------------------------------------
+    # For the routing technique --------------------------------------------------------------
 
     def search_other_nodes_in_range(self) -> None:
-        """PRESENT, to each node in range."""
+        """Send PRESENT to each node in range."""
         self._introduction.broadcast()
 
     def send_heartbeat(self, other: int) -> bool:
-        """A heartbeat towards `other`."""
+        """Send a heartbeat to `other`."""
         return self._delivery.send_own(messages.addressed(self._heartbeat(), other))
 
     def send_heartbeats(self, others: Sequence[int]) -> None:
-        """A heartbeat towards each of these; those for direct neighbours leave together.
+        """Send a heartbeat to each of these; those for direct neighbours leave together.
 
-        On a busy channel, neighbours that were heard lately are left out.
+        On a busy channel, skip neighbours that were heard recently.
         """
         patience = self._antenna.patience()
         if patience > 0.0:
@@ -177,23 +177,23 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         return self._deadlines.now_s
 
     def wake_at(self, at_s: float) -> None:
-        """Have the technique's `on_time` called then."""
+        """Call the technique's `on_time` at this time."""
         self._deadlines.set(Due.ROUTING, at_s)
 
     def send_packet(self, kind: int, neighbour: int, body: bytes) -> bool:
-        """A packet of the technique's own type to a neighbour."""
+        """Send a packet of the technique's own type to a neighbour."""
         me = self._node_id
         return self._delivery.send(
             messages.packet(kind, me, me, neighbour, neighbour, body), neighbour
         )
 
     def broadcast_packet(self, kind: int, body: bytes) -> None:
-        """A packet of the technique's own type to each node in range."""
+        """Send a packet of the technique's own type to each node in range."""
         me = self._node_id
         self._antenna.broadcast_message(messages.packet(kind, me, me, BROADCAST, BROADCAST, body))
 
     def own_place(self) -> Location | None:
-        """Where the drone is, if it can report that."""
+        """The drone's position, if it can report it."""
         return self._pilot.location()
 
     def place_of(self, node: int) -> Location | None:
@@ -202,10 +202,10 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
             return self.places.gateway
         return self.places.good if node == self.places.good_id else None
 
-    # What the parts call ---------------------------------------------------------------------
+    # For the parts ---------------------------------------------------------------------------
 
     def _answer_search(self, gateway: int) -> bool:
-        """A heartbeat even if one is under way: that one may have gone where no route leads."""
+        """Send a heartbeat even if one is under way, which may have been lost without a route."""
         return self._delivery.send_own(messages.addressed(self._heartbeat(), gateway))
 
     def _heartbeat(self) -> bytes:
@@ -218,4 +218,4 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         """The drone leaves its place because of an order."""
 
     def _on_neighbour_lost(self, node: int) -> None:
-        """A packet could not be handed to a neighbour; the routes know already."""
+        """A neighbour did not take a packet; the routes are already updated."""

@@ -20,11 +20,11 @@ _KEY_BYTES = 16
 _BLOCK_BYTES = 16
 
 Encrypt = Callable[[bytes, bytes, bytes], bytes]
-"""Text encrypted with this key and nonce; the same again decrypts it."""
+"""Encrypts text with this key and nonce; applied again, decrypts it."""
 
 
 class MessageSeal:
-    """Seals and opens the messages of one node. Has no state but its keys."""
+    """Seals and opens the messages of one node. Its keys are its only state."""
 
     def __init__(self, keys: Keys) -> None:
         self._keys = keys
@@ -52,7 +52,7 @@ class MessageSeal:
         return payload if hmac.compare_digest(_tag(key, context, payload), tag) else None
 
     def _key(self, creator: int, to: int) -> bytes | None:
-        """That of the pair; for messages to all that of the network."""
+        """The key of the pair; for messages to all, that of the network."""
         return self._keys.pair(creator, to) if to <= MAX_NODE_ID else self._keys.network
 
 
@@ -62,7 +62,7 @@ def _tag(key: bytes, context: bytes, payload: bytes) -> bytes:
 
 
 def _aes_in_counter_mode() -> Encrypt:
-    # Only here: without a key, the mesh needs no such library.
+    # Imported here, because a mesh without a key needs no such library.
     try:
         from cryptography.hazmat.primitives.ciphers import Cipher
         from cryptography.hazmat.primitives.ciphers.algorithms import AES
@@ -74,7 +74,7 @@ def _aes_in_counter_mode() -> Encrypt:
 
     def encrypted(key: bytes, nonce: bytes, text: bytes) -> bytes:
         own = hashlib.blake2s(key=key, digest_size=_KEY_BYTES, person=b"encrypt").digest()
-        first_block = nonce.ljust(_BLOCK_BYTES, b"\0")  # the counter begins at its end
+        first_block = nonce.ljust(_BLOCK_BYTES, b"\0")  # the counter is at its end
         cipher = Cipher(AES(own), CTR(first_block)).encryptor()
         return cipher.update(text) + cipher.finalize()
 

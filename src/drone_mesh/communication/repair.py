@@ -192,7 +192,7 @@ class ConnectionRepair(RepairViews):
     def ask_place(self, node: int) -> None:  # noqa: D102
         self._connection.ask_for_place(node)
 
-    def tell_place(self, place: Location) -> None:  # noqa: D102
+    def announce_place(self, place: Location) -> None:  # noqa: D102
         me = self.node_id
         message = LocationMessage.of(place, self.now_s, me, me, BROADCAST, BROADCAST)
         self._parts.antenna.broadcast_message(message.to_payload())

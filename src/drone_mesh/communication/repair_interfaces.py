@@ -156,7 +156,7 @@ class IRepairActions(abc.ABC):
         """Ask one node, along the route to it."""
 
     @abc.abstractmethod
-    def tell_place(self, place: Location) -> None:
+    def announce_place(self, place: Location) -> None:
         """Send all nodes in range the place where this drone stands, or will stand."""
 
     @abc.abstractmethod

@@ -80,7 +80,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._deadlines.set(Due.GOAL, math.inf)
             goal = self._pilot.goal
             if goal is not None:
-                self._repair.tell_place(goal)
+                self._repair.announce_place(goal)
         if now_s >= self._deadlines.get(Due.REPAIR) and self._repair.on_due():
             self._landed()
         self._repair_status = self._repair.status()
@@ -203,8 +203,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self.places.next_hop_is_at(node, location)
         self._repair.on_place(node, location)
 
-    def _on_missing(self, creator: int, missing: int, told_by: int) -> None:
-        super()._on_missing(creator, missing, told_by)
+    def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
+        super()._on_missing(creator, missing, reported_by)
         self._connection.on_route_lost()
 
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
@@ -229,7 +229,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _took_off(self) -> None:
         goal = self._pilot.goal
         if self._antenna.medium.shared and goal is not None:
-            self._repair.tell_place(goal)
+            self._repair.announce_place(goal)
             self._deadlines.set(Due.GOAL, self._deadlines.now_s + GOAL_AGAIN_S)
             for neighbour in sorted(self._neighbours.ids()):
                 heard = self._neighbours.place_of(neighbour)

@@ -31,5 +31,5 @@ class Follow(Nearest):
             super().on_place(node, place)
 
     def _fly(self, step: Step) -> None:
-        self.mesh.tell_place(step.place)
+        self.mesh.announce_place(step.place)
         super()._fly(step)

@@ -63,5 +63,5 @@ class Inward(Home):
         return is_beside and self._moves < MOVES
 
     def _move_to(self, step: Step) -> None:
-        self.mesh.tell_place(step.place)
+        self.mesh.announce_place(step.place)
         self.mesh.fly(step)
