@@ -195,7 +195,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     seeds = arguments.seeds or (1 if arguments.quick else SEEDS)
     after_s = arguments.seconds or (QUICK_AFTER_S if arguments.quick else AFTER_S)
-    print(f"Radio: {arguments.radio}; {seeds} seeds, of which the worst is shown; {after_s:g} s observed.\n")
+    print(f"Radio: {arguments.radio}; worst of {seeds} seeds; {after_s:g} s observed.\n")
     print("| trial | aim | worst seed | reached |\n|---|---|---|---|", flush=True)
     missed = 0
     try:
