@@ -2,10 +2,10 @@
 
 docs/protocol.md, "Packets".
 
-Each class knows its own bytes, and no other module knows an offset. The constructor arguments are
-those of the original encoder, in its order: creator, from, to, forward, then the body. Any byte
-value can be encoded and decoded; the component that receives a packet judges whether an id makes
-sense (docs/protocol.md, "Bad input").
+Each class encodes and decodes its own bytes, and no other module knows an offset. The constructor
+arguments are those of the original encoder, in its order: creator, from, to, forward, then the
+body. Any byte value can be encoded and decoded; the receiving component decides whether an id is
+valid (docs/protocol.md, "Bad input").
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TWICE = tuple(bytes((value, value)) for value in range(256))
 TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
 REPORT_TYPES = range(64, 128)
 DATA_TYPES = range(128, 256)  # of users; their bodies are described in data/packets.py
-ROUTE_RECORD = 194  # the one packet of users to which each node that forwards it adds its id
+ROUTE_RECORD = 194  # the only packet of users to which forwarding nodes add their ids
 ROUTE_RECORD_AT = HEADER_BYTES + 2  # place of the number of ids, which follow
 MOST_RECORDED = 16
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
@@ -39,14 +39,14 @@ class MessageType(enum.IntEnum):
     """Byte 2. 8..63 belong to routing techniques, 64..127 to reports, 128..255 to users' data."""
 
     NOTDEFINED = 0
-    LOCATION = 1  # where its creator is
+    LOCATION = 1  # the position of its creator
     REQUESTLOCATION = 2  # asks for a LOCATION
     PRESENT = 3  # introduces its creator to every node in range
     HEARTBEAT = 4  # proof of a path; counts its hops
     MISSING = 5  # its creator can no longer reach a node
     MOVE_TO_LOCATION = 6  # an order to fly
     MOVEMENT_NEGOTIATION = 7  # the bid of its creator to fly
-    ORDER_REPLY = 64  # what a drone says of a numbered order; see order_messages
+    ORDER_REPLY = 64  # a drone's reply to a numbered order; see order_messages
     ORDER_QUERY = 65  # asks for an ORDER_REPLY
     NODE_REPORT = 66  # the state of its creator, for the gateway; see node_report
     NODE_WORDS = 67  # why its creator cannot fly
@@ -85,7 +85,7 @@ class Message:
 
 @dataclass(frozen=True)
 class LocationMessage:
-    """Where its creator is."""
+    """The position of its creator."""
 
     TYPE: ClassVar[MessageType] = MessageType.LOCATION
     BODY: ClassVar[struct.Struct] = struct.Struct("<ffhI")
@@ -288,7 +288,7 @@ TYPES_WITH_NUMBERS: Mapping[int, struct.Struct] = {  # the floats at the start o
 class GatewayPlace(NamedTuple):
     """Where a gateway was: an extension of a LOCATION or a MOVEMENT_NEGOTIATION.
 
-    In a mesh with a key a LOCATION has no room for it: it is the body of a GATEWAY_PLACE.
+    In a mesh with a key a LOCATION has no room for it, so it is the body of a GATEWAY_PLACE.
     """
 
     gateway: int  # its id
@@ -302,7 +302,7 @@ class GatewayPlace(NamedTuple):
         return payload[:at] + body + payload[at + len(body) :]
 
     def to_payload(self, creator: int, from_: int, to: int, forward: int) -> bytes:
-        """A packet of its own."""
+        """As a packet of its own."""
         return packet(MessageType.GATEWAY_PLACE, creator, from_, to, forward, self._body())
 
     def _body(self) -> bytes:
@@ -312,7 +312,7 @@ class GatewayPlace(NamedTuple):
 
     @classmethod
     def from_payload(cls, payload: bytes) -> GatewayPlace | None:
-        """The extension of such a packet; None if there is none, or no valid one."""
+        """The extension of such a packet; None if there is no valid one."""
         at = _GATEWAY_PLACE_AT[payload[_TYPE]]
         age, gateway, *place = _GATEWAY_PLACE.unpack_from(payload, at)
         if age == 0 or not all(map(math.isfinite, place)):
@@ -345,11 +345,11 @@ type_of: Callable[[bytes], int] = operator.itemgetter(_TYPE)
 """The type of a packet; see MessageType."""
 
 addressee: Callable[[bytes], int] = operator.itemgetter(_FORWARD)
-"""The node that a packet is for in the end, or BROADCAST."""
+"""The final addressee of a packet, or BROADCAST."""
 
 
 def is_data(payload: bytes) -> bool:
-    """Whether it is a packet of a user, of whatever type."""
+    """Whether it is a packet of users' data, of any type."""
     return payload[_TYPE] >= DATA_TYPES.start
 
 
@@ -402,7 +402,7 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
 
 
 def hops(payload: bytes) -> int:
-    """The hops that a PRESENT or a HEARTBEAT carries: to its gateway, or travelled so far."""
+    """The hop count of a PRESENT or HEARTBEAT: to its gateway, or travelled so far."""
     if payload[_TYPE] == _HEARTBEAT:
         return payload[_HEARTBEAT_HOPS]
     return payload[HEADER_BYTES]
@@ -413,7 +413,7 @@ EXTENSION_ROOM: Mapping[int, int] = {kind: len(part) for kind, part in _EXTENSIO
 
 
 def extension(payload: bytes) -> bytes:
-    """The bytes behind the body of a PRESENT or a HEARTBEAT; zero where no technique uses them."""
+    """The bytes behind the body of a PRESENT or HEARTBEAT; zero if no technique uses them."""
     part = _EXTENSIONS[payload[_TYPE]]
     return payload[part.start : part.stop]
 
@@ -431,7 +431,7 @@ def extended(payload: bytes, extension: bytes) -> bytes:
 
 
 def frame_digest(present: bytes) -> int:
-    """The digest of its creator's origin that a PRESENT carries; 0: it has none."""
+    """The digest of its creator's origin in a PRESENT; 0: it has none."""
     return int(_FRAME_DIGEST.unpack_from(present, _FRAME_DIGEST_AT)[0])
 
 
@@ -457,7 +457,7 @@ def body(payload: bytes) -> bytes:
 
 
 def identity(payload: bytes) -> bytes:
-    """The bytes that stay the same while a packet is forwarded."""
+    """The bytes that do not change while a packet is forwarded."""
     if payload[_TYPE] == _HEARTBEAT:
         return payload[:_FROM] + payload[_TYPE:_TO] + payload[_FORWARD:_HEARTBEAT_HOPS]
     return payload[:_FROM] + payload[_TYPE:_TO] + payload[_FORWARD:]

@@ -1,4 +1,4 @@
-"""Neighbours: the nodes in direct reach, as their packets show them."""
+"""Neighbours: the nodes in direct reach, as known from their packets."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drone_mesh.drone.interfaces import Location
 
 
 class HeardPlace(NamedTuple):
-    """Where a node said that it was."""
+    """The place that a node reported."""
 
     place: Location
     heard_s: float
@@ -18,23 +18,23 @@ class HeardPlace(NamedTuple):
 class Neighbours:
     """When each neighbour was last heard, which gateway it uses, and the places of nodes.
 
-    The only owner of this table: the other parts of a component report here what they learn. What
-    a node said of its gateway and its place stays on record when it is no longer a neighbour.
+    The only owner of this table: the other parts of a component report here what they learn. The
+    gateway and place of a node are kept when it is no longer a neighbour.
     """
 
     def __init__(self, silence_s: float) -> None:
-        """`silence_s`: neighbours that are lost within this time count as lost together."""
+        """`silence_s`: neighbours lost within this time count as lost together."""
         self._silence_s = silence_s
         self._heard_s: dict[int, float] = {}
         self._lost_s: dict[int, float] = {}
         self._gateways: dict[int, int] = {}
         self._hops: dict[int, int] = {}
         self._places: dict[int, HeardPlace] = {}
-        self.silent = False  # all neighbours, two or more, were lost together; none was heard since
-        self._leaves_them = False  # this node flies away from its neighbours by order
+        self.silent = False  # all neighbours (2 or more) were lost together; none heard since
+        self._leaves_them = False  # this node leaves its neighbours by order
 
     def heard(self, node: int, now_s: float) -> bool:
-        """A packet arrived from `node`. True if it was not a neighbour before."""
+        """A packet arrived from `node`. Returns whether it is a new neighbour."""
         is_new = node not in self._heard_s
         self._heard_s[node] = now_s
         if is_new:
@@ -43,7 +43,7 @@ class Neighbours:
         return is_new
 
     def lost(self, node: int, now_s: float) -> bool:
-        """`node` is out of reach. True if it was a neighbour."""
+        """`node` is out of reach. Returns whether it was a neighbour."""
         if self._heard_s.pop(node, None) is None:
             return False
         self._lost_s[node] = now_s
@@ -53,18 +53,18 @@ class Neighbours:
         return True
 
     def left_by_order(self) -> None:
-        """This node flies elsewhere by order: its medium is not the reason if it hears no node."""
+        """This node flies elsewhere by order, so hearing no node is not its medium's fault."""
         self._leaves_them = True
         self.silent = False
 
     def forget_all(self) -> None:
-        """This node moved, so it may have other neighbours."""
+        """This node moved and may have other neighbours."""
         self._leaves_them = False
         self._heard_s.clear()
         self._lost_s.clear()
 
     def ids(self) -> frozenset[int]:
-        """The present neighbours."""
+        """The current neighbours."""
         return frozenset(self._heard_s)
 
     def heard_s(self) -> dict[int, float]:
@@ -75,32 +75,32 @@ class Neighbours:
         """When `node` was last heard; `otherwise` if it is not a neighbour."""
         return self._heard_s.get(node, otherwise)
 
-    # What nodes say of themselves ------------------------------------------------------------
+    # Reported by the nodes themselves--------------------------------------------------------
 
     def uses_gateway(self, node: int, gateway: int) -> None:
         """`node` is connected to `gateway`."""
         self._gateways[node] = gateway
 
     def gateway_of(self, node: int) -> int:
-        """The gateway that `node` named last, or NO_ROUTE."""
+        """The gateway that `node` reported last, or NO_ROUTE."""
         return self._gateways.get(node, NO_ROUTE)
 
     def has_hops(self, node: int, hops: int) -> None:
-        """`node` introduced itself with so many hops to its gateway; 255: it has none."""
+        """`node` introduced itself with `hops` to its gateway; 255: it has none."""
         self._hops[node] = hops
 
     def hops_of(self, node: int) -> int:
-        """The hops that `node` named last; 255: none."""
+        """The hops that `node` reported last; 255: none."""
         return self._hops.get(node, NO_ROUTE)
 
     def is_at(self, node: int, place: Location, now_s: float) -> None:
-        """`node`, a neighbour or not, says where it is."""
+        """`node`, a neighbour or not, reports its place."""
         self._places[node] = HeardPlace(place, now_s)
 
     def place_of(self, node: int) -> HeardPlace | None:
-        """Where `node` was when it last said so."""
+        """The last reported place of `node`."""
         return self._places.get(node)
 
     def places(self) -> dict[int, HeardPlace]:
-        """All places that nodes named, by node. Do not change it."""
+        """All reported places, by node. Do not modify."""
         return self._places

@@ -1,4 +1,4 @@
-"""What a node says of itself to its gateway: reports of types 66 and 67.
+"""Reports of a node about itself to its gateway: types 66 and 67.
 
 docs/protocol.md, "Node reports". Both bodies fit into 14 bytes, so that they leave room for a seal.
 """
@@ -15,7 +15,7 @@ from drone_mesh.communication.messages import HEADER_BYTES, MessageType
 from drone_mesh.communication.text_parts import split
 from drone_mesh.drone.interfaces import Location
 
-STEPS_PER_M = 5  # places travel in steps of 0.2 m: 5000 m fit into an int16
+STEPS_PER_M = 5  # places are encoded in steps of 0.2 m: 5000 m fit into an int16
 UNKNOWN = 255  # of one byte
 NO_PLACE = -(2**15)
 WORDS_BYTES = 13  # in one packet
@@ -58,7 +58,7 @@ class NodeReport:
 
     @classmethod
     def from_payload(cls, payload: bytes) -> NodeReport:
-        """Decode; any bytes make a report."""
+        """Decode; any bytes are a valid report."""
         body = cls.BODY.unpack_from(payload, HEADER_BYTES)
         neighbours, hops, next_hop, *steps, battery, flags, tries = body
         place = None if NO_PLACE in steps else Location(*(step / STEPS_PER_M for step in steps))
@@ -75,7 +75,7 @@ class NodeReport:
 
 
 class NodeWords:
-    """NODE_WORDS: why its creator cannot fly, in as many packets as that takes."""
+    """NODE_WORDS: why its creator cannot fly, in one or more packets."""
 
     TYPE: ClassVar[MessageType] = MessageType.NODE_WORDS
     BODY: ClassVar[struct.Struct] = struct.Struct(f"<B{WORDS_BYTES}s")

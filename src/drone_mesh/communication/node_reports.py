@@ -1,4 +1,4 @@
-"""Nodes report to their gateway, and the gateway keeps what they say.
+"""Nodes report to their gateway, which keeps the reports.
 
 docs/protocol.md, "Node reports".
 """
@@ -19,21 +19,21 @@ from drone_mesh.communication.node_report import (
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.text_parts import TextAssembly
 
-WORDS_AGAIN_REPORTS = 10  # our choice: unchanged words are repeated for a gateway that is new
+WORDS_AGAIN_REPORTS = 10  # our choice: unchanged words are repeated for a new gateway
 
 
 class NodeReporter:
-    """Sends the reports of one router, at most one each period. Only its component calls it."""
+    """Sends the reports of one router, at most one per period. Called only by its component."""
 
     def __init__(self, parts: NodeParts, mesh: IMeshDebugInfo) -> None:
         """`mesh` is the component itself."""
         self._parts = parts
         self._mesh = mesh
-        self._words = ""  # as they were last sent
+        self._words = ""  # the last ones sent
         self._words_in = 0  # reports until they are repeated
 
     def start(self, share: float) -> None:
-        """Send the first after this share of a period, if there is a period."""
+        """Send the first report after this share of a period, if there is a period."""
         period_s = self._parts.timing.report_period_s
         if period_s:
             self._parts.deadlines.set(Due.NODE_REPORT, self._parts.now_s + share * period_s)
@@ -81,7 +81,7 @@ class ReportedNode(NamedTuple):
 class ReportBook:
     """The latest report of each node. Only the component of its gateway writes; any thread reads.
 
-    `_nodes` is never changed but replaced.
+    `_nodes` is never modified, only replaced.
     """
 
     def __init__(self) -> None:

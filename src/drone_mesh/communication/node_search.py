@@ -1,7 +1,8 @@
-"""NodeSearch: a gateway on a shared channel looks for a node that no known route leads to.
+"""NodeSearch: a gateway on a shared channel searches for a node without a known route.
 
-A relay that loses a neighbour loses the routes to all nodes behind it, and learns others only from
-packets of those nodes. On a busy channel these may be silent for 25 s, so the gateway asks for one.
+A relay that loses a neighbour loses the routes to all nodes behind it, and learns new ones only
+from packets of those nodes. On a busy channel these may be silent for 25 s, so the gateway requests
+one.
 docs/protocol.md, "Shared channel".
 """
 
@@ -17,23 +18,23 @@ from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.parts import NodeParts
 
 BODY = struct.Struct("<BH")  # the node, the number of the search
-SEARCH_EVERY_S = 0.3  # our choice: each search is one broadcast of every node
+SEARCH_EVERY_S = 0.3  # our choice: each search is one broadcast by every node
 SAME_SEARCH_S = 10.0  # our choice: far longer than a search takes to pass through a mesh
-NUMBERS_PER_S = 16  # a restarted gateway does not begin where it began before
+NUMBERS_PER_S = 16  # a restarted gateway starts at another number
 
 
 class NodeSearch:
-    """Searches of one node, and its part in those of others. Only its component calls it."""
+    """Searches of one node, and its part in others' searches. Called only by its component."""
 
     def __init__(self, parts: NodeParts, answer: Callable[[int], bool]) -> None:
-        """`answer` sends a heartbeat to the gateway that looks for this node."""
+        """`answer` sends a heartbeat to the gateway that searches for this node."""
         self._parts = parts
         self._answer = answer
         self._searched_s = -math.inf
         self._seen_s: dict[tuple[int, int, int], float] = {}  # creator, node, number
 
     def search(self, node: int) -> bool:
-        """Ask all nodes for it. False: not so soon after another search."""
+        """Ask all nodes for it. False: too soon after another search."""
         now_s = self._parts.now_s
         if now_s - self._searched_s < SEARCH_EVERY_S:
             return False
@@ -43,7 +44,7 @@ class NodeSearch:
         return True
 
     def on_packet(self, creator: int, payload: bytes) -> None:
-        """Answer a search for this node; pass any other on, once."""
+        """Answer a search for this node; forward any other search, once."""
         node, number = BODY.unpack_from(payload, messages.HEADER_BYTES)
         now_s, search = self._parts.now_s, (creator, node, number)
         old = [seen for seen, at_s in self._seen_s.items() if now_s - at_s >= SAME_SEARCH_S]

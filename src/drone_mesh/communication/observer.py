@@ -11,15 +11,15 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 
 
 class MeshEventKind(enum.Enum):
-    """What happened to a node. The value is the word that people see."""
+    """The kind of an event. The value is the text that views display."""
 
     STARTED = "started"
     CONNECTED = "connected"  # peer: the gateway
     DISCONNECTED = "disconnected"  # peer: the gateway that no longer answers
     GATEWAY_CHANGED = "gateway changed"  # peer: the new one
-    NEIGHBOUR_FOUND = "neighbour found"  # peer: it
-    NEIGHBOUR_LOST = "neighbour lost"  # peer: it
-    NODE_MISSING = "node missing"  # peer: a node that can no longer be reached in any way
+    NEIGHBOUR_FOUND = "neighbour found"  # peer: the neighbour
+    NEIGHBOUR_LOST = "neighbour lost"  # peer: the neighbour
+    NODE_MISSING = "node missing"  # peer: a node that is no longer reachable
     NO_ROUTE = "no route"  # peer: the drone whose order could not be sent
     POWER_ON = "power on"
     POWER_OFF = "power off"
@@ -48,17 +48,17 @@ class MeshEventKind(enum.Enum):
 
 @dataclass(frozen=True)
 class MeshEvent:
-    """One thing that happened to one node."""
+    """One event at one node."""
 
     kind: MeshEventKind
     node: int
     now_s: float
     peer: int = NO_ROUTE  # the other node concerned, or NO_ROUTE
-    detail: str = ""  # a few words for people
+    detail: str = ""  # a short text for display
 
 
 MeshObserver = Callable[[MeshEvent], None]
-"""Runs in the thread that works in the component, and must not call back into it."""
+"""Called in the thread that runs the component; must not call back into the component."""
 
 
 def ignore_events(_event: MeshEvent) -> None:
@@ -74,5 +74,5 @@ class Reporter:
         self._observer = observer
 
     def __call__(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
-        """Report what happened, which other node it concerns, and a few words for people."""
+        """Report an event, the other node concerned, and a short text for display."""
         self._observer(MeshEvent(kind, self._node_id, self._deadlines.now_s, peer, detail))

@@ -21,14 +21,14 @@ from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.text_parts import TextAssembly
 from drone_mesh.drone.interfaces import Location
 
-OLD_ORDERS_KEPT = 100  # our choice: beside the latest of each drone
+OLD_ORDERS_KEPT = 100  # our choice: besides the latest of each drone
 HIGHEST_NUMBER = 2**16 - 1
-NUMBERS_PER_S = 16  # our choice: a gateway that is restarted does not begin where it began before
-REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # our choice: without a reply, so long after each try
+NUMBERS_PER_S = 16  # our choice: a restarted gateway starts at another number
+REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # our choice: pauses between tries without a reply
 FOUND_WITHIN_S = 1.0  # our choice: a search passes through 100 nodes within half a second
-MOST_SEARCHES = 3  # our choice: for one order; the path that a search found may break at once
-QUERY_PERIOD_S = 15.0  # our choice: how often a drone under way is asked
-MOST_QUERIES = 20  # our choice: without an answer; five minutes
+MOST_SEARCHES = 3  # our choice: per order; the path that a search found may break at once
+QUERY_PERIOD_S = 15.0  # our choice: period of queries to a drone under way
+MOST_QUERIES = 20  # our choice: without an answer: five minutes
 
 _log = logging.getLogger(__name__)
 
@@ -61,10 +61,10 @@ class _Order:
     reason: str = ""
     changed_s: float = 0.0
     due_s: float = math.inf  # next repeat or query
-    searches: int = 0  # how often the drone was searched for because there was no route
-    seeking: bool = False  # it is searched for now, or will be in a moment
-    unanswered: int = 0  # packets since the drone was last heard about it
-    settled: bool = False  # the drone itself has said how it ended
+    searches: int = 0  # number of searches for the drone without a route
+    seeking: bool = False  # a search for it is running or about to start
+    unanswered: int = 0  # packets since the drone's last reply about it
+    settled: bool = False  # the drone itself has reported the outcome
     reason_parts: TextAssembly = field(default_factory=TextAssembly)
 
 
@@ -74,8 +74,8 @@ class OrderBook:
     def __init__(
         self, parts: NodeParts, may_find: Callable[[int], bool], search: Callable[[int], bool]
     ) -> None:
-        """`may_find`: whether a search could find this drone, which has no route. `search` starts
-        one; False: not so soon after another."""
+        """`may_find`: whether a search could find this drone without a route. `search` starts one;
+        False: too soon after another."""
         self._parts = parts
         self._may_find = may_find
         self._search = search
@@ -83,7 +83,7 @@ class OrderBook:
         self._last_number = 0
 
     def records(self) -> list[OrderRecord]:
-        """All orders that it remembers, oldest first."""
+        """All remembered orders, oldest first."""
         return [
             OrderRecord(
                 order.number,
@@ -98,7 +98,7 @@ class OrderBook:
         ]
 
     def enter(self, drone: int, goal: Location) -> int:
-        """Note a new order; returns its number. It ends an older one for that drone."""
+        """Record a new order; returns its number. It ends an older order for that drone."""
         now_s = self._parts.now_s
         for other in self._open_for(drone):
             self._move(other, OrderState.GIVEN_UP, "another order followed")
@@ -108,7 +108,7 @@ class OrderBook:
         return number
 
     def send(self, number: int) -> bool:
-        """Send it for the first time. False: there was no route, and it is not tried again."""
+        """Send it for the first time. False: there was no route; it is not tried again."""
         order = self._orders[number]
         if self._parts.delivery.send_own(self._packet(order)):
             self._wait(order, REPEAT_AFTER_S[0])
@@ -126,7 +126,7 @@ class OrderBook:
                 self._no_route(order)
 
     def on_found(self, drone: int) -> None:
-        """A drone has answered the search, along a path that works."""
+        """A drone answered the search, along a working path."""
         for order in self._open_for(drone):
             if order.seeking:
                 order.seeking = False
@@ -134,7 +134,7 @@ class OrderBook:
                 self._wait(order, REPEAT_AFTER_S[0])
 
     def _seek(self, order: _Order) -> bool:
-        """Search for the drone; the order is lost if no search finds it in time."""
+        """Search for the drone; the order is lost unless a search finds it in time."""
         if order.searches >= MOST_SEARCHES or not self._may_find(order.drone):
             return False
         order.seeking = True
@@ -168,7 +168,7 @@ class OrderBook:
         self._wait(order, math.inf if order.settled or is_own else QUERY_PERIOD_S)
 
     def on_due(self) -> None:
-        """Repeat orders without a reply, and ask drones that are under way."""
+        """Repeat orders without a reply, and query drones that are under way."""
         now_s = self._parts.now_s
         for order in list(self._orders.values()):
             if order.due_s <= now_s:
@@ -197,7 +197,7 @@ class OrderBook:
             order.due_s = self._parts.now_s + QUERY_PERIOD_S
 
     def _send_if_routed(self, order: _Order, packet: bytes) -> None:
-        """Without a route nothing is sent: the drone may be in flight, out of reach."""
+        """Send nothing without a route: the drone may be in flight, out of reach."""
         if self._parts.routing.get_direction_to_node(order.drone) != NO_ROUTE:
             self._parts.delivery.send_own(packet)
 

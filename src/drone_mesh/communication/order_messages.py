@@ -1,4 +1,4 @@
-"""What a drone and a gateway say about an order: reports of types 64 and 65.
+"""The messages of drone and gateway about an order: reports of types 64 and 65.
 
 docs/protocol.md, "Orders". Both bodies fit into 14 bytes, so that they leave room for a seal.
 """
@@ -18,10 +18,10 @@ TEXT_BYTES = 10  # of a reason, in one packet
 
 
 class OrderOutcome(enum.IntEnum):
-    """What a drone says of an order."""
+    """The outcome of an order, as reported by the drone."""
 
     ACCEPTED = 1  # it flies there
-    REFUSED = 2  # it stays; with the reason
+    REFUSED = 2  # it stays; with a reason
     ARRIVED = 3  # it is there
     GIVEN_UP = 4  # the flight ended elsewhere; with the reason
     UNKNOWN = 5  # answer to a query: it knows no such order (any more)
@@ -29,7 +29,7 @@ class OrderOutcome(enum.IntEnum):
 
 @dataclass(frozen=True)
 class OrderReply:
-    """One part of what a drone says of the order `number` to the gateway that sent it."""
+    """One part of a drone's reply about the order `number` to the gateway that sent it."""
 
     TYPE: ClassVar[MessageType] = MessageType.ORDER_REPLY
     BODY: ClassVar[struct.Struct] = struct.Struct(f"<HBB{TEXT_BYTES}s")
@@ -41,7 +41,7 @@ class OrderReply:
 
     @classmethod
     def from_payload(cls, payload: bytes) -> OrderReply | None:
-        """Decode; None for an outcome or a part that does not exist."""
+        """Decode; None for an invalid outcome or part."""
         number, outcome, part, text = cls.BODY.unpack_from(payload, HEADER_BYTES)
         try:
             known = OrderOutcome(outcome)
@@ -65,7 +65,7 @@ def reply_packets(
 
 
 class OrderQuery:
-    """The gateway asks what became of an order; the body is its number."""
+    """A gateway asks for the state of an order; the body is its number."""
 
     TYPE: ClassVar[MessageType] = MessageType.ORDER_QUERY
     BODY: ClassVar[struct.Struct] = struct.Struct("<H")

@@ -1,4 +1,4 @@
-"""OrderRecord: one order as its gateway knows it (docs/protocol.md, "Orders")."""
+"""OrderRecord: one order as known to its gateway (docs/protocol.md, "Orders")."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drone_mesh.drone.interfaces import Location
 
 
 class OrderState(enum.Enum):
-    """How far an order has come. The value is the word that people see."""
+    """The progress of an order. The value is the text that views display."""
 
     ASKED = "asked"  # the next hop has it
     UNDER_WAY = "under way"  # the drone has accepted it
@@ -20,12 +20,12 @@ class OrderState(enum.Enum):
 
 
 class OrderRecord(NamedTuple):
-    """One order, as its gateway knows it."""
+    """One order as known to its gateway."""
 
     number: int  # 1..65535, unique among the orders that the gateway remembers
     drone: int
     goal: Location
     state: OrderState
-    reason: str  # of a refusal, or why it was given up; else empty
+    reason: str  # why it was refused or given up; otherwise empty
     ordered_s: float  # when, in seconds of the core's clock
-    changed_s: float  # since when it has been in this state
+    changed_s: float  # time of the last change of state

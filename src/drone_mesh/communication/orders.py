@@ -1,4 +1,4 @@
-"""OrderIntake: which orders to fly a node takes, and what it says of them.
+"""OrderIntake: which orders a node accepts, and its replies to them.
 
 docs/protocol.md, "Orders".
 """
@@ -21,13 +21,13 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 
-ORDERS_KEPT = 8  # our choice: more than gateways that order one drone
+ORDERS_KEPT = 8  # our choice: more than the gateways that order one drone
 ARRIVED_WITHIN_M = 1.5  # our choice: a MAVLink drone counts 1 m as there (drone/route.py)
-REPLY_AGAIN_S = 1.0  # our choice: how often a drone without a route looks for one
-REPLY_TRIES = 120  # our choice: a query of the gateway comes after that
+REPLY_AGAIN_S = 1.0  # our choice: how often a reply without a route is retried
+REPLY_TRIES = 120  # our choice: then the gateway queries
 
 OwnReply = Callable[[int, OrderOutcome, str], None]
-"""Takes what the gateway's own drone says: order number, outcome, reason."""
+"""Receives replies of the gateway's own drone: order number, outcome, reason."""
 
 
 @dataclass
@@ -54,17 +54,17 @@ class OrderIntake:
         self.on_own_reply: OwnReply = _ignore
 
     def on_order(self, order: GoToLocationMessage, number: int) -> None:
-        """An order from the air: taken, or refused with a line in the log."""
+        """An order from the air: accepted, or refused with a log line."""
         try:
             self.take(order.creator, order.location, number)
         except GoalRefused as error:
             self._complaints.add("order refused", str(error), self._parts.now_s)
 
     def take(self, gateway: int, goal: Location, number: int = 0) -> None:
-        """Fly to `goal`, unless the drone does so already: two gateways order the same flight.
+        """Fly to `goal`, unless the drone already does: two gateways may order the same flight.
 
-        The same order again (same gateway, number and goal) is only replied to again. Raises
-        GoalRefused if the drone does not fly there.
+        A repeated order (same gateway, number and goal) only gets another reply. Raises GoalRefused
+        if the drone does not fly there.
         """
         known = self._find(gateway, number)
         if known is not None and known.goal == goal:
@@ -87,7 +87,7 @@ class OrderIntake:
             self._took_off()
 
     def on_query(self, gateway: int, number: int) -> None:
-        """A gateway asks what became of an order."""
+        """A gateway queries the state of an order."""
         known = self._find(gateway, number)
         if known is not None:
             self._reply(known, known.outcome, known.reason)
@@ -96,7 +96,7 @@ class OrderIntake:
             self._send(unknown)
 
     def on_landed(self) -> None:
-        """A flight is over; whether it was an ordered one is looked up here."""
+        """A flight is over; if it was an ordered one, reply."""
         orders = self._under_way()
         if not orders:
             return
@@ -113,14 +113,14 @@ class OrderIntake:
                 self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {off_m:.1f} m from the goal")
 
     def on_due(self) -> None:
-        """Send the replies that had no route until now."""
+        """Send replies that had no route until now."""
         self._parts.deadlines.set(Due.ORDER_REPLIES, math.inf)
         for order in self._known:
             if order.tries_left:
                 self._send(order)
 
     def _obey(self, goal: Location) -> bool:
-        """Whether a flight starts by this; it does not if the drone already flies there."""
+        """Start the flight; returns False if the drone already flies there."""
         check_goal(*goal)
         pilot = self._parts.pilot
         why_not = pilot.why_not_fly()
@@ -139,7 +139,7 @@ class OrderIntake:
 
     def _remember(self, order: _KnownOrder) -> None:
         known = self._find(order.gateway, order.number)
-        if known is not None:  # the gateway was restarted, and counts again
+        if known is not None:  # the gateway was restarted and reuses numbers
             self._known.remove(known)
         self._known.append(order)
 
@@ -155,7 +155,7 @@ class OrderIntake:
             self._send(order)
 
     def _send(self, order: _KnownOrder) -> None:
-        """Towards its gateway; after a landing there is no route at first."""
+        """Send the reply towards its gateway; right after a landing there is no route yet."""
         parts = self._parts
         packets = reply_packets(
             order.number, order.outcome, order.reason, parts.node_id, order.gateway
@@ -172,4 +172,4 @@ _NOWHERE = Location(math.nan, math.nan, math.nan)
 
 
 def _ignore(_number: int, _outcome: OrderOutcome, _reason: str) -> None:
-    """A router's own drone takes no orders from itself."""
+    """A router's own drone gets no orders from itself."""

@@ -1,4 +1,4 @@
-"""NodeParts: what the objects that make up one mesh component share."""
+"""NodeParts: shared by the objects that make up one mesh component."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from drone_mesh.communication.timing import MeshTiming
 
 @dataclass(frozen=True)
 class NodeParts:
-    """The parts of one node. All of them belong to the thread that works in its component."""
+    """The parts of one node. All belong to the thread that runs its component."""
 
     node_id: int
     timing: MeshTiming
@@ -33,7 +33,7 @@ class NodeParts:
     antenna: IWirelessCommunication
 
     def heartbeat(self, to: int, forward: int, connected: bool, gateway: int) -> bytes:
-        """A heartbeat of this node for `forward`, with what the routing technique adds to it."""
+        """A heartbeat of this node for `forward`, including the routing technique's extension."""
         me = self.node_id
         payload = messages.heartbeat(me, me, to, forward, connected, gateway)
         room = messages.EXTENSION_ROOM[MessageType.HEARTBEAT]

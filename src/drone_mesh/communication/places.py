@@ -1,4 +1,4 @@
-"""KnownPlaces: where the gateway is, and where to step back to."""
+"""KnownPlaces: the gateway's place, and the places to step back to."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class KnownPlaces:
         self.gateway: Location | None = None  # of the preferred gateway
         self.gateway_seen_s = 0.0  # when the gateway was there
         self.good: Location | None = None  # the last good known location
-        self.good_id = NO_ROUTE  # the node whose place that is
+        self.good_id = NO_ROUTE  # the node at that place
 
     def gateway_is_at(self, place: Location, seen_s: float) -> None:
-        """The preferred gateway was at `place` at `seen_s`; older news changes nothing."""
+        """The preferred gateway was at `place` at `seen_s`; older information is ignored."""
         if self.gateway is None or seen_s >= self.gateway_seen_s:
             self.gateway, self.gateway_seen_s = place, seen_s
 
@@ -29,6 +29,6 @@ class KnownPlaces:
         self.gateway = None
 
     def left_own_place(self, gateway: int) -> None:
-        """The node flies: the next step back is to the place of `gateway`, if that is known."""
+        """The node flies: the next step back leads to the place of `gateway`, if that is known."""
         self.good = self.gateway
         self.good_id = NO_ROUTE if self.gateway is None else gateway

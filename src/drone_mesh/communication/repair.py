@@ -1,4 +1,4 @@
-"""ConnectionRepair: when a router's connection is lost for too long, its strategy repairs it.
+"""ConnectionRepair: repairs a router's connection, with its strategy, if it is lost for too long.
 
 It notices the loss, waits, flies for the strategy, and keeps clear of other drones.
 docs/protocol.md, "Lost connection" and "Flight".
@@ -34,7 +34,7 @@ ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
 class ConnectionRepair(RepairViews):
-    """The repair of one router. It moves the `Repair` of the router's states."""
+    """The repair of one router. It drives the `Repair` of the router's states."""
 
     def __init__(
         self,
@@ -59,9 +59,9 @@ class ConnectionRepair(RepairViews):
     # What the router reports -----------------------------------------------------------------
 
     def on_unconnected_check(self, due_s: float) -> None:
-        """A check, due at `due_s`, finds the router unconnected and no answer under way.
+        """A check, due at `due_s`, finds the router unconnected and no answer pending.
 
-        Time counts from check to check as they were due, so that a late check costs no period.
+        Time is counted between due times, so that a late check does not cost a period.
         """
         state = self._states.repair
         if state is Repair.AT_REST:
@@ -84,20 +84,20 @@ class ConnectionRepair(RepairViews):
             self._flight.stop_here()
 
     def on_antenna_off(self) -> None:
-        """The antenna has no power."""
+        """The antenna is off."""
         self._connection.end(RouterEvent.ANTENNA_OFF)
         self._clear()
         self._strategy.reason = ""
         self._strategy.on_stopped()
 
     def on_ordered_flight(self) -> None:
-        """A flight has started by an order."""
+        """An ordered flight has started."""
         self._flight = None
         self._parts.neighbours.left_by_order()
         self._took_off()
 
     def on_neighbour_found(self, node: int) -> None:
-        """A node is in reach that was not. After a silence, the mesh has its time to recover."""
+        """A new node is in reach. After a silence, give the mesh time to recover."""
         if self._was_silent:
             self._was_silent = False
             if self._states.repair is Repair.LOST:
@@ -109,18 +109,18 @@ class ConnectionRepair(RepairViews):
         self._strategy.on_neighbour_lost(node)
 
     def on_place(self, node: int, place: Location) -> None:
-        """`node` says where it is."""
+        """`node` reports its place."""
         if self._flight is not None:
             self._flight.on_place(node, place)
         else:
             self._strategy.on_place(node, place)
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
-        """A node of the group bids; `from_` sent or passed on that bid (see IRepairStrategy)."""
+        """A node of the group bids; `from_` sent or relayed that bid (see IRepairStrategy)."""
         self._strategy.on_bid(node, score, from_, about)
 
     def on_due(self) -> bool:
-        """The moment has come that the repair waits for. True if a flight is over."""
+        """The repair's timer has expired. Returns whether a flight is over."""
         self._parts.deadlines.set(Due.REPAIR, math.inf)
         if self._flight is not None:
             return self._stands_clear(self._flight)
@@ -128,7 +128,7 @@ class ConnectionRepair(RepairViews):
         return False
 
     def status(self) -> RepairStatus:
-        """What the repair does now, and why."""
+        """The current activity of the repair, and its reason."""
         state, flight, strategy = self.state, self._flight, self._strategy
         if flight is not None:
             return RepairStatus(
@@ -156,7 +156,7 @@ class ConnectionRepair(RepairViews):
     # Actions of the strategy -----------------------------------------------------------------
 
     def fly(self, step: Step, until_connected: bool = False) -> None:
-        """See IRepairActions, as for all that follows."""
+        """See IRepairActions; also for the functions below."""
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = RepairFlight(
             self._parts, self._introduce, step.owner, step.place, self._goal(step), self._options
@@ -221,11 +221,11 @@ class ConnectionRepair(RepairViews):
     # Flight ----------------------------------------------------------------------------------
 
     def may_connect(self, node: int, know_gateway: bool) -> bool:
-        """Whether the router may take up a connection now, through `node`.
+        """Whether the router may now connect through `node`.
 
-        In flight for a repair it would be a relay that is gone the next moment, so it keeps out,
-        unless it is to stop where it is connected. A gateway for the group that it left behind is
-        a reason to do so.
+        In flight for a repair it would be a relay that is soon gone, so it stays unconnected,
+        unless it may stop where it is connected. It also stops if the group that it left behind has
+        a gateway.
         """
         flight = self._flight
         if flight is None:
@@ -240,7 +240,7 @@ class ConnectionRepair(RepairViews):
             self._flight.each_second()
 
     def on_arrived(self) -> bool:
-        """The drone is at its goal. True if the flight is over."""
+        """The drone is at its goal. Returns whether the flight is over."""
         if self._flight is None:
             return True
         if self._flight.arrived():
@@ -263,7 +263,7 @@ class ConnectionRepair(RepairViews):
         return True
 
     def _goal(self, step: Step) -> Location:
-        """A living gateway stands at its place, and in a silent medium any node may."""
+        """The goal of a step, beside a live gateway or, in a silent medium, beside any node."""
         if step.owner == self.node_id:
             return step.place
         if self.silent:

@@ -14,15 +14,15 @@ from drone_mesh.drone.interfaces import Location
 
 ASK_AGAIN_S = 0.3  # our choice: an answer takes some milliseconds
 ASKS_ON_GROUND = 2  # our choice: a lossy medium loses a question now and then
-LEG = 2.0 / 3.0  # of the range, our choice: at half that height it hears what is below
-FRESH_S = 5.0  # our choice: a drone that said where it is may have moved after this time
+LEG = 2.0 / 3.0  # of the range, our choice: at half that height it hears nodes below
+FRESH_S = 5.0  # our choice: a drone may have moved this long after reporting its place
 
 
 class RepairFlight:
-    """One flight of one drone, from the take-off until it stands clear of the others.
+    """One flight of one drone, from take-off until it is clear of other drones.
 
-    Once a second it asks all nodes in range for their places. If one stands on its goal it goes to
-    a spot beside that, and no farther than it needs to be connected. On the ground it asks again.
+    Once a second it asks all nodes in range for their places. If one is at its goal it diverts to a
+    spot beside that, and no farther than it needs to be connected. On the ground it asks again.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class RepairFlight:
 
     @property
     def on_ground(self) -> bool:
-        """Whether it has landed, and checks whether it stands clear of others."""
+        """Whether it has landed and checks that it is clear of others."""
         return self.asks_left > 0
 
     def start(self) -> None:
@@ -65,7 +65,7 @@ class RepairFlight:
             self._introduce()
 
     def stop_when_connected(self) -> None:
-        """Going on is pointless, unless it goes back: be connected, and stop there."""
+        """Stop at the first connection, unless this flight leads back."""
         self.stops_when_connected = self._owner != self._parts.node_id
 
     def stop_here(self) -> None:
@@ -78,7 +78,7 @@ class RepairFlight:
                 self._go_to(below if self._is_free(below) else self._spot())
 
     def on_place(self, node: int, place: Location) -> None:
-        """Another node says where it is; keep clear of it."""
+        """Another node reports its place; keep clear of it."""
         if node == self._owner and place.distance_m(self._place) < self._clearance_m:
             self.stop_when_connected()
         if place.distance_m(self.goal) < self._clearance_m:
@@ -87,7 +87,7 @@ class RepairFlight:
             self._go_to(self._spot())
 
     def arrived(self) -> bool:
-        """It is on the ground. False: that was one leg; else it asks which nodes are there."""
+        """It is on the ground: ask for places. Returns False after one leg of several."""
         here = self._parts.pilot.location()
         if self._leg_is_short(here):
             self._fly_on()
@@ -97,7 +97,7 @@ class RepairFlight:
         return True
 
     def ask_again(self) -> bool:
-        """The answers have had their time. False: it stands clear, and the flight is over."""
+        """The time for answers is over. Returns False if it is clear and the flight is over."""
         self.asks_left -= 1
         if self.on_ground:
             self._ask_all_for_places()
@@ -109,11 +109,12 @@ class RepairFlight:
         self._fly_on()
 
     def _fly_on(self) -> None:
-        """On towards the goal.
+        """Continue towards the goal.
 
-        A flight that may end where the drone is connected goes in legs: it climbs by half of each
-        leg, and higher up it would hear no node on the ground. No leg ends within LANDED_WITHIN_M
-        of the goal: the drone would rest there, and only the goal is clear of the others.
+        A flight that may end where the drone is connected consists of legs: it climbs by half of
+        each leg, and higher up it would hear no node on the ground. No leg ends within
+        LANDED_WITHIN_M of the goal, because the drone would rest there although only the goal is
+        clear of the others.
         """
         here = self._parts.pilot.location()
         self._leg_from = here
@@ -124,7 +125,7 @@ class RepairFlight:
         self._parts.pilot.step_back_to(goal)
 
     def _leg_is_short(self, here: Location | None) -> bool:
-        """Whether this was not the last leg, and the drone moves at all."""
+        """Whether this was not the last leg, and the drone makes progress."""
         if (
             here is None
             or self._leg_from is None
@@ -134,7 +135,7 @@ class RepairFlight:
         return here.distance_m(self.goal) > LANDED_WITHIN_M
 
     def _spot(self) -> Location:
-        """Two drones that divert at the same time pass over different numbers of spots."""
+        """A free spot; two drones that divert at the same time skip different numbers of spots."""
         skip = self._parts.node_id % 5 if self._diversions > 1 else 0
         return free_spot(self._wanted, self._origin, self._clearance_m, self._others(), skip)
 
@@ -142,9 +143,9 @@ class RepairFlight:
         return all(spot.distance_m(other) >= self._clearance_m for other in self._others())
 
     def _others(self) -> list[Location]:
-        """Where other drones are, or may be."""
+        """Where other drones are or may be."""
         now_s, me = self._parts.now_s, self._parts.node_id
-        gateway = self._parts.places.gateway  # it may stand there, though it is off now
+        gateway = self._parts.places.gateway  # it may be there, although it is off now
         kept_free = [] if gateway is None else [gateway]
         return kept_free + [
             heard.place
@@ -157,6 +158,6 @@ class RepairFlight:
 
 
 def ask_all_for_places(antenna: IWirelessCommunication, me: int) -> None:
-    """Ask each node in range where it is."""
+    """Request the places of all nodes in range."""
     question = Message(me, me, MessageType.REQUESTLOCATION, BROADCAST, BROADCAST)
     antenna.broadcast_message(question.to_payload())

@@ -1,7 +1,7 @@
-"""The seam between a router and its repair strategy: its notifications, its views, its actions.
+"""The interface between a router and its repair strategy: notifications, views, actions.
 
-A strategy is driven like the rest of the mesh software: it has no clock, no thread and no random
-numbers of its own. docs/strategies.md shows how to write one.
+A strategy is driven like the rest of the mesh software: without a clock, thread or randomness of
+its own. docs/strategies.md shows how to write one.
 """
 
 # ruff: noqa: B027 - a strategy overrides only those of the calls that it needs
@@ -17,34 +17,34 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.router_states import Repair, RouterEvent
 from drone_mesh.drone.interfaces import Location
 
-SILENCE_PATIENCE = 5.0  # our choice: how many times longer a node waits if its medium may be down
+SILENCE_PATIENCE = 5.0  # our choice: the factor on a node's patience if its medium may be down
 
 
 class Step(NamedTuple):
-    """A flight that a drone could make."""
+    """A possible flight of a drone."""
 
     place: Location
-    owner: int = NO_ROUTE  # the node whose place it is; NO_ROUTE: of none; the own id: back there
+    owner: int = NO_ROUTE  # the node at that place; NO_ROUTE: none; own id: a return
     home: bool = False  # whether it is the gateway's place
 
 
 class NeighbourView(NamedTuple):
-    """What a router knows of a neighbour."""
+    """What a router knows about a neighbour."""
 
-    place: Location | None  # where it stands, or will stand; None: it has not said
-    age_s: float  # how old that is; infinity if it is not known
-    hops: int  # to its gateway, as it said last; 255: it has none
+    place: Location | None  # where it is, or its destination; None: not reported
+    age_s: float  # age of the place; infinity if unknown
+    hops: int  # to its gateway, as last reported; 255: it has none
 
 
 class IRepairActions(abc.ABC):
-    """What a strategy sees of its router, and what it may do. Places are in metres, x east."""
+    """A strategy's view of its router, and its possible actions. Places in metres, x east."""
 
     # Views -----------------------------------------------------------------------------------
 
     @property
     @abc.abstractmethod
     def node_id(self) -> int:
-        """The own id."""
+        """The node's own id."""
 
     @property
     @abc.abstractmethod
@@ -54,12 +54,12 @@ class IRepairActions(abc.ABC):
     @property
     @abc.abstractmethod
     def range_m(self) -> float:
-        """How far a radio reaches, as far as known."""
+        """The range of the radio, as far as known."""
 
     @property
     @abc.abstractmethod
     def clearance_m(self) -> float:
-        """How near to each other drones may come to rest."""
+        """The least distance between drones at rest."""
 
     @property
     @abc.abstractmethod
@@ -79,12 +79,12 @@ class IRepairActions(abc.ABC):
     @property
     @abc.abstractmethod
     def state(self) -> Repair:
-        """What the repair does now."""
+        """The current repair state."""
 
     @property
     @abc.abstractmethod
     def silent(self) -> bool:
-        """Whether all neighbours, two or more, fell silent together: the medium may be down."""
+        """Whether all neighbours (2 or more) fell silent together, so the medium may be down."""
 
     @abc.abstractmethod
     def neighbours(self) -> Mapping[int, NeighbourView]:
@@ -92,7 +92,7 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def reachable(self) -> Mapping[int, NeighbourView]:
-        """All nodes to which there is a route and whose place was heard."""
+        """All nodes with a route to them and a reported place."""
 
     @abc.abstractmethod
     def reaches(self, node: int) -> bool:
@@ -101,25 +101,25 @@ class IRepairActions(abc.ABC):
     @property
     @abc.abstractmethod
     def lost_next_hop(self) -> int:
-        """The next hop towards the gateway, before the connection was lost; NO_ROUTE: unknown."""
+        """The next hop to the gateway before the connection was lost; NO_ROUTE: unknown."""
 
     @property
     @abc.abstractmethod
     def steps(self) -> list[Step]:
-        """The flights back: to the place of the lost next hop, then to that of the gateway."""
+        """The flights back: to the place of the lost next hop, then to the gateway's."""
 
     @property
     @abc.abstractmethod
     def gateway_place(self) -> Location | None:
-        """Where the preferred gateway is, as heard last."""
+        """The last reported place of the preferred gateway."""
 
     @abc.abstractmethod
     def own_place(self) -> Location | None:
-        """Where this drone is; None: it cannot say."""
+        """The position of this drone; None: unknown."""
 
     @abc.abstractmethod
     def why_not_fly(self) -> str:
-        """Why the drone would not fly; empty while it would."""
+        """Why the drone cannot fly; empty if it can."""
 
     @abc.abstractmethod
     def was_at(self, step: Step) -> bool:
@@ -129,7 +129,7 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def fly(self, step: Step, until_connected: bool = False) -> None:
-        """Fly there, and land clear of other drones; `on_landed` reports the landing.
+        """Fly there and land clear of other drones; `on_landed` reports the landing.
 
         `until_connected`: land as soon as a gateway answers. The routes are forgotten.
         """
@@ -142,22 +142,22 @@ class IRepairActions(abc.ABC):
         but_not_to: int = NO_ROUTE,
         about: Location | None = None,
     ) -> None:
-        """Send a bid to all neighbours; `node` made it, if it is passed on.
+        """Send a bid to all neighbours; `node` is its creator if it is relayed.
 
         `about`: the gateway's place, if the bid announces that a drone flies or flew there.
         """
 
     @abc.abstractmethod
     def ask_places(self) -> None:
-        """Ask all nodes in range where they are; the answers come to `on_place`."""
+        """Request the places of all nodes in range; the answers arrive in `on_place`."""
 
     @abc.abstractmethod
     def ask_place(self, node: int) -> None:
-        """Ask one node, along the route to it."""
+        """Request the place of one node, along the route to it."""
 
     @abc.abstractmethod
     def announce_place(self, place: Location) -> None:
-        """Send all nodes in range the place where this drone stands, or will stand."""
+        """Send the place where this drone is or will be to all nodes in range."""
 
     @abc.abstractmethod
     def present(self) -> None:
@@ -165,15 +165,15 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def wait_until(self, at_s: float) -> None:
-        """Have `on_time` called then, and not at an earlier wish; infinity: not at all."""
+        """Call `on_time` at this time instead of an earlier request; infinity: not at all."""
 
     @abc.abstractmethod
     def happened(self, event: RouterEvent) -> None:
-        """Move the states of the router (see router_states). An election needs this."""
+        """Change the states of the router (see router_states). An election needs this."""
 
     @abc.abstractmethod
     def end_round(self) -> None:
-        """An election is over. The time without a gateway counts from its first check on."""
+        """An election is over. Count the time without a gateway from its first check."""
 
     @abc.abstractmethod
     def report(self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = "") -> None:
@@ -181,29 +181,29 @@ class IRepairActions(abc.ABC):
 
 
 class IRepairStrategy(abc.ABC):
-    """What a router does about a lost connection. All calls come from one thread, one at a time.
+    """A router's reaction to a lost connection. All calls come from one thread, one at a time.
 
-    Only `on_emergency` has to be written. A strategy of a node that is connected or in flight for
-    a repair is not asked to do anything.
+    Only `on_emergency` is required. A strategy is not asked for actions while its node is connected
+    or flies for a repair.
     """
 
     # Shown to users, as RepairStatus:
-    reason = ""  # why the drone does not fly, in a few words
+    reason = ""  # why the drone does not fly, as short text
     own_bid = NO_BID  # in an election
     bid_unit = ""  # of bids above 1
     bids_for = NO_ROUTE  # the node whose place it would take
-    winner = NO_ROUTE  # of an election; it has to take off
+    winner = NO_ROUTE  # of an election; it must take off
 
     def start(self, mesh: IRepairActions) -> None:
         """Called once, before everything else."""
         self.mesh = mesh
 
     def patience(self, silent: bool) -> float:
-        """How often `connection_lost_after` passes until an emergency; `silent`: see the router."""
+        """The wait before an emergency, in `connection_lost_after`; `silent`: see above."""
         return SILENCE_PATIENCE if silent else 1.0
 
     def on_gateway_lost(self) -> None:
-        """A check noticed that no gateway answers."""
+        """A check found that no gateway answers."""
 
     @abc.abstractmethod
     def on_emergency(self) -> None:
@@ -213,25 +213,25 @@ class IRepairStrategy(abc.ABC):
         """A gateway answers."""
 
     def on_stopped(self) -> None:
-        """The drone flies by an order, or the antenna is off: give up what is under way."""
+        """An order flies the drone, or the antenna is off: give up what is under way."""
 
     def on_neighbour_found(self, node: int) -> None:
-        """A node is in reach that was not."""
+        """A new node is in reach."""
 
     def on_neighbour_lost(self, node: int) -> None:
-        """A neighbour took no packet any more."""
+        """A neighbour no longer takes packets."""
 
     def on_place(self, node: int, place: Location) -> None:
-        """A node said where it stands, or where it flies to."""
+        """A node reported where it is, or where it flies to."""
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
-        """`node` bids; the neighbour `from_` sent or passed on that bid.
+        """`node` bids; the neighbour `from_` sent or relayed that bid.
 
         `about`: the gateway's place to which that node flies or flew.
         """
 
     def on_time(self) -> None:
-        """The time has come for which the strategy waited."""
+        """The timer of `wait_until` has expired."""
 
     def on_landed(self) -> None:
-        """A flight for the repair is over, and the drone stands clear of others."""
+        """A flight for the repair is over, and the drone is clear of others."""

@@ -1,4 +1,4 @@
-"""What can be adjusted about the repair of a mesh."""
+"""Adjustable options of the repair of a mesh."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from drone_mesh.errors import ConfigurationError
 
 DEFAULT_REPAIR = "thesis"
 RANGE_M = 9.0  # docs/protocol.md, "Wireless signal simulator": in range is nearer than this
-CLEARANCE_M = 0.5  # docs/protocol.md, "Negotiation": a drone nearer than this stands on a place
+CLEARANCE_M = 0.5  # docs/protocol.md, "Negotiation": a drone nearer than this occupies a place
 
 
 @dataclass(frozen=True)
 class RepairOptions:
     """Adjustable numbers of the repair of one node."""
 
-    clearance_m: float = CLEARANCE_M  # drones come to rest no nearer to each other than this
-    range_m: float = RANGE_M  # how far a radio reaches, as far as the node knows
+    clearance_m: float = CLEARANCE_M  # least distance between drones at rest
+    range_m: float = RANGE_M  # range of the radio, as far as the node knows
     avoid_wrecks: bool = False  # whether a drone that is switched off occupies its place
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError for a number outside its range."""
+        """Raise ConfigurationError for a number outside its range."""
         if not (math.isfinite(self.clearance_m) and self.clearance_m > 0):
             raise ConfigurationError(
                 f"invalid clearance {self.clearance_m}: must be above 0 metres"

@@ -1,6 +1,6 @@
-"""RepairStatus: what a node does about a lost connection, and why.
+"""RepairStatus: a node's reaction to a lost connection, and its reason.
 
-Every view shows the sentence that is written here, so that all of them use the same words.
+Every view displays the sentence written here, so all use the same words.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from drone_mesh.drone.interfaces import Location
 
 
 class RepairStatus(NamedTuple):
-    """One moment of the repair of one node. Immutable, so any thread may read it."""
+    """The repair of one node at one moment. Immutable, so any thread may read it."""
 
     state: Repair = Repair.AT_REST
     reason: str = ""  # why it does not fly, or why it lands early; empty: it flies, or may do so
     bid: float = NO_BID  # as in MOVEMENT_NEGOTIATION; negative: it does not bid
     bid_unit: str = ""  # of bids above 1
     place_of: int = NO_ROUTE  # the node whose place it bids for or flies to
-    goal: Location | None = None  # where it flies to
-    winner: int = NO_ROUTE  # the node that it waits for to take off
+    goal: Location | None = None  # the goal of its flight
+    winner: int = NO_ROUTE  # the node whose take-off it waits for
     emergency_s: float = math.inf  # when its patience ends, in seconds of the core's clock
     silent: bool = False  # all its neighbours, two or more, fell silent together
-    landed: bool = False  # the flight ends: it looks whether another drone stands there
+    landed: bool = False  # the flight ends: it checks whether another drone is there
 
     def in_words(self, now_s: float) -> str:
-        """One short sentence about the node; empty while nothing is to be repaired."""
+        """One short sentence about the node; empty if nothing is to be repaired."""
         if self.state is Repair.LOST:
             return "; ".join(filter(None, (self._waits(now_s), self._does_not_fly())))
         if self.state is Repair.ASKING:

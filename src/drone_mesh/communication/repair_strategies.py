@@ -1,4 +1,4 @@
-"""Repair strategies by name, so that a launch argument can choose one."""
+"""Creates repair strategies by name, for launch arguments."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
 
 
 def create_repair_strategy(name: str) -> IRepairStrategy:
-    """A new strategy: a name of REPAIR_STRATEGIES, or "package.module:Class" for one of your own.
+    """A new strategy: a name in REPAIR_STRATEGIES, or "package.module:Class" for your own.
 
     Raises ConfigurationError, with the known names, for anything else.
     """

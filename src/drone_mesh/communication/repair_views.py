@@ -1,4 +1,4 @@
-"""RepairViews: what a repair strategy sees of its router (IRepairActions, "Views")."""
+"""RepairViews: a repair strategy's view of its router (IRepairActions, "Views")."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from drone_mesh.errors import GoalRefused
 
 
 class RepairViews(IRepairActions):
-    """The views of IRepairActions; ConnectionRepair adds what a strategy may do."""
+    """The views of IRepairActions; ConnectionRepair adds the actions."""
 
     def __init__(
         self,
@@ -31,11 +31,11 @@ class RepairViews(IRepairActions):
         self._states = states
         self._connection = connection
         self._options = options
-        self._in_vain: list[Location] = []  # where this drone flew since it was last connected
+        self._in_vain: list[Location] = []  # goals of this drone since it was last connected
 
     @property
     def node_id(self) -> int:
-        """See IRepairActions, as for all that follows."""
+        """See IRepairActions; also for the functions below."""
         return self._parts.node_id
 
     @property
@@ -116,7 +116,7 @@ class RepairViews(IRepairActions):
 
 
 def _may_be_flown_to(place: Location) -> bool:
-    """Whether a drone may go there: a LOCATION may hold any numbers."""
+    """Whether a drone may fly there: a LOCATION may contain any numbers."""
     try:
         check_goal(*place)
     except GoalRefused:

@@ -1,4 +1,4 @@
-"""ReplayWindow: which counter values were used already (as RFC 4303, 3.4.3, and RFC 6479)."""
+"""ReplayWindow: which counter values were already used (like RFC 4303, 3.4.3, and RFC 6479)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ WIDTH = 512  # our choice: packets of a busy sender that may overtake each other
 
 
 class ReplayWindow:
-    """Takes every counter value once; values far behind the highest one not at all."""
+    """Accepts every counter value once; values far below the highest one not at all."""
 
     __slots__ = ("_seen", "highest")
 
@@ -16,12 +16,12 @@ class ReplayWindow:
         self._seen = (1 << WIDTH) - 1  # bit n: highest - n was used
 
     def expand(self, low: int, modulus: int) -> int:
-        """The value nearest to the highest one whose remainder is `low`."""
+        """The value nearest to the highest one with the remainder `low`."""
         ahead = (low - self.highest) % modulus
         return self.highest + (ahead if ahead < modulus // 2 else ahead - modulus)
 
     def use(self, value: int) -> bool:
-        """Take a value whose packet is authentic. False: it was used, or is too old."""
+        """Use a value whose packet is authentic. False: it was already used, or is too old."""
         ahead = value - self.highest
         if ahead > 0:
             self._seen = (self._seen << ahead | 1) & _MASK if ahead < WIDTH else 1

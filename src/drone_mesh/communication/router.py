@@ -34,12 +34,12 @@ from drone_mesh.communication.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 
-GOAL_AGAIN_S = 0.15  # our choice: no one acknowledges a broadcast, and it is soon out of reach
+GOAL_AGAIN_S = 0.15  # our choice: broadcasts are not acknowledged, and it is soon out of reach
 SHORT_FLIGHT = 0.25  # of the range, our choice: the discs before and after share 84 % of their area
 
 
 class MeshnetworkRouter(MeshnetworkComponent):
-    """A node that forwards for others and is not itself a gateway."""
+    """A node that forwards packets for others and is not a gateway."""
 
     def __init__(
         self,
@@ -54,7 +54,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         repair: IRepairStrategy | None = None,
         repair_options: RepairOptions | None = None,
     ) -> None:
-        """As MeshnetworkComponent; `repair` is Thesis if it is not given."""
+        """Like MeshnetworkComponent; the default of `repair` is Thesis."""
         super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._states = RouterStates()
         self._connection = GatewayConnection(
@@ -86,7 +86,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair_status = self._repair.status()
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
-        """As MeshnetworkComponent."""
+        """Like MeshnetworkComponent."""
         MeshnetworkComponent.on_msg(self, payload, now_s)  # super() costs more: once per packet
         if self._states.nothing_to_repair:  # most packets
             self._repair_status = NOTHING_TO_REPAIR
@@ -94,15 +94,15 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._repair_status = self._repair.status()
 
     def get_connected_to_gateway(self) -> bool:
-        """Whether a gateway answered last time, or may still answer."""
+        """Whether a gateway answered the last heartbeat, or may still answer."""
         return self._states.connected
 
     def get_preferred_gateway(self) -> int:
-        """Id of the gateway this node uses, or NO_ROUTE while it knows none."""
+        """Id of the gateway that this node uses, or NO_ROUTE while it knows none."""
         return self._connection.gateway
 
     def get_hops_from_gateway_away(self) -> int:
-        """Hops to the preferred gateway; 255 while not known."""
+        """Hops to the preferred gateway; 255 while unknown."""
         return self._connection.hops
 
     def get_repair_status(self) -> RepairStatus:
@@ -110,13 +110,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
         return self._repair_status
 
     def send_heartbeat(self, other: int) -> bool:
-        """A heartbeat towards `other`; the one to the preferred gateway wants an answer."""
+        """Send a heartbeat to `other`; the preferred gateway is expected to answer."""
         if other == self._connection.gateway:
             return self._connection.send_heartbeat()
         return super().send_heartbeat(other)
 
     def send_heartbeats(self, others: Sequence[int]) -> None:
-        """A heartbeat towards each of these; the preferred gateway's is sent as by itself."""
+        """Send a heartbeat to each of these; the preferred gateway's is sent as if alone."""
         gateway = self._connection.gateway
         if gateway in others and not self._connection.proven(self._antenna.patience()):
             self._connection.send_heartbeat()
@@ -152,7 +152,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
         if creator == self._node_id:
-            return  # its own heartbeat came back and proves nothing
+            return  # its own heartbeat came back, which proves nothing
         if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
             self._neighbours.uses_gateway(creator, preferred_gateway)
         if not self._repair.may_connect(from_, know_gateway):
@@ -169,14 +169,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _on_passing_heartbeat(
         self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
     ) -> None:
-        """The answer of a gateway proves the connection of each relay, too."""
+        """A gateway's answer proves the connection of each relay as well."""
         proves = creator == preferred_gateway and self._repair.may_connect(NO_ROUTE, know_gateway)
         proves = proves and self._antenna.may_be_gateway(creator)
         if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
             self._repair.on_connected()
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
-        """Where the gateway is concerns each relay, too, unless only the addressee can check it."""
+        """Relays use the gateway's place as well, unless only the addressee can check it."""
         if self._antenna.reserved_bytes(MessageType.LOCATION):
             return
         if creator == self._connection.gateway:
@@ -239,7 +239,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._repair.on_ordered_flight()
 
     def _is_short_flight(self) -> bool:
-        """Whether most neighbours will still be in reach, so that the router stays a relay."""
+        """Whether most neighbours will remain in reach, so that the router remains a relay."""
         if not self._states.connected or self._states.repair is Repair.FLYING:
             return False
         return self._pilot.distance_m() <= SHORT_FLIGHT * self._repair.range_m

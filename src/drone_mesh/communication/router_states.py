@@ -1,13 +1,13 @@
 """The states of a router, and every transition between them.
 
 A router is in two states at once, as an h11 connection is in the states of its two sides. They
-overlap: a lost router still tries the gateways that its neighbours offer, and a flying one may
-be answered on the way.
+overlap: a lost router still tries the gateways that its neighbours offer, and a flying one may be
+answered in flight.
 
 * `Link`: whether a gateway answers.
-* `Repair`: what the router does about a lost connection.
+* `Repair`: the router's reaction to a lost connection.
 
-An event that has no entry for the present state is a bug and raises RuntimeError.
+An event without an entry for the current state is a bug and raises RuntimeError.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ class Link(enum.Enum):
 
 
 class Repair(enum.Enum):
-    """What the router does about a lost connection."""
+    """The router's reaction to a lost connection."""
 
     __hash__ = object.__hash__
 
     AT_REST = "at rest"  # nothing: it is connected, or no check has noticed the loss
     LOST = "lost"  # waits for a gateway until the time is up
-    ASKING = "asking"  # wants to know where its neighbours are
+    ASKING = "asking"  # waits for the places of its neighbours
     NEGOTIATING = "negotiating"  # has bid, and waits for the bids of its group
     WATCHING = "watching"  # waits for the winner to take off
     FLYING = "flying"
 
 
 class RouterEvent(enum.Enum):
-    """What moves a router from state to state."""
+    """An event that may change a router's states."""
 
     __hash__ = object.__hash__
 
@@ -93,7 +93,7 @@ LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[Link, Link]] = {
     RouterEvent.LANDED: _ALL_TO_SEARCHING,
     RouterEvent.ANTENNA_OFF: _ALL_TO_SEARCHING,
 }
-"""An event that is missing here leaves the link as it is."""
+"""An event without an entry leaves the link unchanged."""
 
 REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[Repair, Repair]] = {
     RouterEvent.GATEWAY_ANSWERED: _ALL_BUT_FLYING_TO_REST,
@@ -112,11 +112,11 @@ REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[Repair, Repair]] = {
     RouterEvent.LANDED: {Repair.FLYING: Repair.AT_REST},
     RouterEvent.ANTENNA_OFF: _ALL_BUT_FLYING_TO_REST,
 }
-"""An event that is missing here leaves the repair as it is."""
+"""An event without an entry leaves the repair unchanged."""
 
 
 class RouterStates:
-    """The present states of one router. All that it shows changes in `happened` only.
+    """The current states of one router. Its attributes change only in `happened`.
 
     Read for each packet, hence plain attributes.
     """
@@ -129,7 +129,7 @@ class RouterStates:
         self.nothing_to_repair = False  # connected, and the repair at rest
 
     def happened(self, event: RouterEvent) -> None:
-        """Move on. Raises RuntimeError, and changes nothing, if `event` cannot happen now."""
+        """Change the states. Raises RuntimeError and changes nothing if `event` is impossible."""
         links, repairs = LINK_TRANSITIONS.get(event), REPAIR_TRANSITIONS.get(event)
         try:
             link = self.link if links is None else links[self.link]

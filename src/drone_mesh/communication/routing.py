@@ -1,4 +1,4 @@
-"""Routing techniques by name, so that a launch argument can choose one."""
+"""Creates routing techniques by name, for launch arguments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ROUTING_TECHNIQUES: dict[str, Callable[[], IRoutingTechnique]] = {
 
 
 def create_routing_technique(name: str) -> IRoutingTechnique:
-    """A new technique: a name of ROUTING_TECHNIQUES, or "package.module:Class" for one of your own.
+    """A new technique: a name in ROUTING_TECHNIQUES, or "package.module:Class" for your own.
 
     Raises ConfigurationError, with the known names, for anything else.
     """

@@ -1,7 +1,7 @@
-"""The routing seam: what a technique learns, and what it may do (docs/techniques.md).
+"""The routing interface: what a technique learns, and what it may do (docs/techniques.md).
 
-A technique has no thread, no clock and no randomness of its own: its component calls it, and it
-acts through IRoutingEssentials.
+A technique has no thread, clock or randomness of its own: its component calls it, and it acts
+through IRoutingEssentials.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _HEARTBEAT = int(messages.MessageType.HEARTBEAT)
 
 
 class IRoutingEssentials(abc.ABC):
-    """What a routing technique may ask of the component that it serves."""
+    """The functions of the component that a routing technique may call."""
 
     @abc.abstractmethod
     def get_node_id(self) -> int:
@@ -37,7 +37,7 @@ class IRoutingEssentials(abc.ABC):
 
     @abc.abstractmethod
     def wake_at(self, at_s: float) -> None:
-        """Have `IRoutingTechnique.on_time` called at this time; replaces the last request."""
+        """Call `IRoutingTechnique.on_time` at this time; replaces an earlier request."""
 
     @abc.abstractmethod
     def search_other_nodes_in_range(self) -> None:
@@ -62,29 +62,29 @@ class IRoutingEssentials(abc.ABC):
 
     @abc.abstractmethod
     def own_place(self) -> Location | None:
-        """Where this node is; None if the drone cannot report it."""
+        """The position of this node; None if the drone cannot report it."""
 
     @abc.abstractmethod
     def place_of(self, node: int) -> Location | None:
-        """The last place reported by `node`, or None."""
+        """The last reported place of `node`, or None."""
 
 
 class IRoutingTechnique(abc.ABC):
-    """Which neighbour leads to which node.
+    """Decides which neighbour leads to which node.
 
     A node in direct reach is a "child"; nodes behind it are its "grandchildren".
 
-    Called by one thread at a time, but for `get_direction_to_node` and `get_table_size`: a thread
-    that reports on the node may call these at any time. If they raise, the last report stands.
+    Called by one thread at a time, except `get_direction_to_node` and `get_table_size`, which a
+    reporting thread may call at any time. If they raise, the previous report is kept.
     """
 
     @abc.abstractmethod
     def get_direction_to_node(self, node: int) -> int:
-        """The neighbour to hand a packet for `node` to, or NO_ROUTE."""
+        """The next hop for `node`, or NO_ROUTE."""
 
     @abc.abstractmethod
     def start_routing(self, essentials: IRoutingEssentials) -> None:
-        """Begin to find routes, by means of `essentials`."""
+        """Start finding routes, through `essentials`."""
 
     @abc.abstractmethod
     def maintain_routing(self) -> None:
@@ -92,18 +92,18 @@ class IRoutingTechnique(abc.ABC):
 
     @abc.abstractmethod
     def node_moved_location(self) -> None:
-        """This node moved: forget what was known of its neighbours."""
+        """This node moved: forget its neighbours and routes."""
 
     @abc.abstractmethod
     def cant_communicate_with_node(self, node: int) -> int:
-        """A packet could not be handed to neighbour `node`.
+        """Neighbour `node` did not take a packet.
 
-        Returns 1 if that removed something and `node` can no longer be reached in any way, else 0.
+        Returns 1 if that removed something and `node` is no longer reachable, else 0.
         """
 
     @abc.abstractmethod
     def other_cant_communicate_with_node(self, other: int, node: int) -> int:
-        """`other` says that it cannot reach `node`; the return value is as above."""
+        """`other` reports that it cannot reach `node`; the return value is as above."""
 
     @abc.abstractmethod
     def can_communicate_with_node(self, node: int) -> None:
@@ -130,9 +130,9 @@ class IRoutingTechnique(abc.ABC):
         """Whether no node is known."""
 
     def proven_path_to_node(self, other: int, node: int) -> None:
-        """A packet made by `node` just came through `other`: from now on that is the route to it.
+        """A packet created by `node` just arrived through `other`, which is now the route to it.
 
-        Other routes to `node` are forgotten, except that it may be in direct reach itself
+        Other routes to `node` are forgotten, except that it may itself be in direct reach
         (docs/protocol.md, "Receiving and learning": heartbeats prove a path).
         """
         for child in self.get_set_of_children():
@@ -140,25 +140,25 @@ class IRoutingTechnique(abc.ABC):
                 self.other_cant_communicate_with_node(child, node)
         self.other_can_communicate_with_node(other, node)
 
-    # What the component does beyond that; the defaults are the rules of a tree of children ------
+    # Further behaviour; the defaults are the rules of a tree of children ------
 
     FLOODS: ClassVar[bool] = False
-    """A packet goes to several next hops, and the technique itself drops copies.
+    """Packets go to several next hops, and the technique itself drops copies.
 
-    Dead ends are normal then: they are neither reported nor answered with MISSING, and the
-    component does not look for circulating packets.
+    Dead ends are then normal: they are neither reported nor answered with MISSING, and the
+    component does not detect circulating packets.
     """
 
     TAKES_SHORTCUTS: ClassVar[bool] = True
-    """A router tries a neighbour that presents itself with fewer hops: its next heartbeat to the
+    """A router tries a neighbour that introduces itself with fewer hops: its next heartbeat to the
     gateway goes through that neighbour, and the answer decides."""
 
     def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
         """A packet arrived from neighbour `from_`, for this node or to be forwarded.
 
-        `messages.hops` and `messages.extension` read what PRESENT and HEARTBEAT carry. False: drop
-        the packet. By default a heartbeat proves a path, and any other packet teaches a route to
-        its creator if there was none (docs/protocol.md, "Receiving and learning").
+        `messages.hops` and `messages.extension` read the contents of PRESENT and HEARTBEAT. Return
+        False to drop the packet. By default a heartbeat proves a path, and any other packet teaches
+        a route to its creator if there was none (docs/protocol.md, "Receiving and learning").
         """
         self.can_communicate_with_node(from_)
         if creator != from_:
@@ -169,23 +169,23 @@ class IRoutingTechnique(abc.ABC):
         return True
 
     def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
-        """A packet was handed to `neighbour` (ok), or given up, after so many transmissions.
+        """A packet was delivered to `neighbour` (ok) or given up, after `transmissions`.
 
-        A neighbour that is given up is then reported to `cant_communicate_with_node`.
+        A neighbour whose packet was given up is then reported to `cant_communicate_with_node`.
         """
         if ok:
             self.can_communicate_with_node(neighbour)
 
     def directions(self, node: int, came_from: int, creator: int) -> Sequence[int]:
-        """The neighbours to hand a packet for `node` to; empty: there is no route.
+        """The next hops for a packet to `node`; empty if there is no route.
 
-        `came_from` is the neighbour that sent the packet, NO_ROUTE for one of this node's own.
+        `came_from` is the neighbour that sent the packet, NO_ROUTE for this node's own packets.
         """
         to = self.get_direction_to_node(node)
         return () if to == NO_ROUTE else (to,)
 
     def gateway_lost(self, gateway: int) -> bool:
-        """The gateway no longer answers. True: inform the neighbours that it is missing."""
+        """The gateway no longer answers. Returns whether to inform the neighbours."""
         tried: list[int] = []
         while True:
             to = self.get_direction_to_node(gateway)
@@ -198,21 +198,21 @@ class IRoutingTechnique(abc.ABC):
                 self.other_cant_communicate_with_node(to, gateway)
 
     def gateway_taken(self, neighbour: int, gateway: int) -> None:
-        """This node has no gateway; `neighbour` uses this one, and routes so far did not work."""
+        """This node has no gateway; `neighbour` uses this one, and earlier routes to it failed."""
         self.gateway_lost(gateway)
         self.other_can_communicate_with_node(neighbour, gateway)
 
     def circulated(self, node: int, used: int) -> None:
-        """A packet for `node` that was handed to `used` came round."""
+        """A packet for `node` that was sent to `used` came back."""
         if used not in (node, NO_ROUTE):
             self.other_cant_communicate_with_node(used, node)
 
     def extension(self, kind: int, room: int) -> bytes:
-        """Up to `room` bytes to send behind the body of a PRESENT or HEARTBEAT of this node."""
+        """Up to `room` bytes to append to the body of this node's PRESENT or HEARTBEAT."""
         return b""
 
     def on_time(self, now_s: float) -> None:  # noqa: B027 (only some techniques need it)
-        """The time asked for with `IRoutingEssentials.wake_at` has come."""
+        """The time requested with `IRoutingEssentials.wake_at` has come."""
 
     def on_packet(  # noqa: B027 (only some techniques need it)
         self, creator: int, from_: int, kind: int, body: bytes

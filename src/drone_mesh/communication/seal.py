@@ -1,11 +1,11 @@
-"""HopSeal: proves that a packet comes from a node of this mesh, now (docs/security.md, "Hop seal").
+"""HopSeal: proves that a node of this mesh has just sent a packet (docs/security.md, "Hop seal").
 
 The last 7 bytes of each packet: the low 2 bytes of a counter of its sender, and a tag of 5 bytes
 over everything before them, the counter and the sender's epoch. The key is that of the network for
-packets to all, otherwise that of the pair: a captured node cannot pose as another one to it. An
+packets to all, otherwise that of the pair, so a captured node cannot impersonate another one. An
 epoch is 8 random bytes that a node draws at each start; a receiver learns it by a challenge that
-only this node can answer. So there is nothing to store that could be lost, and no packet of an
-earlier epoch counts.
+only this node can answer. So there is no stored state to lose, and no packet of an earlier epoch is
+accepted.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ SEAL_BYTES = 2 + TAG_BYTES
 SEAL_AT = PAYLOAD_BYTES - SEAL_BYTES
 TAG_AT = PAYLOAD_BYTES - TAG_BYTES
 LAST_COUNT = 2**32 - 1  # of an epoch; an answer carries 4 bytes
-WAITING_CHALLENGES = 16  # our choice: to as many nodes at once
-CHALLENGE_AGAIN_S = 2.0  # our choice: to the same node
-CHALLENGE_OUT_S = 0.5  # our choice: after that another node may have its place
+WAITING_CHALLENGES = 16  # our choice: greatest number of nodes at once
+CHALLENGE_AGAIN_S = 2.0  # our choice: least time between two to the same node
+CHALLENGE_OUT_S = 0.5  # our choice: after that another node may take its slot
 
 _COUNT_BYTES = 2**16
 _EPOCH_BITS, _NONCE_BITS = 64, 64
@@ -43,7 +43,7 @@ _TO, _FORWARD = 3, 4
 
 
 class _Peer:
-    """A neighbour whose epoch is known."""
+    """A neighbour with a known epoch."""
 
     __slots__ = ("epoch", "heard_s", "state", "state_to_all", "window")
 
@@ -63,13 +63,13 @@ class _Challenge(NamedTuple):
 
 
 class HopSeal:
-    """Seals and opens the packets of one node. Belongs to the thread of its component."""
+    """Seals and opens the packets of one node. Belongs to its component's thread."""
 
     def __init__(self, node_id: int, keys: Keys, rng: random.Random, fresh_s: float) -> None:
         """`rng` draws epochs and nonces: a cryptographic one on real nodes.
 
-        `fresh_s`: a neighbour that was silent for longer is challenged again, so that a packet
-        which an attacker kept from its receiver is worthless after that time.
+        `fresh_s`: a neighbour that was silent for longer is challenged again, so that a packet that
+        an attacker has held back is worthless after that time.
         """
         self._node_id = node_id
         self._keys = keys
@@ -85,7 +85,7 @@ class HopSeal:
     # Packets of the mesh ---------------------------------------------------------------------
 
     def seal(self, payload: bytes) -> bytes:
-        """The same packet with a seal in its last 7 bytes. What was there is lost."""
+        """The same packet with a seal in its last 7 bytes, which are overwritten."""
         if self._count == LAST_COUNT:
             self._begin_epoch()
         self._count = count = self._count + 1
@@ -126,16 +126,16 @@ class HopSeal:
         return head + _NO_SEAL
 
     def knows(self, node: int, now_s: float) -> bool:
-        """Whether the epoch of this neighbour is known, and it was heard a while ago at most."""
+        """Whether the epoch of this neighbour is known and it was heard recently."""
         peer = self._peers.get(node)
         return peer is not None and now_s - peer.heard_s <= self._fresh_s
 
     # Epochs ----------------------------------------------------------------------------------
 
     def challenge(self, node: int, now_s: float) -> bytes | None:
-        """A packet that asks a neighbour for its epoch; None: not again so soon.
+        """A packet that requests a neighbour's epoch; None: too soon after the last one.
 
-        The number of challenges under way is bounded, and an answered one no longer counts.
+        The number of pending challenges is bounded; an answered one no longer counts.
         """
         while self._challenges and now_s - self._oldest_s() >= CHALLENGE_AGAIN_S:
             self._challenges.popitem(last=False)
@@ -156,7 +156,7 @@ class HopSeal:
         return len(self._challenges) > WAITING_CHALLENGES // 2
 
     def answer(self, challenge: bytes) -> bytes | None:
-        """The answer to a challenge; None if that is not from a node with the key."""
+        """The answer to a challenge; None if it is not from a node with the key."""
         if not self._is_proven(challenge):
             return None
         (nonce,) = _CHALLENGE.unpack_from(challenge, messages.HEADER_BYTES)
@@ -164,9 +164,9 @@ class HopSeal:
         return self._proven(MessageType.SEAL_ANSWER, messages.sender(challenge), body)
 
     def answered(self, answer: bytes, now_s: float) -> bool | None:
-        """Take a neighbour's epoch from its answer; whether that epoch is new.
+        """Store a neighbour's epoch from its answer; returns whether that epoch is new.
 
-        None: it answers no challenge of this node.
+        None: it is not an answer to a challenge of this node.
         """
         node = messages.sender(answer)
         waiting = self._challenges.get(node)
@@ -210,7 +210,7 @@ class HopSeal:
         return hmac.compare_digest(proof, payload[TAG_AT:])
 
     def _proof(self, packet: bytes, other: int) -> bytes:
-        """Over all but byte 3, which differs for each receiver of a broadcast challenge."""
+        """Covers all but byte 3, which differs for each receiver of a broadcast challenge."""
         key = self._pair_key(other)
         covered = packet[:_TO] + packet[_FORWARD:]
         tag = hashlib.blake2s(covered, key=key, digest_size=TAG_BYTES, person=b"epochs")
@@ -218,7 +218,7 @@ class HopSeal:
 
 
 def _epoch_state(key: bytes, epoch: int) -> hashlib.blake2s:
-    """The tag of an epoch's packets up to where they differ; to be copied for each."""
+    """The hash state for the tags of an epoch's packets; to be copied for each packet."""
     state = hashlib.blake2s(key=key, digest_size=TAG_BYTES, person=b"hop")
     state.update(struct.pack("<Q", epoch))
     return state

@@ -1,4 +1,4 @@
-"""Places beside a place: where a drone goes that must not stand exactly there."""
+"""Positions beside a place, for drones that must not land exactly there."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Iterable, Iterator
 
 from drone_mesh.drone.interfaces import Location
 
-BLOCK = 16  # 16 x 16 spots have an owner each: ids are one byte
-PITCH = 1.1  # spots are this many clearances apart: rounding must not bring drones too close
+BLOCK = 16  # one spot for each of the 256 ids
+PITCH = 1.1  # distance of spots in clearances, with a margin for rounding
 
 
 def beside(place: Location, origin: Location, distance_m: float) -> Location:
-    """The point `distance_m` beside `place`, on the side that `origin` is on."""
+    """The point `distance_m` beside `place`, on the side of `origin`."""
     return _at(place, distance_m, _bearing(place, origin))
 
 
 def towards(start: Location, end: Location, distance_m: float) -> Location:
-    """The point `distance_m` from `start` on the straight way to `end`, at most `end` itself."""
+    """The point `distance_m` from `start` on the straight line to `end`, at most `end` itself."""
     whole_m = start.distance_m(end)
     share = min(1.0, distance_m / whole_m) if whole_m else 1.0
     return Location(*(a + (b - a) * share for a, b in zip(start, end)))
@@ -26,10 +26,10 @@ def towards(start: Location, end: Location, distance_m: float) -> Location:
 def own_spot(
     place: Location, node: int, clearance_m: float, occupied: Iterable[Location] = ()
 ) -> Location:
-    """The spot nearest to `place` of those that belong to `node` alone, clear of `occupied`.
+    """The spot nearest to `place` that belongs to `node` alone and is clear of `occupied`.
 
-    The ground is a lattice of spots that are clear of each other, and the ids 0..255 share it out
-    in blocks of 16 x 16. So drones that cannot hear each other never come to rest at one spot.
+    The ground is a lattice of spots that are clear of each other, divided among the ids 0..255 in
+    blocks of 16 x 16. So drones that cannot hear each other never land at the same spot.
     """
     pitch_m = PITCH * clearance_m
     block_m = BLOCK * pitch_m
@@ -58,8 +58,8 @@ def free_spot(
 ) -> Location:
     """The nearest spot beside `place` that is clear of all `occupied` places.
 
-    Spots towards `origin` come first. `skip` passes over that many free spots, so that two drones
-    that look for one at the same time can take different ones.
+    Spots towards `origin` come first. `skip` skips that many free spots, so that two drones that
+    search at the same time can choose different ones.
     """
     occupied = list(occupied)
     for spot in _spots(place, origin, clearance_m):

@@ -1,4 +1,4 @@
-"""Short texts that take several packets: each part carries its index and the last one."""
+"""Short texts in several packets: each part carries its index and that of the last part."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def split(text: str, room: int) -> list[tuple[int, bytes]]:
 
 
 class TextAssembly:
-    """Puts a text together, whatever the order in which its parts arrive."""
+    """Reassembles a text from parts in any order."""
 
     def __init__(self) -> None:
         self._parts: dict[int, bytes] = {}
         self._last = 0
 
     def add(self, part_byte: int, text: bytes) -> str | None:
-        """The whole text when this part was the missing one, else None."""
+        """The whole text if this part completes it, else None."""
         index, last = part_byte & 0x0F, part_byte >> 4
         if not is_valid(part_byte):
             return None
@@ -40,5 +40,5 @@ class TextAssembly:
 
 
 def is_valid(part_byte: int) -> bool:
-    """Whether there can be such a part."""
+    """Whether this part byte is possible."""
     return part_byte & 0x0F <= part_byte >> 4 < MOST_PARTS

@@ -1,4 +1,4 @@
-"""The times and counts of the mesh protocol that can be adjusted."""
+"""The adjustable times and counts of the mesh protocol."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from drone_mesh.errors import ConfigurationError
 
 HEARTBEAT_ANSWER_S = 0.5  # one heartbeat to the gateway under way at a time
-CIRCULATION_S = 0.5  # within this time the same packet from elsewhere circulates
-FLIGHT_POSITION_PERIOD_S = 1.0  # a flying node asks its position this often
+CIRCULATION_S = 0.5  # the same packet from another neighbour within this time circulates
+FLIGHT_POSITION_PERIOD_S = 1.0  # how often a flying node requests its position
 MIN_REPORT_PERIOD_S = 30.0  # docs/protocol.md, "Node reports"
 LANDED_WITHIN_M = 0.1  # docs/protocol.md, "Flight"
 
@@ -17,13 +17,13 @@ LANDED_WITHIN_M = 0.1  # docs/protocol.md, "Flight"
 class MeshTiming:
     """Adjustable numbers of one node; the defaults are those of docs/protocol.md."""
 
-    check_period_s: float = 10.0  # how often a node looks after its routes and its connection
-    connection_lost_after_s: float = 30.0  # without a gateway for so long: emergency
-    send_attempts: int = 3  # transmissions of a packet without success, in all
+    check_period_s: float = 10.0  # how often a node checks its routes and its connection
+    connection_lost_after_s: float = 30.0  # time without a gateway until the emergency
+    send_attempts: int = 3  # failed transmissions of a packet, in total
     report_period_s: float = 0.0  # how often a node reports to its gateway; 0: never
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError for a number outside its range."""
+        """Raise ConfigurationError for a number outside its range."""
         if not self.check_period_s > 0:
             raise ConfigurationError(
                 f"invalid check_period {self.check_period_s}: must be above 0 seconds"

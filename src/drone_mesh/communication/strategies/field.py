@@ -13,8 +13,8 @@ from drone_mesh.communication.spots import towards
 from drone_mesh.drone.interfaces import Location
 
 TO_NEIGHBOURS = 0.1  # weights of the field, as in MDSG-APF
-LEG = 0.5  # of the range: the way between two looks; our choice
-PAUSE_S = 2.0  # our choice: time to hear of a gateway between two legs
+LEG = 0.5  # of the range: distance between two requests for places; our choice
+PAUSE_S = 2.0  # our choice: time to hear a gateway between two legs
 
 
 class Field(IRepairStrategy):
@@ -23,20 +23,20 @@ class Field(IRepairStrategy):
     _nearest_m = math.inf  # to the gateway's place, since the connection was lost
 
     def on_gateway_found(self) -> None:
-        """The next loss is another one."""
+        """Forget the distance reached: the next loss starts over."""
         self._nearest_m = math.inf
 
     def on_emergency(self) -> None:
-        """Ask where the neighbours are, then move."""
+        """Request the places of the neighbours, then move."""
         self.mesh.ask_places()
         self.mesh.wait_until(self.mesh.now_s + PAUSE_S)
 
     def on_landed(self) -> None:
-        """Look around, then move on."""
+        """Request places again, then move on."""
         self.on_emergency()
 
     def on_time(self) -> None:
-        """One leg."""
+        """Fly one leg."""
         mesh, here, gateway = self.mesh, self.mesh.own_place(), self.mesh.gateway_place
         self.reason = mesh.why_not_fly()
         if gateway is None or here is None:

@@ -13,14 +13,14 @@ from drone_mesh.communication.spots import towards
 from drone_mesh.communication.strategies.nearest import Nearest
 from drone_mesh.drone.interfaces import Location
 
-KEPT = 0.9  # of the range: how far behind its next hop a drone may stay; our choice
+KEPT = 0.9  # of the range: greatest distance behind its next hop; our choice
 
 
 class Follow(Nearest):
     """The leader is the nearest; each drone announces where it will stand before it leaves."""
 
     def on_place(self, node: int, place: Location) -> None:
-        """If the next hop moves on, follow it as far as is needed."""
+        """If the next hop moves away, follow it as far as needed."""
         mesh, here = self.mesh, self.mesh.own_place()
         may_follow = not (mesh.connected or mesh.why_not_fly() or mesh.state is Repair.FLYING)
         if node != mesh.lost_next_hop or here is None or not may_follow:

@@ -2,7 +2,7 @@
 
 After RIM: Younis, Lee, Abbasi, "A Localized Algorithm for Restoring Internode Connectivity in
 Networks of Moveable Sensors", IEEE TC 59(12), 2010. Only the parts without a gateway move, so one
-move need not suffice: a second one leads to the place itself, and the third way is to the gateway.
+move may not suffice: a second one leads to the place itself, and a third flight to the gateway.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from drone_mesh.communication.spots import towards
 from drone_mesh.communication.strategies.home import Home
 from drone_mesh.drone.interfaces import Location
 
-KEPT = 0.9  # of the range: how far behind a neighbour that moved a drone may stay; our choice
+KEPT = 0.9  # of the range: greatest distance behind a neighbour that moved; our choice
 MOVES = 2  # towards one lost next hop
 WAITS = 6  # our choice: checks; the drones beside the dead node have moved twice by then
 
@@ -26,11 +26,11 @@ class Inward(Home):
     _waits = 0  # for the drones beside the dead node, in checks
 
     def on_gateway_found(self) -> None:
-        """The next loss is another one."""
+        """Start over: the next loss is a new one."""
         self._lost, self._moves, self._waits = None, 0, 0
 
     def on_emergency(self) -> None:
-        """Move inward; if that did not help, fly home."""
+        """Move inward; if that has not helped, fly home."""
         mesh, here = self.mesh, self.mesh.own_place()
         if self._lost is None and mesh.reaches(mesh.lost_next_hop) and self._waits < WAITS:
             self._waits += 1
@@ -49,7 +49,7 @@ class Inward(Home):
             self._move_to(Step(towards(self._lost.place, here, stop_m), self._lost.owner))
 
     def on_place(self, node: int, place: Location) -> None:
-        """If a neighbour moves out of reach, follow it as far as is needed."""
+        """If a neighbour moves out of reach, follow it as far as needed."""
         mesh, here = self.mesh, self.mesh.own_place()
         may_move = not (mesh.connected or mesh.state is Repair.FLYING or mesh.why_not_fly())
         if here is None or not may_move or node not in mesh.neighbours() or self._moves_itself():
@@ -58,7 +58,7 @@ class Inward(Home):
             self._move_to(Step(towards(place, here, KEPT * mesh.range_m), node))
 
     def _moves_itself(self) -> bool:
-        """Whether it is beside the dead node, and has not moved as far as it may."""
+        """Whether it is beside the dead node and may still move."""
         is_beside = self._lost is not None or not self.mesh.reaches(self.mesh.lost_next_hop)
         return is_beside and self._moves < MOVES
 

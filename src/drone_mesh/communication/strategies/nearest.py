@@ -1,4 +1,4 @@
-"""Nearest: of a group, the drone that is nearest to the place of its lost next hop takes it.
+"""Nearest: the drone of a group that is nearest to the place of its lost next hop takes it.
 
 After DARA: Abbasi, Younis, Akkaya, "Movement-Assisted Connectivity Restoration in Wireless Sensor
 and Actor Networks", IEEE TPDS 20(9), 2009; only the parts without a gateway act. The children that
@@ -13,10 +13,10 @@ from drone_mesh.communication.repair_interfaces import Step
 
 
 class Nearest(GroupRepair):
-    """The shortest flight wins."""
+    """The drone with the shortest flight wins."""
 
     def _score(self, step: Step) -> float:
-        """Above 1 for a first choice, else up to 1; the shorter the flight the higher."""
+        """Above 1 for a first choice, otherwise up to 1; the shorter the flight, the higher."""
         own = self.mesh.own_place()
         if own is None:
             self.reason = "does not know where it is"

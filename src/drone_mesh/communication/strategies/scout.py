@@ -1,10 +1,10 @@
-"""Scout: as Thesis, but quicker: a drone that hears no node looks around, and comes back.
+"""Scout: like Thesis, but quicker: a drone that hears no node looks around, and comes back.
 
 A drone whose neighbours all fell silent together cannot know whether they died or its medium is
 down; Thesis waits five times as long in that case. A scout waits no longer than usual, flies to the
 place of its lost next hop and stays there if it hears a node. Otherwise, or as soon as it hears one
-of its lost neighbours, it flies back. In a group the rounds after the first flight follow each
-other sooner. Both rules are our own.
+of its lost neighbours, it flies back. In a group, later rounds follow sooner after the first
+flight. Both rules are our own.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ LATER_ROUNDS = 1.0 / 3.0  # of the patience, our choice: a step back takes about
 class Scout(Thesis):
     """Looks around before it waits."""
 
-    _stood_at: Location | None = None  # during a look around: where it began
+    _stood_at: Location | None = None  # during a look around: its start
     _looked = False  # since the connection was lost
     _drone_flew = False  # one of the group, since the connection was lost
 
     def start(self, mesh: IRepairActions) -> None:
-        """Called once, before everything else."""
+        """Called once, before any other call."""
         super().start(mesh)
         self._lost: set[int] = set()  # neighbours that were not heard again
 
     def patience(self, silent: bool) -> float:
-        """The first look is early; a second one is as late as a flight of others."""
+        """The first look is early; a second one as late as the flights of others."""
         if silent:
             return SILENCE_PATIENCE if self._looked else 1.0
         return LATER_ROUNDS if self._drone_flew else 1.0
 
     def on_gateway_found(self) -> None:
-        """The next loss is another one."""
+        """Start over: the next loss is a new one."""
         super().on_gateway_found()
         self._stood_at, self._looked, self._drone_flew = None, False, False
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
-        """Note that a drone of the group flies."""
+        """Also note that a drone of the group flies."""
         self._drone_flew = self._drone_flew or score in (TOOK_OFF, TOOK_OFF_HOME)
         super().on_bid(node, score, from_, about)
 
     def on_emergency(self) -> None:
-        """Alone in silence: look around."""
+        """If alone in silence, look around."""
         mesh, here = self.mesh, self.mesh.own_place()
         if not mesh.silent or here is None:
             super().on_emergency()
@@ -60,7 +60,7 @@ class Scout(Thesis):
             self._stood_at, self._looked = here, True
 
     def on_stopped(self) -> None:
-        """The drone flies, perhaps by an order."""
+        """The drone flies, perhaps by an order: forget the look around."""
         super().on_stopped()
         self._stood_at = None
 
@@ -70,18 +70,18 @@ class Scout(Thesis):
         self._lost.add(node)
 
     def on_neighbour_found(self, node: int) -> None:
-        """A lost neighbour lives: the medium was down, and this drone belongs where it stood."""
+        """A lost neighbour is alive, so the medium was down: fly back to the start."""
         if node in self._lost:
             self._lost.discard(node)
             self._back()
 
     def on_landed(self) -> None:
-        """Listen, if this is where it looks around."""
+        """If this is where it looks around, listen."""
         if self._stood_at is not None:
             self.mesh.wait_until(self.mesh.now_s + LISTENS_S)
 
     def on_time(self) -> None:
-        """If no node is here, back."""
+        """If no node is here, fly back."""
         if self._stood_at is None:
             super().on_time()
         elif self.mesh.silent:

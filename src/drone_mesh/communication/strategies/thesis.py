@@ -11,7 +11,7 @@ from drone_mesh.communication.repair_interfaces import Step
 
 
 class Thesis(GroupRepair):
-    """The farthest flies; for the second choice, the gateway's place, the nearest."""
+    """The farthest drone flies; for the second choice, the gateway's place, the nearest."""
 
     bid_unit = "m"
 

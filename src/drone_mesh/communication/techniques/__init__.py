@@ -1,1 +1,1 @@
-"""Routing techniques beside ChildTableTree (docs/techniques.md)."""
+"""Routing techniques besides ChildTableTree (docs/techniques.md)."""

@@ -22,7 +22,7 @@ SOON_S = 0.2  # our choice: urgent updates within this time share one packet
 
 
 class Babel(GatewayRoutes):
-    """Uses the cheapest neighbour among those that cannot be behind this node."""
+    """Uses the cheapest of the neighbours that cannot be behind this node."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -30,7 +30,7 @@ class Babel(GatewayRoutes):
         self._own_sequence = 0
 
     def maintain_routing(self) -> None:
-        """A gateway makes a new sequence number; all nodes advertise."""
+        """A gateway increments its sequence number; all nodes advertise."""
         self._own_sequence = (self._own_sequence + 1) % 2**16
         super().maintain_routing()
 
@@ -45,7 +45,7 @@ class Babel(GatewayRoutes):
         return super().learn(creator, from_, kind, payload)
 
     def extension(self, kind: int, room: int) -> bytes:
-        """The updates that fit, for PRESENT."""
+        """The updates that fit into a PRESENT."""
         if kind != MessageType.PRESENT or self._essentials is None:
             return b""
         me, packed = self._essentials.get_node_id(), []
@@ -60,12 +60,12 @@ class Babel(GatewayRoutes):
         return self._routes.best(gateway)
 
     def forget_neighbour(self, neighbour: int) -> None:
-        """Its updates are void; without another route the neighbours hear of that soon."""
+        """Drop its updates; if no other route is left, advertise that soon."""
         for gateway in self._routes.forget_neighbour(neighbour):
             self._starve(gateway)
 
     def forget_gateway(self, gateway: int) -> None:
-        """All updates for it are void until they are repeated."""
+        """Drop all updates for it until they are repeated."""
         self._routes.forget_gateway(gateway)
 
     def on_time(self, now_s: float) -> None:
@@ -74,7 +74,7 @@ class Babel(GatewayRoutes):
         self._essentials.search_other_nodes_in_range()
 
     def on_packet(self, creator: int, from_: int, kind: int, body: bytes) -> None:
-        """A starving node needs a new sequence number: make it, or pass the request on."""
+        """A starving node needs a new sequence number: create it, or forward the request."""
         if kind != REQUEST_TYPE or self._essentials is None:
             return
         gateway, sequence, hops_left = REQUEST.unpack_from(body)

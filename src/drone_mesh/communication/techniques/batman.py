@@ -19,15 +19,15 @@ ORIGINATOR = struct.Struct("<BHBB")  # gateway, sequence number, transmit qualit
 ORIGINATOR_TYPE = 9
 MAX_QUALITY = 255
 HOP_PENALTY = 15  # of 255, as in the Linux implementation
-WINDOW = 5  # sequence numbers that a neighbour's quality is the mean of
+WINDOW = 5  # number of sequence numbers in the mean of a neighbour's quality
 HOPS = 50
 ORIGINATE_EVERY_S = 5.0  # our choice: a check period holds two
-SPREAD_S = 0.005  # our choice: neighbours repeat a message one after the other
+SPREAD_S = 0.005  # our choice: neighbours repeat a message one after another
 SLOTS = 16
 
 
 class Heard(NamedTuple):
-    """One originator message as it came from a neighbour."""
+    """One originator message as received from a neighbour."""
 
     sequence: int
     quality: int
@@ -45,14 +45,14 @@ class Batman(GatewayRoutes):
         self._originate_s = -math.inf
 
     def maintain_routing(self) -> None:
-        """A gateway originates; all nodes look after their neighbours as the tree does."""
+        """A gateway originates; all nodes check their neighbours as the tree does."""
         super().maintain_routing()
         assert self._essentials is not None
         if self._essentials.get_preferred_gateway() == self._essentials.get_node_id():
             self._originate()
 
     def on_packet(self, creator: int, from_: int, kind: int, body: bytes) -> None:
-        """Note how well it came, and repeat it if it came from the best neighbour."""
+        """Record its quality, and repeat it if it came from the best neighbour."""
         if kind != ORIGINATOR_TYPE or self._essentials is None:
             return
         gateway, sequence, quality, hops_left = ORIGINATOR.unpack_from(body)
@@ -73,7 +73,7 @@ class Batman(GatewayRoutes):
             self._plan()
 
     def on_time(self, now_s: float) -> None:
-        """Repeat what is due; a gateway originates again."""
+        """Repeat due messages; a gateway originates again."""
         assert self._essentials is not None
         due = [repeated for at_s, repeated in self._repeat if at_s <= now_s]
         self._repeat = [(at_s, repeated) for at_s, repeated in self._repeat if at_s > now_s]
@@ -95,12 +95,12 @@ class Batman(GatewayRoutes):
         return max(qualities, key=lambda neighbour: (qualities[neighbour], -neighbour))
 
     def forget_neighbour(self, neighbour: int) -> None:
-        """What came from it is void."""
+        """Forget its messages."""
         for heard in self._heard.values():
             heard.pop(neighbour, None)
 
     def forget_gateway(self, gateway: int) -> None:
-        """Wait for its next message."""
+        """Forget it until its next message."""
         self._heard.pop(gateway, None)
 
     def _originate(self) -> None:

@@ -36,7 +36,7 @@ class Dsdv(GatewayRoutes):
         self._own_sequence = 0
 
     def maintain_routing(self) -> None:
-        """A gateway makes a new sequence number; all nodes advertise."""
+        """A gateway increments its sequence number; all nodes advertise."""
         self._own_sequence = (self._own_sequence + 2) % 2**16
         super().maintain_routing()
 
@@ -51,7 +51,7 @@ class Dsdv(GatewayRoutes):
         return super().learn(creator, from_, kind, payload)
 
     def extension(self, kind: int, room: int) -> bytes:
-        """The entries that fit, for PRESENT; a gateway's first is its own."""
+        """The entries that fit into a PRESENT; a gateway's first is its own."""
         if kind != MessageType.PRESENT or self._essentials is None:
             return b""
         entries = dict(self._vectors)
@@ -62,18 +62,18 @@ class Dsdv(GatewayRoutes):
         return b"".join(packed[: room // ENTRY.size])
 
     def next_hop_to_gateway(self, gateway: int) -> int:
-        """As the entry says, while it is not broken."""
+        """The next hop of the entry, unless it is broken."""
         entry = self._vectors.get(gateway)
         return NO_ROUTE if entry is None or entry.hops == INFINITE_HOPS else entry.next_hop
 
     def forget_neighbour(self, neighbour: int) -> None:
-        """Routes through it are broken, which the neighbours should hear soon."""
+        """Mark routes through it as broken, and advertise that soon."""
         for gateway, entry in self._vectors.items():
             if entry.next_hop == neighbour and entry.hops != INFINITE_HOPS:
                 self._break(gateway, entry)
 
     def forget_gateway(self, gateway: int) -> None:
-        """The route to it is broken."""
+        """Mark the route to it as broken."""
         entry = self._vectors.get(gateway)
         if entry is not None and entry.hops != INFINITE_HOPS:
             self._break(gateway, entry)
@@ -92,7 +92,7 @@ class Dsdv(GatewayRoutes):
         age = 1 if known is None else _newer_by(said.sequence, known.sequence)
         broken = new.hops == INFINITE_HOPS
         if broken and (known is None or known.next_hop != said.next_hop):
-            return  # concerns a route that this node does not use
+            return  # about a route that this node does not use
         if known is None or age > 0 or (age == 0 and new.hops < known.hops):
             self._vectors[gateway] = new
             if known is None or (known.hops == INFINITE_HOPS) != broken:

@@ -45,7 +45,7 @@ class EtxTree(GatewayRoutes):
         return super().learn(creator, from_, kind, payload)
 
     def extension(self, kind: int, room: int) -> bytes:
-        """The own rank, for PRESENT."""
+        """The node's own rank, for PRESENT."""
         if kind != MessageType.PRESENT or self._essentials is None:
             return b""
         gateway = self._essentials.get_preferred_gateway()
@@ -53,7 +53,7 @@ class EtxTree(GatewayRoutes):
         return ADVERTISEMENT.pack(gateway, rank) if rank else b""
 
     def on_packet(self, creator: int, from_: int, kind: int, body: bytes) -> None:
-        """A neighbour has no parent left: advertise soon, if that helps."""
+        """A neighbour has no parent: advertise soon, if that helps."""
         if kind == SOLICITATION_TYPE and self._essentials is not None:
             gateway = self._essentials.get_preferred_gateway()
             if self._rank(gateway) and self.next_hop_to_gateway(gateway) != from_:
@@ -65,7 +65,7 @@ class EtxTree(GatewayRoutes):
         self._essentials.search_other_nodes_in_range()
 
     def next_hop_to_gateway(self, gateway: int) -> int:
-        """The parent, which changes only for one that is better by SWITCH_BELOW."""
+        """The parent, replaced only by one that is better by SWITCH_BELOW."""
         costs = {
             neighbour: said.rank + RANK_PER_ETX * self.links.etx(neighbour)
             for neighbour, said in self._advertised.items()
@@ -81,13 +81,13 @@ class EtxTree(GatewayRoutes):
         return parent
 
     def forget_neighbour(self, neighbour: int) -> None:
-        """Its advertisement is void; solicit others if it was the last one."""
+        """Drop its advertisement; solicit others if it was the last one."""
         said = self._advertised.pop(neighbour, None)
         if said is not None and self.next_hop_to_gateway(said.gateway) == NO_ROUTE:
             self._solicit()
 
     def forget_gateway(self, gateway: int) -> None:
-        """All advertisements for it are void until they are repeated."""
+        """Drop all advertisements for it until they are repeated."""
         for neighbour in [n for n, said in self._advertised.items() if said.gateway == gateway]:
             del self._advertised[neighbour]
         self._solicit()
@@ -99,7 +99,7 @@ class EtxTree(GatewayRoutes):
     def _rank(self, gateway: int) -> int:
         assert self._essentials is not None
         if not self._essentials.get_connected_to_gateway():
-            return 0  # or nodes that are cut off would count each other's ranks up for ever
+            return 0  # otherwise nodes without a gateway would raise each other's ranks for ever
         if gateway == self._essentials.get_node_id():
             return ROOT_RANK
         parent = self.next_hop_to_gateway(gateway)

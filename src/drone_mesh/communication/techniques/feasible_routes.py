@@ -1,4 +1,4 @@
-"""FeasibleRoutes: the updates of neighbours, and which of them cannot lead in a circle.
+"""FeasibleRoutes: the updates of neighbours, and which of them cannot form a loop.
 
 RFC 8966, 3.5 to 3.8: the source table and the route table of Babel, for gateways.
 """
@@ -27,7 +27,7 @@ class Distance(NamedTuple):
 
 
 class FeasibleRoutes:
-    """Routes to gateways through neighbours. Only the technique that owns it calls it."""
+    """Routes to gateways through neighbours. Called only by the technique that owns it."""
 
     def __init__(self, links: LinkCosts) -> None:
         self._links = links
@@ -35,7 +35,7 @@ class FeasibleRoutes:
         self._feasibility: dict[int, Distance] = {}  # by gateway: the best ever advertised
 
     def hear(self, gateway: int, neighbour: int, said: Distance) -> None:
-        """An update of a neighbour."""
+        """Store an update from a neighbour."""
         self._updates.setdefault(gateway, {})[neighbour] = said
 
     def best(self, gateway: int) -> int:
@@ -49,7 +49,7 @@ class FeasibleRoutes:
         return min(costs, key=lambda n: (costs[n], n)) if costs else NO_ROUTE
 
     def advertise(self) -> list[tuple[int, Distance]]:
-        """(gateway, own distance) of each gateway. What is advertised bounds what is feasible."""
+        """(gateway, own distance) of each gateway. Advertised distances bound what is feasible."""
         found = [(gateway, self._distance(gateway)) for gateway in self._updates]
         for gateway, said in found:
             limit = self._feasibility.get(gateway)
@@ -58,7 +58,7 @@ class FeasibleRoutes:
         return found
 
     def forget_neighbour(self, neighbour: int) -> list[int]:
-        """Its updates are void. The gateways that no feasible route leads to now."""
+        """Drop its updates. Returns the gateways that no feasible route leads to now."""
         return [
             gateway
             for gateway, updates in self._updates.items()
@@ -66,7 +66,7 @@ class FeasibleRoutes:
         ]
 
     def forget_gateway(self, gateway: int) -> None:
-        """All updates for it are void until they are repeated."""
+        """Drop all updates for it until they are repeated."""
         self._updates.get(gateway, {}).clear()
 
     def needed_sequence(self, gateway: int) -> int | None:

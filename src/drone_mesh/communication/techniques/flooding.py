@@ -1,4 +1,4 @@
-"""Flooding: every packet to every neighbour, once. The baseline of all routing studies."""
+"""Flooding: sends every packet once to every neighbour. The baseline of all routing studies."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import MessageType
 
-REMEMBERED = 512  # our choice: packets that a node recognises; a heartbeat lives a second
+REMEMBERED = 512  # our choice: packets that a node recognises; heartbeats live for a second
 REACHABLE_S = 20.0  # our choice: two check periods
 SEQUENCE = struct.Struct("<H")
 SAME_PACKET_S = 0.5  # docs/protocol.md, "Circulating packets": after that it is another packet
 
 
 class Flooding(ChildTableTree):
-    """Needs no routes: knows neighbours, and recognises the copies of a packet."""
+    """Needs no routes: knows its neighbours and recognises copies of a packet."""
 
     FLOODS = True
     TAKES_SHORTCUTS = False
@@ -49,16 +49,16 @@ class Flooding(ChildTableTree):
         return is_first
 
     def directions(self, node: int, came_from: int, creator: int) -> Sequence[int]:
-        """The node itself if it is a neighbour, else all neighbours but the one it came from."""
+        """The node itself if it is a neighbour, else all neighbours except `came_from`."""
         children = self.get_set_of_children()
         if node in children:
             return (node,)
         return tuple(sorted(children - {came_from, creator}))
 
     def get_direction_to_node(self, node: int) -> int:
-        """For people and for repair: the neighbour with the fewest hops to its gateway.
+        """For display and repair: the neighbour with the fewest hops to its gateway.
 
-        NO_ROUTE for a node that was not heard lately, although a packet for it would be flooded.
+        NO_ROUTE for a node that was not heard recently, although packets for it would be flooded.
         """
         children = self.get_set_of_children()
         if node in children:
@@ -77,26 +77,26 @@ class Flooding(ChildTableTree):
         return SEQUENCE.pack(self._sequence)
 
     def proven_path_to_node(self, other: int, node: int) -> None:
-        """There are no routes to prove."""
+        """Nothing to do: there are no routes to prove."""
 
     def other_can_communicate_with_node(self, other: int, node: int) -> None:
-        """`other` is a neighbour; what is behind it does not matter."""
+        """Nothing to do: only neighbours matter."""
         self.can_communicate_with_node(other)
 
     def gateway_lost(self, gateway: int) -> bool:
-        """There is no route to drop, and nothing that neighbours should know."""
+        """No route to drop, and nothing to report to neighbours."""
         self._heard_s.pop(gateway, None)
         return False
 
     def cant_communicate_with_node(self, node: int) -> int:
-        """A neighbour is gone, but that does not make it unreachable."""
+        """Remove a neighbour; it may still be reachable."""
         self._hops.pop(node, None)
         super().cant_communicate_with_node(node)
         return 0
 
 
 def _identity(payload: bytes, kind: int) -> bytes:
-    """What all copies of a packet share: for a heartbeat its sequence number, not its hops."""
+    """The bytes that all copies share: for a heartbeat its sequence number, not its hops."""
     if kind == MessageType.HEARTBEAT:
         creator, _from, _kind, _to, forward = messages.header(payload)
         return bytes((creator, forward, kind)) + messages.extension(payload)[: SEQUENCE.size]

@@ -1,4 +1,4 @@
-"""GatewayRoutes: what techniques share that find routes to gateways in their own way."""
+"""GatewayRoutes: the common base of techniques with their own routes to gateways."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 
 ETX_GAIN = 0.1  # weight of a new sample; CTP (TEP 123) uses the same exponential average
-WORST_ETX = 16.0  # our choice: worse links count as this one
+WORST_ETX = 16.0  # our choice: worse links count as this value
 
 
 class LinkCosts:
     """Expected transmissions (ETX, De Couto et al., 2003) per packet to each neighbour.
 
-    Only the technique that owns it calls it.
+    Called only by the technique that owns it.
     """
 
     def __init__(self) -> None:
         self._etx: dict[int, float] = {}
 
     def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
-        """A packet took so many transmissions; one that was given up counts twice as many."""
+        """A packet took this many transmissions; one that was given up counts twice as many."""
         sample = min(float(transmissions if ok else 2 * transmissions), WORST_ETX)
         before = self._etx.get(neighbour, 1.0)
         self._etx[neighbour] = before + ETX_GAIN * (sample - before)
 
     def etx(self, neighbour: int) -> float:
-        """1.0 for a link that never lost a packet, and for one without traffic so far."""
+        """The ETX; 1.0 for a link that never lost a packet or had no traffic yet."""
         return self._etx.get(neighbour, 1.0)
 
 
@@ -45,28 +45,28 @@ class GatewayRoutes(ChildTableTree):
 
     @abc.abstractmethod
     def next_hop_to_gateway(self, gateway: int) -> int:
-        """The neighbour to use for `gateway`; NO_ROUTE: this technique knows none."""
+        """The next hop to `gateway`; NO_ROUTE if this technique knows none."""
 
     @abc.abstractmethod
     def forget_neighbour(self, neighbour: int) -> None:
-        """`neighbour` is out of reach: routes to gateways through it are void."""
+        """`neighbour` is out of reach: drop routes to gateways through it."""
 
     @abc.abstractmethod
     def forget_gateway(self, gateway: int) -> None:
-        """`gateway` did not answer: all routes to it are void."""
+        """`gateway` did not answer: drop all routes to it."""
 
     def get_direction_to_node(self, node: int) -> int:
-        """The neighbour to hand a packet for `node` to, or NO_ROUTE."""
+        """The next hop for `node`, or NO_ROUTE."""
         to = self.next_hop_to_gateway(node)
         return to if to != NO_ROUTE else super().get_direction_to_node(node)
 
     def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
-        """Measures the link, then as the tree."""
+        """Measure the link; otherwise like the tree."""
         self.links.sent(neighbour, ok, transmissions)
         super().sent(neighbour, ok, transmissions)
 
     def cant_communicate_with_node(self, node: int) -> int:
-        """A packet could not be handed to neighbour `node`."""
+        """Neighbour `node` did not take a packet."""
         self.forget_neighbour(node)
         return super().cant_communicate_with_node(node)
 
@@ -76,7 +76,7 @@ class GatewayRoutes(ChildTableTree):
         return super().gateway_lost(gateway)
 
     def node_moved_location(self) -> None:
-        """Forget everything but the time-out of old entries."""
+        """Forget everything except the time-out of old entries."""
         for child in self.get_set_of_children():
             self.forget_neighbour(child)
         super().node_moved_location()

@@ -1,4 +1,4 @@
-"""SteadyTree: a tree that keeps a route for as long as it works."""
+"""SteadyTree: a tree that keeps a route as long as it works."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 
 
 class SteadyTree(ChildTableTree):
-    """Keeps the route it knows until that fails; ChildTableTree follows the latest heartbeat."""
+    """Keeps a known route until it fails; ChildTableTree follows the latest heartbeat."""
 
     def proven_path_to_node(self, other: int, node: int) -> None:
         """`node` was just reached through `other`: a new route only if there was none."""
