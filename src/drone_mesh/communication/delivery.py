@@ -50,9 +50,7 @@ class Delivery:
         self._attempts = attempts
         self._report = report
         self._on_neighbour_lost = on_neighbour_lost
-        self._reported_s: dict[
-            int, float
-        ] = {}  # shared medium: when each was announced
+        self._reported_s: dict[int, float] = {}  # shared medium: when each was announced
         self._gave_up: set[int] = set()  # neighbours that took no packets, though heard
         self._strangers = Strangers()
         self._announced = RateLimit(REPEATS)

@@ -1,7 +1,7 @@
-"""How long things take: states [DS 6.1.7, Table 16] and frames on the air [DS 7.3, 7.4].
+"""Durations: states of the chip [DS 6.1.7, Table 16] and frames on the air [DS 7.3, 7.4].
 
-All times are integer nanoseconds, so that nothing is ever rounded: one bit lasts 4000, 1000 or
-500 ns.
+All times are integer nanoseconds, so that nothing is ever rounded: one bit lasts 4000, 1000 or 500
+ns.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def bit_ns(bits_per_s: int) -> int:
 
 
 def ard_s(delay: int) -> float:
-    """ARD of SETUP_RETR in seconds: from a frame's end until the chip turns to sending again."""
+    """ARD of SETUP_RETR in seconds: from the end of a frame until the chip starts the next one."""
     return (delay + 1) * ARD_STEP_NS / NS_PER_S
 
 
 def failed_cycle_ns(data_ns: int, ard_ns: int, retransmits: int) -> int:
     """From the rise of CE to MAX_RT.
 
-    ARD runs from the end of a frame; the settling before the next comes on top [DS Fig. 17].
+    ARD starts at the end of a frame; the settling before the next frame is added [DS Fig. 17].
     """
     return SETTLING_NS + (retransmits + 1) * (data_ns + ard_ns) + retransmits * SETTLING_NS

@@ -1,4 +1,4 @@
-"""Errors of a radio; their messages name the remedy."""
+"""Errors of a radio; each message includes the remedy."""
 
 from __future__ import annotations
 
@@ -10,4 +10,4 @@ class RadioError(MeshError):
 
 
 class HardwareUnavailable(RadioError):
-    """This machine lacks a device or a library that the radio needs. Show the message and stop."""
+    """This machine lacks a device or library that the radio needs. Show the message and stop."""

@@ -31,7 +31,7 @@ class IrqPin(Protocol):
     """Interrupt request, an input, low while a flag of the chip is set. One thread waits for it."""
 
     def wait_low(self, timeout_s: float) -> bool:
-        """Wait until it is low; False if it is still high after the time-out."""
+        """Wait until it is low; returns False if it is still high after the time-out."""
 
     def close(self) -> None:
         """Release the pin."""
@@ -54,7 +54,7 @@ def _gpiod() -> ModuleType:
 
 
 def find_header(devices: Path = Path("/dev")) -> str:
-    """Path of the GPIO chip that has the header's pins."""
+    """Path of the GPIO chip with the header's pins."""
     gpiod = _gpiod()
     refused = False
     labels = []
@@ -93,7 +93,7 @@ def _request(gpio: int, settings: Any) -> Any:
 
 
 class GpiodCe:
-    """CE on a pin of the header; low from the start, and when it is closed."""
+    """CE on a pin of the header; low initially and after `close`."""
 
     def __init__(self, gpio: int = CE_GPIO) -> None:
         line = _gpiod().line
@@ -124,7 +124,7 @@ class GpiodCe:
 
 
 class GpiodIrq:
-    """IRQ on a pin of the header. Levels decide, edges only wake: none can be missed."""
+    """IRQ on a pin of the header. Levels decide and edges only wake, so none can be missed."""
 
     def __init__(self, gpio: int = IRQ_GPIO) -> None:
         line = _gpiod().line
@@ -146,7 +146,7 @@ class GpiodIrq:
             if left_s <= 0:
                 return False
             if self._lines.wait_edge_events(left_s):
-                self._lines.read_edge_events()  # perhaps an old one, so look again
+                self._lines.read_edge_events()  # it may be an old edge, so check again
         return True
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Decides whether the IRQ pin can be trusted, or the chip must be polled."""
+"""Decides whether the IRQ pin works, or the chip must be polled."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ _PATIENCE = 3  # contradictions; a single one may be a race
 
 
 class IrqWatch:
-    """Compares the pin with the contents of the chip. For the receiving thread."""
+    """Compares the pin with the state of the chip. For the receiving thread."""
 
     def __init__(self) -> None:
         self.trusted = True
-        self._said: bool | None = None  # the pin was low, was not, or was not asked
+        self._said: bool | None = None  # whether the pin was low; None: not read
         self._contradictions = 0
 
     def woken(self, low: bool) -> None:
@@ -18,10 +18,10 @@ class IrqWatch:
         self._said = low
 
     def looked(self, found: bool, low_for_nothing: bool) -> bool:
-        """The chip was read after the wait; True if that ends the trust in the pin.
+        """The chip was read after the wait; returns whether the pin is now considered broken.
 
-        `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all
-        flags are clear, and still the pin is low.
+        `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all flags
+        are clear, but the pin is low.
         """
         said, self._said = self._said, None
         if low_for_nothing or (found and said is False):

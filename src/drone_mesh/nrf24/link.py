@@ -1,4 +1,4 @@
-"""SPI commands of the chip as functions, registers by their names."""
+"""The chip's SPI commands as functions, with named registers."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Command, Register
 from drone_mesh.nrf24.spi import SpiDevice
 
-_NO_CHIP = (0x00, 0xFF)  # STATUS as it reads when nothing drives MISO, or nothing is connected
+_NO_CHIP = (0x00, 0xFF)  # STATUS if nothing drives MISO, or nothing is connected
 
 
 class ChipLink:
-    """One chip on one SPI device; the caller lets one thread at a time use it."""
+    """One chip on one SPI device; the caller ensures that one thread at a time uses it."""
 
     def __init__(self, spi: SpiDevice) -> None:
         self._spi = spi
@@ -61,7 +61,7 @@ class ChipLink:
             )
 
     def first_difference(self, values: Mapping[Register, bytes]) -> tuple[Register, bytes] | None:
-        """The first register that does not hold its value, and what it holds."""
+        """The first register that does not hold its value, with the value found, or None."""
         for register, value in values.items():
             found = self.read(register, len(value))
             if found != value:

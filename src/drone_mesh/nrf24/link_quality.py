@@ -8,20 +8,20 @@ _LEARNING = 0.1  # weight of the latest packet
 
 
 class Quality(NamedTuple):
-    """Of the packets to one neighbour lately, the latest counting most."""
+    """Quality of one link: moving averages over recent packets."""
 
     tries: float  # per packet, delivered or not
     delivered: float  # share, 0..1
 
 
 class LinkQuality:
-    """One thread writes, any thread reads: the figures are replaced, never changed."""
+    """One thread writes, any thread reads: the figures are replaced, never modified."""
 
     def __init__(self) -> None:
         self._of: dict[int, Quality] = {}
 
     def packet(self, neighbour: int, tries: int, delivered: bool) -> None:
-        """A packet was delivered to a neighbour, or given up, after so many tries."""
+        """A packet to a neighbour was delivered or given up, after `tries`."""
         before = self._of.get(neighbour)
         latest = Quality(float(tries), float(delivered))
         if before is not None:
@@ -29,5 +29,5 @@ class LinkQuality:
         self._of = {**self._of, neighbour: latest}
 
     def figures(self) -> Mapping[int, Quality]:
-        """Of each neighbour that a packet was sent to."""
+        """The quality for each neighbour that packets were sent to."""
         return self._of

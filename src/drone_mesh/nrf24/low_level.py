@@ -28,17 +28,17 @@ from drone_mesh.nrf24.transceiver import Received, Transceiver
 logger = logging.getLogger(__name__)
 
 POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s
-VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed by a listener
+VERIFY_PERIOD_S = 1.0  # our choice: how long a brown-out may stay unnoticed while listening
 RESTART_PERIOD_S = 1.0  # our choice: shortest time between two attempts to find a lost chip
 
 
 class NRF24LowLevelInterface:
     """One radio: sends with and without acknowledgement, and receives.
 
-    `spi`, `ce` and `irq` are passed in, so anything that behaves like a chip will do; without
-    `irq` it is polled. One thread may send and one may call `receive`; a lock, held for one try at
-    most, makes each sequence of SPI transfers atomic. While it sends, a node is deaf: for 1.9 ms at
-    250 kbit/s if all goes well, and for twice to four times as long without an answer.
+    `spi`, `ce` and `irq` are passed in, so anything that behaves like a chip works; without `irq`
+    it is polled. One thread may send and one may call `receive`; a lock, held for one try at most,
+    makes each sequence of SPI transfers atomic. While sending, a node cannot receive: for 1.9 ms at
+    250 kbit/s if all goes well, and for two to four times as long without an answer.
 
     Use it as a context manager, or call `begin` and `close`. Every function except `begin`
     tolerates a failing chip: it is set up again, at most once a second; until then sends fail.
@@ -56,13 +56,13 @@ class NRF24LowLevelInterface:
         rng: random.Random | None = None,
         rules: AccessRules | None = None,
     ) -> None:
-        """`rules`: of access to the channel; those of `pace.access_rules` if not given."""
+        """`rules`: of access to the channel; by default those of `pace.access_rules`."""
         self.node_id = node_id
         self.settings = settings
         self._spi, self._ce, self._irq = spi, ce, irq
         self._runtime = runtime or SystemRuntime()
         self.access = MediumAccess(rules or access_rules(settings), rng or random.Random())
-        self._lock = self._runtime.lock()  # guards the chip and all that follows
+        self._lock = self._runtime.lock()  # guards the chip and all fields below
         self._statistics = RadioStatistics()
         self._chip = Transceiver(spi, ce, node_id, settings, self._runtime, self._statistics)
         self._irq_watch = IrqWatch()
@@ -79,7 +79,7 @@ class NRF24LowLevelInterface:
         self.close()
 
     def begin(self) -> None:
-        """Set the chip up and listen. Raises RadioError without a working chip."""
+        """Set up the chip and listen. Raises RadioError without a working chip."""
         with self._lock:
             self._set_up()
             self._powered = True
@@ -102,7 +102,7 @@ class NRF24LowLevelInterface:
         self._spi.close()
 
     def statistics(self) -> RadioStatistics:
-        """The counters as they are now."""
+        """The current counters."""
         return replace(self._statistics, **self.access.figures())
 
     @property
@@ -114,8 +114,8 @@ class NRF24LowLevelInterface:
         """Send 32 bytes to a node, and wait; True once its chip has acknowledged them.
 
         Follows the rules of access, one packet at a time; `Sender` serves several receivers at
-        once. In the random pauses between the tries it listens, so that two nodes that call each
-        other get through. Each try sends the very same packet, which cannot arrive twice.
+        once. It listens in the random pauses between tries, so that two nodes that send to each
+        other succeed. Each try sends the very same packet, which cannot be received twice.
         """
         _check(payload)
         access = self.access
@@ -139,15 +139,15 @@ class NRF24LowLevelInterface:
         delay: int,
         following: Callable[[], bytes | None] = lambda: None,
     ) -> bool:
-        """Send a packet to a node in one go; True once its chip has acknowledged it.
+        """Try once to send a packet to a node; returns whether its chip has acknowledged it.
 
-        `again`: it was tried before. `retransmits`, `delay`: the chip's own, for this try. When it
-        was acknowledged, `following` may return another packet for the same node, which is sent
-        without listening in between, and so on; then the result is that of the last one.
+        `again`: an earlier try failed. `retransmits`, `delay`: the chip's own, for this try. After
+        an acknowledgement, `following` may return another packet for the same node, which is sent
+        without listening in between, and so on; the result is then that of the last packet.
 
-        The acknowledgement comes back to pipe 0, which holds the receiver's address as long as
-        this takes. The program of 2019 opened pipe 3 for it, at the address of another node: the
-        sender then received, and acknowledged, packets of that node. So pipe 3 stays shut.
+        The acknowledgement returns to pipe 0, which has the receiver's address for this time. The
+        program of 2019 opened pipe 3 for it, at the address of another node, so the sender received
+        and acknowledged packets of that node. Therefore pipe 3 stays closed.
         """
         chip, address = self._chip, self.settings.node_address(node_id)
         with self._lock:
@@ -171,7 +171,7 @@ class NRF24LowLevelInterface:
             return done
 
     def drop(self) -> None:
-        """The packet that was tried last is given up: take it out of the chip."""
+        """Give up the packet that was tried last: remove it from the chip."""
         with self._lock:
             try:
                 if self._working:
@@ -221,7 +221,7 @@ class NRF24LowLevelInterface:
                 self._look()
 
     def _look(self) -> None:
-        """Empty the FIFO, and check periodically that the chip still holds its settings."""
+        """Empty the FIFO, and periodically check that the chip still holds its settings."""
         if not self._powered or (not self._working and not self._ready()):
             return
         chip = self._chip
@@ -247,7 +247,7 @@ class NRF24LowLevelInterface:
         self._next_verify_s = self._runtime.now_s() + VERIFY_PERIOD_S
 
     def _ready(self) -> bool:
-        """Whether the chip can be used; sets it up again if it lost its settings."""
+        """Whether the chip can be used; sets it up again after it lost its settings."""
         if not self._powered:
             return False
         if self._working:

@@ -1,4 +1,4 @@
-"""The pace of a mesh on this radio: rules of access and what the mesh must know of the channel."""
+"""Timing of a mesh on this radio: the rules of access and the properties of the channel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def access_rules(settings: RadioSettings) -> AccessRules:
 
 
 def medium_of(settings: RadioSettings) -> Medium:
-    """What the mesh has to know of a channel with these settings."""
+    """The properties of a channel with these settings, for the mesh."""
     cycle_s = CYCLE_S[settings.data_rate]
     return Medium(
         shared=True,

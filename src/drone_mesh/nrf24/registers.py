@@ -64,12 +64,12 @@ class Register(enum.IntEnum):
 
 @dataclass(frozen=True)
 class BitField:
-    """A few neighbouring bits of one register."""
+    """A group of adjacent bits in one register."""
 
     register: Register
     lsb: int
     width: int = 1
-    mask: int = field(init=False)  # the bits of the field, where they stand in the register
+    mask: int = field(init=False)  # the bits of the field, at their position in the register
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mask", ((1 << self.width) - 1) << self.lsb)
@@ -86,7 +86,7 @@ class BitField:
 
 
 # CONFIG, p. 57
-MASK_RX_DR = BitField(Register.CONFIG, 6)  # 1: RX_DR does not pull the IRQ pin
+MASK_RX_DR = BitField(Register.CONFIG, 6)  # 1: RX_DR does not pull the IRQ pin low
 MASK_TX_DS = BitField(Register.CONFIG, 5)
 MASK_MAX_RT = BitField(Register.CONFIG, 4)
 EN_CRC = BitField(Register.CONFIG, 3)  # forced on while any bit of EN_AA is set
@@ -112,7 +112,7 @@ RF_PWR = BitField(Register.RF_SETUP, 1, 2)  # -18, -12, -6, 0 dBm
 
 # STATUS, p. 59; a flag is cleared by writing 1 to it
 RX_DR = BitField(Register.STATUS, 6)  # a payload arrived
-TX_DS = BitField(Register.STATUS, 5)  # sent, and acknowledged if that was asked for
+TX_DS = BitField(Register.STATUS, 5)  # sent, and acknowledged if requested
 MAX_RT = BitField(Register.STATUS, 4)  # all retransmits used up; blocks sending until cleared
 RX_P_NO = BitField(Register.STATUS, 1, 3)  # pipe of the oldest payload, RX_FIFO_IS_EMPTY if none
 STATUS_TX_FULL = BitField(Register.STATUS, 0)

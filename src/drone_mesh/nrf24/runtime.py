@@ -1,4 +1,4 @@
-"""Time and threads of the driver, replaceable so that it runs under emulated time."""
+"""The driver's time and threads, replaceable so that it runs in emulated time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Callable, ContextManager
 
 
 class Task(abc.ABC):
-    """A task that runs beside its creator."""
+    """A task that runs concurrently with its creator."""
 
     @abc.abstractmethod
     def join(self) -> None:
@@ -17,13 +17,14 @@ class Task(abc.ABC):
 
 
 class Signal(abc.ABC):
-    """Makes waiting tasks evaluate their condition again."""
+    """Makes waiting tasks evaluate their conditions again."""
 
     @abc.abstractmethod
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Return when the condition holds, or when the time is over; whether it holds.
+        """Return when the condition holds or the time is over; returns whether it holds.
 
-        It is evaluated first, and again at each `notify`. The caller must hold no lock.
+        The condition is evaluated first, and again at each `notify`. The caller must not hold a
+        lock.
         """
 
     @abc.abstractmethod
@@ -52,7 +53,7 @@ class Runtime(abc.ABC):
 
     @abc.abstractmethod
     def start(self, run: Callable[[], None], name: str) -> Task:
-        """Run `run` beside the caller."""
+        """Run `run` concurrently with the caller."""
 
 
 class _ThreadTask(Task):
@@ -79,7 +80,7 @@ class ThreadSignal(Signal):
 
 
 class SystemRuntime(Runtime):
-    """The time and the threads of the machine."""
+    """The machine's time and threads."""
 
     def now_s(self) -> float:
         return time.monotonic()

@@ -1,4 +1,4 @@
-"""Sender: the queue of one radio, and the task that works it off by the rules of access."""
+"""Sender: the queue of one radio, and the task that sends it by the rules of access."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drone_mesh.nrf24.runtime import Runtime, Task
 
 
 class Sender:
-    """Sends what is offered, several receivers at once.
+    """Sends queued packets, to several receivers at once.
 
     Threads: `start` starts one that sends. Any thread may call the other methods; none of them
     waits for the radio. A lock guards the queue, and is never held during a send.
@@ -23,9 +23,9 @@ class Sender:
         on_delivered: Callable[[int, int], None],
         on_given_up: Callable[[bytes, int], None],
     ) -> None:
-        """Both are called in the sending thread, with the number of tries.
+        """Both functions are called in the sending thread, with the number of tries.
 
-        `on_delivered` takes the node that has a packet, `on_given_up` a lost packet.
+        `on_delivered` gets the node that received a packet, `on_given_up` a lost packet.
         """
         self._radio = radio
         self._access = radio.access
@@ -39,12 +39,12 @@ class Sender:
         self._task: Task | None = None
 
     def start(self) -> None:
-        """Begin to send."""
+        """Start sending."""
         self._closed = False
         self._task = self._runtime.start(self._run, f"nRF24 sender {self._radio.node_id}")
 
     def stop(self) -> None:
-        """Give up what waits, without a report, and end the thread."""
+        """Give up waiting packets, without a report, and end the thread."""
         self._closed = True
         self.clear()
         task, self._task = self._task, None
@@ -61,7 +61,7 @@ class Sender:
         return taken
 
     def data_room(self) -> int:
-        """How many packets of priority DATA it would take now."""
+        """The number of packets of priority DATA that it would accept now."""
         with self._lock:
             return self._access.data_room()
 
@@ -71,7 +71,7 @@ class Sender:
             self._access.heard(sender, self._runtime.now_s(), broadcast=broadcast, train=train)
 
     def clear(self) -> None:
-        """Give up what waits, without a report."""
+        """Give up waiting packets, without a report."""
         with self._lock:
             self._access.clear()
         self._wake()
@@ -105,7 +105,7 @@ class Sender:
             retransmits, delay = access.retransmits()
 
             def following() -> bytes | None:
-                """The packet was delivered: the payload that follows in its train."""
+                """The packet was delivered: return the next payload of its train."""
                 nonlocal packet
                 with self._lock:
                     now_s = self._runtime.now_s()
@@ -125,7 +125,7 @@ class Sender:
         self._settle(packet, fate)
 
     def _settle(self, packet: Outgoing, fate: Fate) -> None:
-        """Report what became of a packet."""
+        """Report the outcome of a packet."""
         if fate is Fate.GIVEN_UP:
             self._radio.drop()
             if not self._closed:

@@ -1,4 +1,4 @@
-"""Settings of the radios of a mesh; all radios need the same ones."""
+"""The settings of the radios of a mesh, equal for all of them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _ALL_PIPES = (1 << PIPES) - 1
 
 
 class DataRate(enum.Enum):
-    """Bits per second on the air; a slower one reaches further."""
+    """Bits per second on the air; lower rates have a longer range."""
 
     KBPS_250 = 250_000
     MBPS_1 = 1_000_000
@@ -47,7 +47,7 @@ DATA_RATES = {
 
 
 def data_rate(name: str) -> DataRate:
-    """The rate of that name. Raises ConfigurationError for another name."""
+    """The rate with this name. Raises ConfigurationError for an unknown name."""
     try:
         return DATA_RATES[name]
     except KeyError:
@@ -77,7 +77,7 @@ class RadioSettings:
 
     `crc_bytes` is 1 for nodes of 2019 (docs/radio.md, "CRC length").
 
-    Raises ConfigurationError for values that the chip does not have.
+    Raises ConfigurationError for values that the chip does not support.
     """
 
     channel: int = 1  # 2400 + n MHz
@@ -87,7 +87,7 @@ class RadioSettings:
     retransmit_delay: int = 5  # ARD = (n + 1) * 250 us, while it listens; see AccessRules
     retransmits: int = 15  # ARC, while it listens
     broadcast_mode: BroadcastMode = BroadcastMode.NO_ACK
-    base_address: int = 0x544D526800  # a node's address is this + its id
+    base_address: int = 0x544D526800  # the address of a node is this plus its id
     broadcast_id: int = BROADCAST
 
     def __post_init__(self) -> None:
@@ -112,12 +112,12 @@ class RadioSettings:
             )
 
     def node_address(self, node_id: int) -> bytes:
-        """Five bytes, LSByte first, as the chip wants them."""
+        """Five bytes, LSByte first, as the chip expects them."""
         return (self.base_address + node_id).to_bytes(ADDRESS_BYTES, "little")
 
     @property
     def broadcast_address(self) -> bytes:
-        """Where all nodes listen; LSByte first."""
+        """The address on which all nodes listen; LSByte first."""
         return self.node_address(self.broadcast_id)
 
     @property
@@ -137,7 +137,7 @@ class RadioSettings:
 
     @property
     def auto_ack_pipes(self) -> int:
-        """EN_AA. Sender and receiver must agree on it pipe by pipe, or nothing is received."""
+        """EN_AA. Sender and receiver must agree on it for each pipe, or nothing is received."""
         if self.broadcast_mode is BroadcastMode.SHOCKBURST:
             return _ALL_PIPES & ~(1 << BROADCAST_PIPE)
         return _ALL_PIPES
@@ -148,9 +148,10 @@ class RadioSettings:
         return _LISTENING_PIPES
 
     def registers(self, node_id: int) -> dict[Register, bytes]:
-        """Every register that the driver depends on, but for CONFIG: no reset clears the chip.
+        """Every register that the driver depends on, except CONFIG, because no reset clears the
+        chip.
 
-        Pipe 0 is opened while sending, for the acknowledgement; the pipes 3 to 5 never are.
+        Pipe 0 is opened for acknowledgements while sending; pipes 3 to 5 are never opened.
         """
         rate = RF_PWR.put(sorted(p.value for p in TxPower).index(self.power.value))
         rate |= RF_DR_LOW.put(int(self.data_rate is DataRate.KBPS_250))
@@ -190,10 +191,10 @@ class RadioSettings:
 
     @property
     def broadcast_s(self) -> float:
-        """From the rise of CE until a broadcast is sent."""
+        """From the rise of CE until a broadcast has been sent."""
         return SETTLING_NS / NS_PER_S + self.frame_s
 
     @property
     def acknowledged_s(self) -> float:
-        """From the rise of CE until a packet is acknowledged, if nothing goes wrong."""
+        """From the rise of CE until a packet is acknowledged, without losses."""
         return 2 * SETTLING_NS / NS_PER_S + self.frame_s + self.answer_frame_s

@@ -20,7 +20,7 @@ class SpiDevice(Protocol):
 
 
 def open_spi(bus: int = 0, device: int = 0, hz: int = SPI_HZ) -> SpiDevice:
-    """Open /dev/spidev<bus>.<device>; HardwareUnavailable names what is missing and the remedy."""
+    """Open /dev/spidev<bus>.<device>. HardwareUnavailable: what is missing, and the remedy."""
     path = f"/dev/spidev{bus}.{device}"
     try:
         import spidev

@@ -9,34 +9,34 @@ from drone_mesh.communication.medium import ChannelUse
 
 @dataclass
 class RadioStatistics:
-    """Counters since the driver was created; each is written under the driver's lock only."""
+    """Counters since the driver was created; each is written only under the driver's lock."""
 
-    sent: int = 0  # packets with acknowledgement that were to be sent
-    acknowledged: int = 0  # of these: the receiver has them
+    sent: int = 0  # packets that request an acknowledgement
+    acknowledged: int = 0  # of these: received
     lost: int = 0  # of these: given up
     retries: int = 0  # retransmissions by the chip
     tries: int = 0  # further tries by the driver, after a pause
     broadcasts: int = 0  # sent
     received: int = 0  # payloads received
     corrupt: int = 0  # damaged frames that passed the CRC; dropped
-    restarts: int = 0  # the chip had lost its settings, or hung, and was set up again
+    restarts: int = 0  # set-ups after the chip had lost its settings or hung
     irq_fallbacks: int = 0  # the IRQ pin failed; polling instead
-    airtime_s: float = 0.0  # of the frames that it sent, acknowledgements included
+    airtime_s: float = 0.0  # of the frames that it sent, including acknowledgements
     waiting: int = 0  # packets in the queue now
     contention: float = 0.0  # share of first tries that failed lately, as the sender estimates it
-    duplicates: int = 0  # seen by the antenna: the same packet from the same node again, at once
+    duplicates: int = 0  # packets that the antenna received again from the same node, at once
 
     @property
     def tries_per_packet(self) -> float:
-        """Of packets that were delivered or given up; 1 while there are none."""
+        """Mean over packets delivered or given up; 1 while there are none."""
         return 1.0 + self.tries / self.sent if self.sent else 1.0
 
 
-AIRTIME_WINDOW_S = 1.0  # our choice: the share of airtime is taken over at least this time
+AIRTIME_WINDOW_S = 1.0  # our choice: the airtime share is measured over at least this time
 
 
 class ChannelMeter:
-    """Makes the figures for people from the counters of one radio. One thread at a time."""
+    """Derives figures for display from the counters of one radio. One thread at a time."""
 
     def __init__(self, now_s: float) -> None:
         self._since_s = now_s
@@ -44,7 +44,7 @@ class ChannelMeter:
         self._share = 0.0
 
     def read(self, statistics: RadioStatistics, now_s: float) -> ChannelUse:
-        """The figures now."""
+        """The current figures."""
         passed_s = now_s - self._since_s
         if passed_s >= AIRTIME_WINDOW_S:
             self._share = (statistics.airtime_s - self._airtime_s) / passed_s

@@ -1,4 +1,4 @@
-"""The SPI sequences of the driver, without threads and without further tries."""
+"""The SPI sequences of the driver, without threads and retries."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.statistics import RadioStatistics
 
 POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms, depending on the crystal [DS Table 16]
-CE_PULSE_S = 20e-6  # Thce is 10 us; a pulse sends one packet, and cannot keep the chip in TX
+CE_PULSE_S = 20e-6  # Thce is 10 us; a pulse sends one packet and does not keep the chip in TX
 CE_TO_CSN_S = 5e-6  # Tpece2csn is 4 us
 TIMEOUT_S = 95e-3  # the longest transaction takes 87.1 ms
-_DRAIN_LIMIT = 32  # payloads at a time; the FIFO holds three, more keep coming only while we read
-# How long an acknowledgement that is being sent may still need after CE went low.
+_DRAIN_LIMIT = 32  # payloads at a time; the FIFO holds three, more arrive only while we read
+# How long an acknowledgement in progress may still take after CE went low.
 TX_DELAY_S = {DataRate.KBPS_250: 505e-6, DataRate.MBPS_1: 280e-6, DataRate.MBPS_2: 240e-6}
 
 
 class Received(NamedTuple):
-    """A payload, and the pipe it came through."""
+    """A payload and the pipe on which it arrived."""
 
     pipe: int
     payload: bytes
 
 
 class Transceiver:
-    """One chip. Every function raises RadioError when the chip does not answer as expected.
+    """One chip. Every function raises RadioError if the chip does not answer as expected.
 
-    Belongs to the thread that holds the driver's lock, except that `inbox` may be emptied by
-    another one.
+    Belongs to the thread that holds the driver's lock, except that another thread may empty
+    `inbox`.
     """
 
     def __init__(
@@ -74,14 +74,14 @@ class Transceiver:
         self._runtime = runtime
         self._statistics = statistics
         self._registers = settings.registers(node_id)
-        self._retries = (settings.retransmit_delay, settings.retransmits)  # as the chip is set now
+        self._retries = (settings.retransmit_delay, settings.retransmits)  # currently in the chip
         self.inbox: deque[Received] = deque()
         self._loaded: tuple[bytes, bytes] | None = None  # address and payload in the TX FIFO
-        self._pid = 0  # of the last payload written; counts from where the chip stood, not from 0
+        self._pid = 0  # of the last payload written, relative to an unknown start
         self._last_sent: dict[bytes, tuple[int, bytes]] = {}  # address -> PID and payload
 
     def set_up(self) -> None:
-        """Write every register that matters, since only power resets the chip; then listen."""
+        """Write every register that matters, because only power resets the chip; then listen."""
         settings = self._settings
         self._ce.value = False
         self._retries = (settings.retransmit_delay, settings.retransmits)
@@ -97,12 +97,12 @@ class Transceiver:
         self._raise_ce()
 
     def power_down(self) -> None:
-        """The least current; registers and FIFOs keep their content."""
+        """Lowest current; registers and FIFOs keep their contents."""
         self._ce.value = False
         self._link.write_byte(Register.CONFIG, self._settings.config_power_down)
 
     def disable(self) -> None:
-        """CE low, so that a failing chip does not send."""
+        """Set CE low, so that a failing chip does not send."""
         self._ce.value = False
 
     def check_config(self) -> None:
@@ -129,7 +129,7 @@ class Transceiver:
     def become_transmitter(self, address: bytes) -> None:
         """Go to standby with pipe 0 open for the answer, after emptying the FIFO."""
         self._ce.value = False
-        # An acknowledgement that the chip is sending must not be cut off.
+        # Do not cut off an acknowledgement that the chip is sending.
         self._runtime.sleep(TX_DELAY_S[self._settings.data_rate])
         self.drain()
         self._link.write_byte(Register.CONFIG, self._settings.config_sending)
@@ -138,17 +138,17 @@ class Transceiver:
         self._link.write_byte(Register.EN_RXADDR, self._settings.listening_pipes | ERX[0].mask)
 
     def load(self, address: bytes, payload: bytes, *, again: bool = False) -> None:
-        """Have the payload in the chip, under the right packet number (PID).
+        """Load the payload into the chip with the right packet number (PID).
 
-        The receiver's chip takes a packet with the PID and CRC of the one before for a repetition:
-        it acknowledges it, and drops it. So `again`, another try of a packet that may have arrived
-        while its acknowledgement was lost, has the PID of the try before, and any other packet has
-        another PID than the same bytes had before. The PID has two bits and counts the payloads
-        that are written: writing one and flushing it uses up a PID.
+        The receiver's chip treats a packet with the PID and CRC of the previous one as a
+        repetition: it acknowledges it and drops it. So `again`, another try of a packet that may
+        have arrived while its acknowledgement was lost, has the PID of the previous try, and any
+        other packet has another PID than the same bytes had before. The PID has two bits and counts
+        written payloads: writing one and flushing it uses up a PID.
         """
         before = self._last_sent.get(address)
         if again and self._loaded == (address, payload):
-            return  # it is still there
+            return  # it is still loaded
         self.drop()
         pid = self._pid + 1 & 3
         if before is not None and before[1] == payload:
@@ -162,9 +162,10 @@ class Transceiver:
         self._last_sent[address] = (pid, payload)
 
     def transmit(self) -> int | None:
-        """Have what was loaded sent to a node; the chip's retransmits, None if not acknowledged.
+        """Send the loaded payload to a node; returns the chip's retransmits, None if not
+        acknowledged.
 
-        If not, it stays in the chip for another try.
+        In that case it stays in the chip for another try.
         """
         flags = self._pulse(self._settings.acknowledged_s)
         retransmits = ARC_CNT.get(self._link.read_byte(Register.OBSERVE_TX))
@@ -184,7 +185,7 @@ class Transceiver:
         if plain:
             self._link.write_byte(Register.EN_AA, settings.auto_ack_pipes & ~ENAA[0].mask)
         self.drop()
-        # On a pipe without auto-acknowledgement an ordinary payload asks for none.
+        # On a pipe without auto-acknowledgement an ordinary payload requests none.
         self._write_payload(payload, Command.W_TX_PAYLOAD if plain else Command.W_TX_PAYLOAD_NO_ACK)
         self._pulse(settings.broadcast_s)
         self._statistics.airtime_s += settings.frame_s
@@ -194,9 +195,9 @@ class Transceiver:
         self.listen()
 
     def drain(self) -> bool:
-        """Move payloads from the FIFO to the inbox; whether there were any.
+        """Move payloads from the FIFO to the inbox; returns whether there were any.
 
-        In the order of the datasheet (8.4, footnote c): payload, RX_DR, then look for more.
+        In the order of the datasheet (8.4, footnote c): payload, RX_DR, then check for more.
         """
         found = False
         for _ in range(_DRAIN_LIMIT):
@@ -223,17 +224,17 @@ class Transceiver:
 
     @property
     def flags_seen(self) -> int:
-        """RX_DR, TX_DS and MAX_RT as of the last transfer."""
+        """RX_DR, TX_DS and MAX_RT in the last transfer."""
         return self._link.status & STATUS_FLAGS
 
     def set_retries(self, delay: int, count: int) -> None:
-        """Other retransmits of the chip than those of the settings, until `listen`."""
+        """Use other retransmit settings than the configured ones, until `listen`."""
         if (delay, count) != self._retries:
             self._retries = (delay, count)
             self._link.write_byte(Register.SETUP_RETR, ARD.put(delay) | ARC.put(count))
 
     def drop(self) -> None:
-        """Forget the payload of a failed try: it was given up, or another one goes first."""
+        """Discard the payload of a failed try: it was given up, or another one goes first."""
         if self._loaded is not None:
             self._loaded = None
             self._link.command(Command.FLUSH_TX)
@@ -247,7 +248,7 @@ class Transceiver:
         self._runtime.sleep(CE_TO_CSN_S)
 
     def _pulse(self, expected_s: float) -> int:
-        """Send the payload; returns TX_DS or MAX_RT. RadioError if neither comes in time."""
+        """Send the payload; returns TX_DS or MAX_RT. RadioError if neither appears in time."""
         self._ce.value = True
         self._runtime.sleep(CE_PULSE_S)
         self._ce.value = False
@@ -260,5 +261,5 @@ class Transceiver:
                 return flags
             if self._runtime.now_s() > deadline_s:
                 raise RadioError("the chip reported neither success nor failure within 95 ms")
-            # The next attempt of the chip cannot be over any sooner.
+            # The chip's next attempt cannot end sooner.
             self._runtime.sleep(ard_s(self._retries[0]))

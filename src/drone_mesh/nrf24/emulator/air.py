@@ -1,9 +1,8 @@
 """The air: frames on their way from one chip to the others.
 
-A frame is received by chips that listened on its channel and rate from before its start to its
-end. Two frames that overlap on one channel destroy each other at a receiver, unless
-one is stronger by the capture ratio. Neighbouring channels do not disturb each other, and the
-speed of light is infinite.
+A frame is received by chips that listened on its channel and rate from before its start to its end.
+Two frames that overlap on one channel destroy each other at a receiver, unless one is stronger by
+the capture ratio. Neighbouring channels do not interfere, and the speed of light is infinite.
 """
 
 from __future__ import annotations
@@ -19,23 +18,23 @@ from drone_mesh.nrf24.emulator.links import Hop, LinkModel
 
 CAPTURE_DB = {250_000: 12.0, 1_000_000: 9.0, 2_000_000: 7.0}  # co-channel C/I [DS 5.7]
 RPD_DBM = -64.0  # [DS 6.4]
-RPD_NS = 40_000  # power must last that long to be noticed [DS 6.4]
+RPD_NS = 40_000  # the least duration of power that is detected [DS 6.4]
 
 Position = Tuple[float, float, float]  # metres
 
 
 class Antenna(Protocol):
-    """What the air sees of a chip."""
+    """A chip as seen by the air."""
 
     name: str
     position: Position
     listening_since_ns: int | None  # None: it does not listen
 
     def recognises(self, frame: Frame) -> bool:
-        """Whether the frame begins with an address that the chip looks for now."""
+        """Whether the frame starts with an address that the chip is listening for."""
 
     def frame_arrived(self, frame: Frame, power_dbm: float) -> None:
-        """A frame that it recognises has ended, its bits perhaps damaged."""
+        """A recognised frame has ended; its bits may be damaged."""
 
     def frame_left(self) -> None:
         """The chip's own frame has ended."""
@@ -63,7 +62,7 @@ class Flight:
         self.start_ns, self.end_ns = span_ns
         self.packet = packet  # see links.Hop
         self.aborted = False
-        self.others: list[Flight] = []  # that overlap with it on the channel
+        self.others: list[Flight] = []  # overlapping frames on the channel
         self.listeners: Sequence[Antenna] = ()
 
 
@@ -81,7 +80,7 @@ class Air:
         self._on_channel: dict[int, list[Flight]] = {}
         self._distances: dict[tuple[Antenna, Antenna], float] = {}
         self._observers: list[FlightObserver] = []
-        self.frames = 0  # that have been on the air
+        self.frames = 0  # frames sent so far
         self.airtime_s = 0.0  # of all frames together
         self.collisions = 0  # frames that a receiver lost because of another frame
 
@@ -99,19 +98,19 @@ class Air:
         self._distances.clear()
 
     def listen(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:
-        """The antenna hears frames that begin from now on."""
+        """The antenna receives frames that start from now on."""
         antenna.listening_since_ns = self.clock.now_ns
         self._listening.setdefault((channel, bits_per_s), {})[antenna] = None
 
     def stop_listening(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:
-        """The antenna hears no more frames, nor the one on the air now."""
+        """The antenna receives no more frames, nor the current one."""
         antenna.listening_since_ns = None
         self._listening[channel, bits_per_s].pop(antenna, None)
 
     def transmit(
         self, sender: Antenna, frame: Frame, radio: tuple[int, int, float], packet: object
     ) -> Flight:
-        """Put a frame on the air now; `radio`: channel, bits per second, dBm."""
+        """Start sending a frame now; `radio`: channel, bits per second, dBm."""
         start_ns = self.clock.now_ns
         end_ns = start_ns + frame.bit_count * 1_000_000_000 // radio[1]
         flight = Flight(sender, frame, radio, (start_ns, end_ns), packet)
@@ -125,13 +124,13 @@ class Air:
         return flight
 
     def abort(self, flight: Flight) -> None:
-        """The sender lost its power in mid-frame: no receiver can decode it."""
+        """The sender lost power during the frame, so no receiver can decode it."""
         flight.aborted = True
         flight.end_ns = self.clock.now_ns
         self._on_channel[flight.channel].remove(flight)
 
     def energy_dbm(self, antenna: Antenna, channel: int, since_ns: int) -> float:
-        """The strongest frame on the channel that has lasted long enough to be noticed."""
+        """Power of the strongest frame on the channel that lasted long enough to be detected."""
         enough_ns = self.clock.now_ns - RPD_NS
         return max(
             (
@@ -143,7 +142,7 @@ class Air:
         )
 
     def recognised_until_ns(self, antenna: Antenna, channel: int, address_bits: int) -> int | None:
-        """End of a frame on the air that the antenna recognises, already past its address."""
+        """End of a frame that the antenna has recognised, whose address has passed; else None."""
         since_ns = antenna.listening_since_ns
         for flight in self._on_channel.get(channel, ()):
             passed_ns = flight.start_ns + address_bits * 1_000_000_000 // flight.bits_per_s
@@ -165,7 +164,7 @@ class Air:
         self.frames += 1
         self.airtime_s += (flight.end_ns - flight.start_ns) / NS_PER_S
         self._on_channel[flight.channel].remove(flight)
-        # First the sender: it must be listening when the answer to its frame begins.
+        # The sender first: it must be listening when the answer to its frame starts.
         flight.sender.frame_left()
         for antenna in flight.listeners:
             since_ns = antenna.listening_since_ns
@@ -204,7 +203,7 @@ class Air:
 
     def _power_dbm(self, flight: Flight, antenna: Antenna) -> float:
         if flight.sender is antenna:
-            return -math.inf  # its own: it did not listen then
+            return -math.inf  # its own frame, during which it did not listen
         distance_m = self._distance_m(flight.sender, antenna)
         return self._links.received_dbm(distance_m, flight.tx_dbm, 2400 + flight.channel)
 

@@ -1,8 +1,8 @@
-"""What a process and the server of an emulated air exchange over TCP.
+"""The TCP protocol between a process and the server of an emulated air.
 
 A request is an opcode, the length of its data and the data; the answer is the length of its data
-and the data. A connection carries one request at a time. The first connection of a process makes
-its chip; a second one waits for the chip's IRQ pin, since waiting blocks a connection.
+and the data. A connection carries one request at a time. The first connection of a process creates
+its chip; a second one waits for the chip's IRQ pin, because waiting blocks a connection.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ TIMEOUT_S = struct.Struct("<f")
 
 
 class Opcode(enum.IntEnum):
-    """What a request asks for."""
+    """The kinds of requests."""
 
     MAKE_CHIP = 1  # answered with the chip's number
     JOIN_CHIP = 2  # for its IRQ; answered with nothing

@@ -1,6 +1,6 @@
 """AirServer: chips on an emulated air for other processes, which may come and go.
 
-A process that ends, however it ends, takes its chip with it: the chip loses its supply.
+When a process ends for any reason, its chip loses its supply.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from drone_mesh.nrf24.emulator.air_protocol import (
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 
 MOST_CHIPS = 64  # our choice: more than one machine can emulate
-LONGEST_WAIT_S = 1.0  # our choice: a thread that waits for an IRQ looks for its end so often
+LONGEST_WAIT_S = 1.0  # our choice: how often a thread that waits for an IRQ checks whether to end
 
 _log = logging.getLogger(__name__)
 
 
 class AirServer:
-    """Listens from its creation to `close`; each connection has a thread of its own.
+    """Accepts connections from creation to `close`; each connection has its own thread.
 
-    `_lock` guards the chips and the connections; the chips themselves are guarded by their clock.
+    `_lock` guards the chips and the connections; the clock guards the chips themselves.
     """
 
     def __init__(self, air: Air, host: str, port: int) -> None:

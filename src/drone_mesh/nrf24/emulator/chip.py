@@ -1,8 +1,8 @@
-"""An nRF24L01+ in software: its power states and CE, and its engines put together.
+"""An nRF24L01+ in software: its power states and CE, and its engines combined.
 
-The transmitter (PTX), the receiver (PRX) and the SPI commands have modules of their own, and share
-what is in `chip_core.py`. Only the holder of the clock's access may touch the chip. Misuse is never
-refused, only recorded in `warnings`.
+The transmitter (PTX), the receiver (PRX) and the SPI commands have their own modules and share
+`chip_core.py`. Only the holder of the clock's access may touch the chip. Misuse is never refused,
+only recorded in `warnings`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from drone_mesh.nrf24.emulator.transmitter import Transmitter
 
 
 class EmulatedChip(ChipCore):
-    """One chip at one place, switched on long ago: in power down, registers as after reset."""
+    """One chip at one position, powered long ago: in power down, registers as after reset."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class EmulatedChip(ChipCore):
         self.spi = EmulatedSpiDev(self.clock, self)
 
     def brown_out(self) -> None:
-        """The supply fails for a moment: everything is as after power-on."""
+        """The supply fails briefly: everything is as after power-on."""
         with self.clock.access():
             self.abort()
             self.registers.reset()

@@ -1,7 +1,7 @@
-"""What the engines and the SPI commands of an emulated chip share.
+"""The common part of the engines and SPI commands of an emulated chip.
 
-Registers, FIFOs, flags, the state, timers and the antenna. `chip.py` decides on power states; the
-receiver, the transmitter and the commands work on this, and do not know the whole chip.
+Registers, FIFOs, flags, the state, timers and the antenna. `chip.py` decides on power states;
+receiver, transmitter and commands use this class and do not depend on the whole chip.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from drone_mesh.nrf24.registers import RX_FIFO_IS_EMPTY, RX_P_NO
 
 
 class ChipCore(abc.ABC):
-    """One chip at one place, as far as its engines need it. An `air.Antenna`."""
+    """The part of a chip that its engines need. An `air.Antenna`."""
 
     def __init__(self, air: Air, name: str, position: Position, variant: ChipVariant) -> None:
         self.air = air
@@ -35,14 +35,14 @@ class ChipCore(abc.ABC):
         self.registers = RegisterBank(variant.plus)
         self.rx_fifo = RxFifo(variant.partial_read_removes)
         self.tx_fifo = TxFifo()
-        self.flags = 0  # RX_DR, TX_DS and MAX_RT, where they stand in STATUS
+        self.flags = 0  # RX_DR, TX_DS and MAX_RT, at their positions in STATUS
         self.state = State.POWER_DOWN
         self.listening_since_ns: int | None = None
         self._listening_to = (0, 0)  # channel and rate
-        self.flight: Flight | None = None  # the own frame that is on the air
+        self.flight: Flight | None = None  # its own frame on the air
         self.ce_rose_ns = -SETTLING_NS
         self._epoch = 0  # timers of an earlier epoch are void
-        self._rpd_latched: bool | None = False  # None: as the channel is now
+        self._rpd_latched: bool | None = False  # None: the current state of the channel
         self.ce = EmulatedCe(self.clock, self._ce_changed)
         self.irq = EmulatedIrq(self.clock)
 
@@ -51,7 +51,7 @@ class ChipCore(abc.ABC):
 
     @property
     def position(self) -> Position:
-        """Where its antenna is, in metres."""
+        """The position of its antenna, in metres."""
         return self._position
 
     @position.setter
@@ -62,12 +62,12 @@ class ChipCore(abc.ABC):
                 self.air.moved()
 
     def warn(self, text: str) -> None:
-        """Record a misuse, once."""
+        """Record a misuse once."""
         if text not in self._warned:
             self._warned.add(text)
             self.warnings.append(text)
 
-    # -- what the whole chip decides ------------------------------------------------------------
+    # -- decided by the whole chip --------------------------------------------------------------
 
     @abc.abstractmethod
     def settle(self) -> None:
@@ -79,20 +79,20 @@ class ChipCore(abc.ABC):
 
     @abc.abstractmethod
     def frame_arrived(self, frame: Frame, power_dbm: float) -> None:
-        """A frame that it recognises has ended, its bits perhaps damaged."""
+        """A recognised frame has ended; its bits may be damaged."""
 
     @abc.abstractmethod
     def frame_left(self) -> None:
-        """The own frame has ended."""
+        """The chip's own frame has ended."""
 
     @abc.abstractmethod
     def _ce_changed(self, high: bool) -> None:
-        """The CE pin has another level."""
+        """The level of the CE pin has changed."""
 
     # -- flags ---------------------------------------------------------------------------------
 
     def status(self) -> int:
-        """The STATUS register as it is now."""
+        """The current STATUS register."""
         oldest = self.rx_fifo.oldest
         pipe = RX_FIFO_IS_EMPTY if oldest is None else oldest.pipe
         return self.flags | pipe << RX_P_NO.lsb | self.tx_fifo.full
@@ -116,7 +116,7 @@ class ChipCore(abc.ABC):
     # -- timers ------------------------------------------------------------------------------
 
     def after(self, delay_ns: int, step: Callable[[], None]) -> None:
-        """Schedule the next step of the current activity, unless it is overtaken."""
+        """Schedule the next step of the current activity, unless it is cancelled before."""
         self.clock.call_at(self.clock.now_ns + delay_ns, self._step, self._epoch, step)
 
     def _step(self, epoch: int, step: Callable[[], None]) -> None:
@@ -137,7 +137,7 @@ class ChipCore(abc.ABC):
         self.air.listen(self, *self._listening_to)
 
     def stop_listening(self) -> None:
-        """The receiver is switched off; RPD keeps what it saw last."""
+        """The receiver is switched off; RPD keeps its last value."""
         if self.listening_since_ns is not None:
             self._rpd_latched = self.rpd()
             self.air.stop_listening(self, *self._listening_to)
@@ -149,7 +149,7 @@ class ChipCore(abc.ABC):
             self.listen(self.state)
 
     def rpd(self) -> bool:
-        """Received power detector: more than -64 dBm now, or when a packet came, or at the end."""
+        """Received power detector: above -64 dBm now, when a packet arrived, or at the end."""
         if self._rpd_latched is not None:
             return self._rpd_latched
         if self.listening_since_ns is None:
@@ -158,7 +158,7 @@ class ChipCore(abc.ABC):
         return self.air.energy_dbm(self, channel, self.listening_since_ns) > RPD_DBM
 
     def transmit(self, frame: Frame, packet: object) -> None:
-        """Put a frame on the air; `frame_left` is called at its end."""
+        """Send a frame; `frame_left` is called at its end."""
         registers = self.registers
         power_dbm = -300.0 if self.faults.dead_transmitter else float(registers.tx_dbm)
         radio = (registers.channel, registers.bits_per_s, power_dbm)
@@ -176,7 +176,7 @@ class ChipCore(abc.ABC):
         return address in registers.pipe_of_address
 
     def abort(self) -> None:
-        """Stop whatever is going on, on the air too."""
+        """Stop all activity, including a frame on the air."""
         self.overtake()
         self.stop_listening()
         if self.flight is not None:
@@ -184,11 +184,11 @@ class ChipCore(abc.ABC):
             self.flight = None
 
     def latch_rpd(self, strong: bool) -> None:
-        """A valid packet came: RPD shows its power, also that of a weak one after a strong one."""
+        """A valid packet arrived: RPD shows its power, even if a stronger one came before."""
         self._rpd_latched = strong
 
     def recognised_until_ns(self) -> int | None:
-        """End of the frame that is coming in and was recognised; None: there is none."""
+        """End of the incoming recognised frame, or None."""
         registers = self.registers
         address_bits = PREAMBLE_BITS + 8 * registers.address_bytes
         return self.air.recognised_until_ns(self, registers.channel, address_bits)

@@ -13,12 +13,12 @@ from drone_mesh.nrf24.runtime import Runtime, Signal
 
 
 class EmulatorClock(abc.ABC):
-    """Time of one air, its queue of events, and the right to touch its chips."""
+    """The time of one air, its event queue, and the exclusive access to its chips."""
 
     @property
     @abc.abstractmethod
     def now_ns(self) -> int:
-        """Time of the air. Within an event: the time for which the event was meant."""
+        """Time of the air. Within an event: the time for which the event was scheduled."""
 
     @property
     @abc.abstractmethod
@@ -31,11 +31,11 @@ class EmulatorClock(abc.ABC):
 
     @abc.abstractmethod
     def access(self) -> ContextManager[object]:
-        """Held while code outside the air touches a chip; no event runs meanwhile."""
+        """Held while code outside the air accesses a chip; no event runs meanwhile."""
 
     @abc.abstractmethod
     def elapse(self, duration_ns: int) -> None:
-        """An SPI transfer takes that long. Called without access."""
+        """An SPI transfer takes this long. Called without access."""
 
     @abc.abstractmethod
     def signal(self) -> Signal:

@@ -38,7 +38,7 @@ class CommandDecoder:
         self._advanced_unlocked = chip.variant.plus
 
     def execute(self, mosi: bytes) -> bytes:
-        """The bytes that go out while those after the command come in."""
+        """Execute a command; returns the bytes that leave while those after the command arrive."""
         command, data = mosi[0], mosi[1:]
         if command < Command.W_REGISTER:
             return self._read(command & _REGISTER_MASK, len(data))
@@ -60,7 +60,7 @@ class CommandDecoder:
         if command == Command.W_TX_PAYLOAD:
             self._load(data, no_ack=False)
         elif command == Command.W_TX_PAYLOAD_NO_ACK:
-            # Without EN_DYN_ACK silicon sends an ordinary packet that is acknowledged.
+            # Without EN_DYN_ACK, silicon sends an ordinary packet with acknowledgement.
             self._load(data, no_ack=chip.registers.dynamic_ack)
         elif Command.W_ACK_PAYLOAD <= command < Command.W_ACK_PAYLOAD + PIPES:
             if not chip.registers.ack_payloads:

@@ -10,12 +10,12 @@ from drone_mesh.nrf24.registers import FIFO_DEPTH
 
 @dataclass(eq=False)
 class Outgoing:
-    """A payload in the TX FIFO; packets are distinguished by the object itself."""
+    """A payload in the TX FIFO; object identity distinguishes packets."""
 
     payload: bytes
     pid: int = 0
     no_ack: bool = False
-    ack_pipe: int | None = None  # rides on an acknowledgement of that pipe
+    ack_pipe: int | None = None  # to be sent in an acknowledgement on that pipe
     was_sent: bool = False  # an ack payload that was sent, perhaps without success
     _frame: Frame | None = None
     _made_for: object = None
@@ -39,7 +39,7 @@ class Incoming:
 
 
 class RxFifo:
-    """What was received and not yet read."""
+    """Received payloads that were not read yet."""
 
     def __init__(self, partial_read_removes: bool) -> None:
         self._partial_read_removes = partial_read_removes
@@ -65,9 +65,9 @@ class RxFifo:
         self._payloads.clear()
 
     def read(self, count: int) -> bytes:
-        """R_RX_PAYLOAD: what leaves the chip while `count` bytes are clocked out.
+        """R_RX_PAYLOAD: the bytes that leave the chip while `count` bytes are clocked.
 
-        Past the end of a payload the next one follows; in an empty FIFO the last byte is repeated.
+        After the end of a payload the next one follows; an empty FIFO repeats the last byte.
         """
         out = b""
         while self._payloads and len(out) < count:
@@ -82,7 +82,7 @@ class RxFifo:
 
 
 class TxFifo:
-    """What is to be sent: payloads of a transmitter, ack payloads of a receiver."""
+    """Payloads to send: those of a transmitter, or ack payloads of a receiver."""
 
     def __init__(self) -> None:
         self._payloads: list[Outgoing] = []
@@ -99,18 +99,18 @@ class TxFifo:
         return self._payloads[0] if self._payloads else None
 
     def push(self, outgoing: Outgoing) -> bool:
-        """False: it is full, and the payload is lost."""
+        """Add a payload. False: the FIFO is full, and the payload is lost."""
         if self.full:
             return False
         self._payloads.append(outgoing)
         return True
 
     def push_back(self, outgoing: Outgoing) -> None:
-        """REUSE_TX_PL: have the payload that was sent last in front again."""
+        """REUSE_TX_PL: put the payload that was sent last in front again."""
         self._payloads.insert(0, outgoing)
 
     def remove(self, outgoing: Outgoing) -> None:
-        """It was sent; nothing happens if it was flushed meanwhile."""
+        """Remove a sent payload; ignored if it was flushed meanwhile."""
         if outgoing in self._payloads:
             self._payloads.remove(outgoing)
 
@@ -118,5 +118,5 @@ class TxFifo:
         self._payloads.clear()
 
     def for_pipe(self, pipe: int) -> Outgoing | None:
-        """The oldest ack payload for a pipe."""
+        """The oldest ack payload for a pipe, or None."""
         return next((out for out in self._payloads if out.ack_pipe == pipe), None)

@@ -1,11 +1,11 @@
-"""Frames, bit by bit as they are on the air [DS 7.3].
+"""Frames as bits on the air [DS 7.3].
 
     preamble 8 | address 16..40 | PCF 9 | payload 0..256 | CRC 0, 8 or 16
 
-everything MSBit first, the address from its most significant byte. The packet control field is 6
-bits length, 2 bits PID, 1 bit NO_ACK; frames of plain ShockBurst have none. The CRC covers
-address, PCF and payload. CRC16 and the order of the bits are pinned to silicon by
-acknowledgements that were recorded on a real chip; see the tests.
+with everything MSBit first and the address from its most significant byte. The packet control field
+is 6 bits length, 2 bits PID, 1 bit NO_ACK; plain ShockBurst frames have none. The CRC covers
+address, PCF and payload. Acknowledgements recorded on a real chip confirm CRC16 and the bit order;
+see the tests.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from drone_mesh.nrf24.airtime import PCF_BITS, PREAMBLE_BITS
 
-STATIC_LENGTH_FIELD = 0x33  # what silicon sends in the length field while DPL is off
+STATIC_LENGTH_FIELD = 0x33  # the length field that silicon sends while DPL is off
 _CRC8_POLYNOMIAL = 0x07  # x^8 + x^2 + x + 1, initial value 0xFF
 _CRC16_POLYNOMIAL = 0x1021  # x^16 + x^12 + x^5 + 1, initial value 0xFFFF
 
@@ -58,17 +58,17 @@ def frame_crc(address: bytes, control: int | None, payload: bytes, crc_bytes: in
 
 
 class FrameFormat(NamedTuple):
-    """What one must know to find the parts of a frame: how a receiver's pipe is configured."""
+    """The configuration of a receiver's pipe, which determines the parts of a frame."""
 
     address_bytes: int
     crc_bytes: int
     enhanced: bool  # with packet control field
-    payload_bytes: int | None  # None: the length field says it
+    payload_bytes: int | None  # None: given by the length field
 
 
 @dataclass(frozen=True)
 class Packet:
-    """The parts of a frame, as found by a receiver."""
+    """The parts of a frame, as a receiver decodes them."""
 
     pid: int
     no_ack_bit: int  # as it is on the air
@@ -77,7 +77,7 @@ class Packet:
 
 
 class Frame:
-    """A row of bits. It remembers what it was found to mean, for one frame has many receivers."""
+    """A sequence of bits. Caches how it was decoded, because a frame has many receivers."""
 
     __slots__ = ("_addresses", "_packets", "bit_count", "bits")
 
@@ -107,12 +107,12 @@ class Frame:
             crc = frame_crc(address, control, payload, form.crc_bytes)
             bits = bits << 8 * form.crc_bytes | crc
         frame = cls(bits, count + 8 * (len(payload) + form.crc_bytes))
-        # A receiver with the same configuration finds what was put in: no need to check again.
+        # A receiver with the same configuration decodes the same packet: cache it.
         frame._packets[form] = Packet(pid, no_ack_bit, payload, crc)
         return frame
 
     def address(self, address_bytes: int) -> int:
-        """What a receiver with that address width sees as the address, as a number."""
+        """The address, as a number, for a receiver with this address width."""
         address = self._addresses.get(address_bytes)
         if address is None:
             width = 8 * address_bytes
@@ -121,7 +121,7 @@ class Frame:
         return address
 
     def decode(self, form: FrameFormat) -> Packet | None:
-        """What a receiver with that configuration finds; None if the CRC is wrong for it."""
+        """The packet that a receiver with this configuration decodes; None if the CRC is wrong."""
         try:
             return self._packets[form]
         except KeyError:
@@ -136,7 +136,7 @@ class Frame:
         return Frame(bits, self.bit_count)
 
     def to_bytes(self) -> bytes:
-        """The bits from the first to the last, filled up with zeros to whole bytes."""
+        """The bits from first to last, padded with zeros to whole bytes."""
         padding = -self.bit_count % 8
         return (self.bits << padding).to_bytes((self.bit_count + padding) // 8, "big")
 

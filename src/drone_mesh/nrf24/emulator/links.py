@@ -1,7 +1,7 @@
-"""How strong a frame arrives, and how many of its bits are wrong.
+"""Link models: the strength of a received frame, and its number of wrong bits.
 
-Models may be scaled: a world of a few metres can be given a radio whose reach ends where that of
-the ideal disc would, without changing what happens near the edge.
+Models may be scaled: a world of a few metres can have a radio whose range ends where that of the
+ideal disc would, without changing the behaviour near the edge.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from drone_mesh.nrf24.airtime import NS_PER_S
 SENSITIVITY_DBM = {250_000: -94.0, 1_000_000: -85.0, 2_000_000: -82.0}  # at 0.1 % BER [DS 5.7]
 _FSPL_CONSTANT_DB = -27.55  # free space, metres and MHz (ITU-R P.525)
 _NEAREST_M = 0.1  # antennas may share a point; log10(0) may not
-_ADDRESS_LOST_BER = 0.1  # our choice: with more wrong bits the address is not recognised either
-_SAME_POINT_DBM = 0.0  # the strongest input that is specified [DS 5.7]
+_ADDRESS_LOST_BER = 0.1  # our choice: with more wrong bits not even the address is recognised
+_SAME_POINT_DBM = 0.0  # the strongest specified input [DS 5.7]
 
 
 class Hop(NamedTuple):
-    """One frame on its way to one receiver."""
+    """The path of one frame to one receiver."""
 
     sender: Hashable
     receiver: Hashable
@@ -38,26 +38,26 @@ class LinkModel(abc.ABC):
 
     @abc.abstractmethod
     def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
-        """Power at the receiver; decides which of overlapping frames survives, and RPD."""
+        """Power at the receiver; decides which overlapping frame survives, and RPD."""
 
     @abc.abstractmethod
     def bit_errors(self, hop: Hop) -> int | None:
-        """How many bits arrive wrong; None: the receiver does not notice the frame at all."""
+        """The number of wrong bits; None: the receiver does not notice the frame at all."""
 
     def reaches(self, distance_m: float, power_dbm: float, bits_per_s: int) -> bool:
-        """Whether a frame can arrive over that distance at all, with luck; True if unknown."""
+        """Whether a frame can arrive over that distance at all; True if unknown."""
         return True
 
 
 def free_space_dbm(distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
-    """Power between isotropic antennas (ITU-R P.525); 40.06 dB are lost on 1 m at 2401 MHz."""
+    """Power between isotropic antennas (ITU-R P.525); 40.06 dB loss over 1 m at 2401 MHz."""
     distance_m = max(distance_m, _NEAREST_M)
     loss_db = 20 * math.log10(distance_m) + 20 * math.log10(carrier_mhz) + _FSPL_CONSTANT_DB
     return min(tx_dbm - loss_db, _SAME_POINT_DBM)
 
 
 class IdealDisc(LinkModel):
-    """All frames arrive within a range, none beyond."""
+    """All frames arrive within the range, none beyond it."""
 
     def __init__(self, range_m: float = math.inf) -> None:
         self._range_m = range_m
@@ -73,12 +73,12 @@ class IdealDisc(LinkModel):
 
 
 def bit_error_rate(margin_db: float) -> float:
-    """Share of wrong bits at so many dB above the sensitivity; 0.1 % at 0 dB, as specified."""
+    """Share of wrong bits at this margin above the sensitivity; 0.1 % at 0 dB, as specified."""
     return 0.5 * math.exp(-6.215 * 10 ** (margin_db / 10))
 
 
 class LogDistance(LinkModel):
-    """Power falls with a power of the distance; bits go wrong near the receiver's sensitivity."""
+    """Power falls with a power of the distance; bits get wrong near the receiver's sensitivity."""
 
     def __init__(
         self,
@@ -103,9 +103,9 @@ class LogDistance(LinkModel):
         exponent: float = 2.7,
         bits_per_s: int = 250_000,
     ) -> LogDistance:
-        """Distances are stretched so that at `range_m` the power is the sensitivity at that rate.
+        """Scale distances so that at `range_m` the power equals the sensitivity at that rate.
 
-        About one frame in four is lost there, when it is sent with 0 dBm.
+        At that distance about one frame in four sent with 0 dBm is lost.
         """
         model = cls(rng, exponent=exponent)
         at_1_m_dbm = model.received_dbm(1.0, 0.0, 2401)
@@ -132,7 +132,7 @@ class LogDistance(LinkModel):
 
 
 class ScriptedLoss(LinkModel):
-    """Another model, with some frames lost on demand, for tests and experiments."""
+    """Another model with additional losses on demand, for tests and experiments."""
 
     def __init__(self, model: LinkModel, loses: Callable[[Hop], bool]) -> None:
         self._model = model
@@ -149,16 +149,15 @@ class ScriptedLoss(LinkModel):
 
 
 class LossCurve(LinkModel):
-    """Packets get lost as often as was measured over distance.
+    """Packets are lost as often as measured at each distance.
 
-    What was measured is the share of packets that were lost after 16 frames, and the time that a
-    packet took. Independent losses cannot explain both: they would have to be so frequent that
-    every packet took long. So there are two kinds here. A link fails for `BURST_S` at a time, as
-    often as packets were lost: that loses all frames of a transaction of the chip, and another try
-    after a pause finds the link as it is then. And between the bursts, single frames get lost as
-    often as the packets took longer than their bursts explain. Acknowledgements of a packet that
-    came are not lost. Beyond the last distance nothing was measured, and nothing arrives; below the
-    first, the shares are those of the first.
+    The measurements are the share of packets that were lost after 16 frames, and the duration of a
+    packet. Independent losses cannot explain both: they would have to be so frequent that every
+    packet took long. So there are two kinds here. A link fails for `BURST_S` at a time, as often as
+    packets were lost: that loses all frames of a transaction of the chip, and a retry after a pause
+    meets a new state of the link. Between the bursts, single frames are lost as often as the bursts
+    leave packet durations unexplained. Acknowledgements of received packets are not lost. Beyond
+    the last distance nothing was measured and nothing arrives; below the first, its shares apply.
     """
 
     BURST_S = 0.05  # our choice: just longer than 16 frames at 250 kbit/s
@@ -186,18 +185,18 @@ class LossCurve(LinkModel):
 
     @property
     def range_m(self) -> float:
-        """The range; no frame arrives beyond."""
+        """The range; no frame arrives beyond it."""
         return self._points[-1][0] / self._scale
 
     def loss(self, distance_m: float) -> float | None:
-        """Share of lost packets, straight lines between the points; None: out of range."""
+        """Share of lost packets, linear between the points; None: out of range."""
         metres = distance_m * self._scale
         if metres > self._points[-1][0]:
             return None
         return _between(self._points, metres)
 
     def frame_loss(self, distance_m: float) -> float:
-        """Share of single frames that are lost between the bursts."""
+        """Share of single frames lost between the bursts."""
         return _between(self._frame_points, distance_m * self._scale)
 
     def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
@@ -224,7 +223,7 @@ class LossCurve(LinkModel):
 
 
 def _between(points: tuple[tuple[float, float], ...], metres: float) -> float:
-    """On straight lines between the points; level before the first and after the last."""
+    """Linear between the points; constant before the first and after the last."""
     last_m, last_value = points[0]
     for point_m, value in points:
         if metres <= point_m:

@@ -1,4 +1,4 @@
-"""The range that was measured in 2019 with real modules, as a loss curve."""
+"""The range measured in 2019 with real modules, as a loss curve."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from drone_mesh.nrf24.settings import RadioSettings
 
 RANGE_FILE = Path(__file__).with_name("nrf24_range.csv")
 _PACKETS_PER_RUN = 1000
-_NEAR_M = 300.0  # up to there the distance made no difference to the throughput
+_NEAR_M = 300.0  # up to this distance the throughput was constant
 
 
 def measured_losses(path: Path = RANGE_FILE) -> tuple[tuple[float, float], ...]:
-    """Distance in metres and mean share of packets that were lost after all retries."""
+    """Distance in metres and mean share of packets lost after all retries."""
     return tuple(
         (distance_m, lost / _PACKETS_PER_RUN)
         for distance_m, lost in _means(path, "packets_lost_of_1000")
@@ -25,10 +25,10 @@ def measured_losses(path: Path = RANGE_FILE) -> tuple[tuple[float, float], ...]:
 
 
 def measured_frame_losses(path: Path = RANGE_FILE) -> tuple[tuple[float, float], ...]:
-    """Distance in metres and the share of single frames that must have been lost besides.
+    """Distance in metres and the additional share of lost single frames.
 
-    From the throughput: the time of a packet grew beyond what near ones took. Lost packets took the
-    16 frames of their bursts; the rest are retransmissions of packets that arrived.
+    Derived from the throughput: packets took longer than near ones. Lost packets took the 16 frames
+    of their bursts; the rest are retransmissions of packets that arrived.
     """
     settings = RadioSettings(crc_bytes=1)  # of 2019
     frame_ns = round(settings.frame_s * NS_PER_S)
@@ -52,7 +52,7 @@ def measured_frame_losses(path: Path = RANGE_FILE) -> tuple[tuple[float, float],
 
 
 def measured_curve(rng: random.Random, *, range_m: float | None = None) -> LossCurve:
-    """The measured modules; with `range_m`, shrunk or stretched so that their range ends there."""
+    """The measured modules; with `range_m`, scaled so that their range ends there."""
     points = measured_losses()
     scale = 1.0 if range_m is None else points[-1][0] / range_m
     return LossCurve(points, rng, frame_points=measured_frame_losses(), metres_per_metre=scale)

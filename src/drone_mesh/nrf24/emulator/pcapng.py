@@ -1,4 +1,4 @@
-"""Just enough of pcapng to write packets with comments (IETF draft-ietf-opsawg-pcapng).
+"""A minimal pcapng writer for packets with comments (IETF draft-ietf-opsawg-pcapng).
 
 Our own because it is short and the libraries mainly read (docs/decisions/own-code.md).
 """
@@ -45,7 +45,7 @@ def _block(kind: int, body: bytes) -> bytes:
 
 
 class PcapngWriter:
-    """A file with one section and one interface; each packet is in it when `write` returns."""
+    """A file with one section and one interface; `write` returns once its packet is in the file."""
 
     def __init__(self, path: Path, link_type: int, interface: str) -> None:
         """Raises OSError."""
@@ -67,12 +67,12 @@ class PcapngWriter:
         self._file.write(_block(_ENHANCED_PACKET, head + _padded(packet.data) + comment))
 
     def close(self) -> None:
-        """No more packets follow."""
+        """Close the file."""
         self._file.close()
 
 
 def write_pcapng(path: Path, packets: Iterable[CapturedPacket]) -> None:
-    """A file of frames on the emulated air. Raises OSError."""
+    """Write a file of frames on the emulated air. Raises OSError."""
     with contextlib.closing(PcapngWriter(path, LINKTYPE_FRAMES, "emulated air")) as writer:
         for packet in packets:
             writer.write(packet)

@@ -1,4 +1,4 @@
-"""The two pins of an emulated chip beside SPI."""
+"""The CE and IRQ pins of an emulated chip."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drone_mesh.nrf24.emulator.clock import EmulatorClock
 
 
 class EmulatedCe:
-    """Chip enable, an output of the host. Usable like a DigitalInOut of CircuitPython, too."""
+    """Chip enable, an output of the host. Also usable as a DigitalInOut of CircuitPython."""
 
     def __init__(self, clock: EmulatorClock, changed: Callable[[bool], None]) -> None:
         self._clock = clock
@@ -32,17 +32,17 @@ class EmulatedCe:
         self.value = value
 
     def close(self) -> None:
-        """Nothing to release; the level stays."""
+        """Does nothing; the level stays."""
 
 
 class EmulatedIrq:
-    """Interrupt request, an input of the host: low while a flag that is not masked is set."""
+    """Interrupt request, an input of the host: low while an unmasked flag is set."""
 
     def __init__(self, clock: EmulatorClock) -> None:
         self._clock = clock
         self._signal = clock.signal()
         self._value = True
-        self.fell_ns: int | None = None  # when it went low last
+        self.fell_ns: int | None = None  # when it last went low
 
     @property
     def value(self) -> bool:
@@ -50,11 +50,11 @@ class EmulatedIrq:
         return self._value
 
     def wait_low(self, timeout_s: float) -> bool:
-        """Wait until the pin is low; False if it is still high after the time-out."""
+        """Wait until the pin is low; returns False if it is still high after the time-out."""
         return self._signal.wait_for(lambda: not self._value, timeout_s)
 
     def set(self, high: bool) -> None:
-        """The chip drives the pin; called with access."""
+        """Set the level, by the chip; called with access."""
         if high != self._value:
             self._value = high
             if not high:
@@ -62,4 +62,4 @@ class EmulatedIrq:
                 self._signal.notify()
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Does nothing."""

@@ -9,9 +9,9 @@ from drone_mesh.nrf24.airtime import POWER_UP_NS
 
 @dataclass(frozen=True)
 class ChipVariant:
-    """Properties of a piece of silicon. The defaults are those of a genuine nRF24L01+.
+    """Properties of a chip. The defaults are those of a genuine nRF24L01+.
 
-    Where no source settles a behaviour, there is a switch.
+    There is a switch for each behaviour that no source settles.
     """
 
     plus: bool = True  # False: no 250 kbit/s; ACTIVATE 0x73 must unlock FEATURE and DYNPD
@@ -23,7 +23,7 @@ class ChipVariant:
 
 @dataclass
 class Faults:
-    """The present faults; may be changed at any time."""
+    """The current faults; may be changed at any time."""
 
     miso_stuck_at: int | None = None  # 0x00 or 0xFF: nothing answers, or nothing is connected
     irq_stuck_at: bool | None = None  # level of the pin

@@ -13,7 +13,7 @@ _NOTHING_YET = (-1, -1)
 
 
 class Receiver:
-    """Takes frames that are addressed to one of its pipes, and acknowledges them."""
+    """Accepts frames addressed to its pipes, and acknowledges them."""
 
     def __init__(self, chip: ChipCore) -> None:
         self._chip = chip
@@ -24,7 +24,7 @@ class Receiver:
         self._chip.listen(State.RX)
 
     def frame_arrived(self, frame: Frame) -> bool:
-        """A frame with the address of an open pipe; True if it was valid there."""
+        """A frame with the address of an open pipe arrived; returns whether it was valid there."""
         chip, registers = self._chip, self._chip.registers
         pipe = registers.pipe_of_address[frame.address(registers.address_bytes)]
         form = registers.formats[pipe]
@@ -47,7 +47,7 @@ class Receiver:
         return True
 
     def _is_new(self, pipe: int, packet: Packet) -> bool:
-        """Not the same PID and CRC again; frames without control field are always new."""
+        """Whether PID or CRC differ from the last packet; frames without PCF are always new."""
         if not self._chip.registers.formats[pipe].enhanced:
             return True
         memory = pipe if self._chip.variant.duplicates_by_pipe else 0
@@ -62,7 +62,8 @@ class Receiver:
         flags = RX_DR.mask
         answered = chip.tx_fifo.for_pipe(pipe)
         if answered is not None and answered.was_sent:
-            # The other side sends something new, so it had the acknowledgement with this payload.
+            # The other side sends a new packet, so it received the acknowledgement with this
+            # payload.
             chip.tx_fifo.remove(answered)
             flags |= TX_DS.mask
         width = len(packet.payload)

@@ -1,4 +1,4 @@
-"""The registers of an emulated chip, and what their values mean for its radio."""
+"""The registers of an emulated chip, and the radio settings derived from them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from drone_mesh.nrf24.registers import (
 
 _WRITABLE: dict[int, int] = {
     Register.CONFIG: 0x7F,
-    Register.EN_AA: 0x7F,  # bit 6 has no meaning, but is stored by silicon
+    Register.EN_AA: 0x7F,  # bit 6 has no meaning, but silicon stores it
     Register.EN_RXADDR: 0x3F,
     Register.SETUP_AW: 0x03,
     Register.SETUP_RETR: 0xFF,
@@ -47,9 +47,9 @@ _TX_POWERS_DBM = (-18, -12, -6, 0)  # RF_PWR [DS Table 17]
 
 
 class RegisterBank:
-    """Plain registers with what follows from them; STATUS and the counters belong to the chip.
+    """Plain registers and values derived from them; STATUS and the counters belong to the chip.
 
-    The derived attributes are renewed by each write, so that the radio need not compute anything.
+    Each write updates the derived attributes, so that the radio need not compute anything.
     """
 
     def __init__(self, plus: bool = True) -> None:
@@ -58,7 +58,7 @@ class RegisterBank:
 
     def reset(self) -> None:
         """The values after power-on."""
-        # By address; those that do not exist read as 0.
+        # By address; unimplemented registers read as 0.
         self._values = [bytearray(1) for _ in range(_ADDRESSES)]
         for register, value in RESET_VALUES.items():
             self._values[register] = bytearray(value)
@@ -69,7 +69,7 @@ class RegisterBank:
         return bytes(self._values[register])
 
     def write(self, register: Register, data: bytes) -> None:
-        """Write the low bytes; bytes that are not given stay as they are."""
+        """Write the low bytes; the remaining bytes do not change."""
         value = self._values[register]
         data = data[: len(value)]
         if len(value) == 1:
@@ -166,7 +166,7 @@ class RegisterBank:
                 self.pipe_of_address[int.from_bytes(self.pipe_addresses[pipe], "big")] = pipe
 
     def tx_format(self, payload_bytes: int) -> FrameFormat:
-        """Of frames that this chip sends as a transmitter: pipe 0 decides [DS 7.4.2, 7.6]."""
+        """The format of frames that this chip transmits: pipe 0 decides [DS 7.4.2, 7.6]."""
         if self.dynamic[0]:
             return self.formats[0]
         return FrameFormat(self.address_bytes, self.crc_bytes, self.auto_ack[0], payload_bytes)

@@ -1,4 +1,4 @@
-"""RemoteChip: an emulated chip on an air that another process serves, with its SPI, CE and IRQ.
+"""RemoteChip: an emulated chip on an air in another process, with its SPI, CE and IRQ.
 
 After a lost connection the chip does not answer: the driver reports this and retries, and gets a
 new chip as soon as the air is served again.
@@ -64,7 +64,7 @@ class RemoteChip:
                 raise
 
     def wait_irq(self, timeout_s: float) -> bool:
-        """Whether IRQ is low within this time, or within a second. OSError as for `request`."""
+        """Wait for IRQ low, at most this long or a second; whether it is. Raises OSError."""
         with self._irq_lock:
             if self._closed:
                 raise ConnectionError("this chip was released")
@@ -80,10 +80,10 @@ class RemoteChip:
                 raise
 
     def move(self, position: Position) -> None:
-        """Bring the chip to a place."""
+        """Move the chip to this position."""
         if position != self._position:
             self._position = position
-            with contextlib.suppress(OSError):  # the next chip is made there
+            with contextlib.suppress(OSError):  # the next chip is created there
                 self.request(Opcode.MOVE, MAKE_CHIP.pack(*position))
 
     def close(self) -> None:

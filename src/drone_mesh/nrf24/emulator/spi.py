@@ -14,7 +14,7 @@ class SpiTarget(Protocol):
     """The chip at the other end of the wires."""
 
     def chip_selected(self) -> int:
-        """CSN falls; the STATUS that goes out as the first byte."""
+        """CSN falls; returns STATUS, the first byte sent."""
 
     def chip_deselected(self, mosi: bytes) -> bytes:
         """CSN rises and the command takes effect; returns the bytes after STATUS."""
@@ -24,7 +24,7 @@ class SpiTarget(Protocol):
 
 
 class EmulatedSpiDev:
-    """One transfer is one period of CSN low; it takes the time its bits take."""
+    """One transfer is one period of CSN low; it takes as long as its bits."""
 
     def __init__(self, clock: EmulatorClock, target: SpiTarget) -> None:
         self._clock = clock
@@ -36,7 +36,7 @@ class EmulatedSpiDev:
         self.transfers = 0
 
     def open(self, bus: int, device: int) -> None:
-        """Any bus and device lead to the one chip behind this object."""
+        """Any bus and device select the one chip of this object."""
 
     def close(self) -> None:
         """Nothing to release."""

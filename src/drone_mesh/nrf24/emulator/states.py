@@ -6,7 +6,7 @@ import enum
 
 
 class State(enum.Enum):
-    """What the chip is doing now."""
+    """The current activity of the chip."""
 
     POWER_DOWN = "power down"
     STARTING = "starting"  # Tpd2stby

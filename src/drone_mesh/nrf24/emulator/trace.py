@@ -1,4 +1,4 @@
-"""Every frame on the air, kept in memory, and as a file that Wireshark opens."""
+"""A trace of every frame on the air, in memory and as a file for Wireshark."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class TracedFrame(NamedTuple):
 
 
 class FrameTrace:
-    """Hand `see` to Air.observe. Keeps the last `limit` frames."""
+    """Pass `see` to Air.observe. Keeps the last `limit` frames."""
 
     def __init__(self, limit: int = 100_000) -> None:
         self._frames: deque[TracedFrame] = deque(maxlen=limit)
 
     def see(self, flight: Flight) -> None:
-        """A frame has ended."""
+        """Record a frame that has ended."""
         self._frames.append(
             TracedFrame(
                 flight.start_ns,
@@ -59,14 +59,14 @@ class FrameTrace:
 
     @property
     def frames(self) -> tuple[TracedFrame, ...]:
-        """What was seen, oldest first."""
+        """The recorded frames, oldest first."""
         return tuple(self._frames)
 
     def write(self, path: Path) -> int:
-        """Write a pcapng file; the number of frames in it. OSError if that cannot be.
+        """Write a pcapng file; returns the number of frames in it. Raises OSError.
 
-        Each packet holds the bits from the preamble to the CRC, filled up to whole bytes, and a
-        comment in words. The time counts from the start of the air.
+        Each packet holds the bits from the preamble to the CRC, padded to whole bytes, and a
+        comment. Times are relative to the start of the air.
         """
         frames = self.frames
         write_pcapng(

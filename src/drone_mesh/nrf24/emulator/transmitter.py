@@ -15,7 +15,7 @@ _ANSWER_WINDOW_NS = {250_000: 500_000, 1_000_000: 250_000, 2_000_000: 250_000}  
 
 
 class Transmitter:
-    """Sends what is in the TX FIFO, waits for acknowledgements, and sends again."""
+    """Sends the payloads in the TX FIFO, waits for acknowledgements, and retransmits."""
 
     def __init__(self, chip: ChipCore) -> None:
         self._chip = chip
@@ -28,22 +28,22 @@ class Transmitter:
         self.packets_lost = 0  # PLOS_CNT
 
     def next_pid(self) -> int:
-        """For each payload that comes over SPI, and each time one is used again."""
+        """The PID for each payload written over SPI, and for each reuse."""
         self._pid = self._pid + 1 & 3
         return self._pid
 
     def has_work(self) -> bool:
-        """Whether there is something to send, and MAX_RT does not forbid it."""
+        """Whether there is something to send and MAX_RT is not set."""
         return self._chip.tx_fifo.oldest is not None and not self._chip.flags & MAX_RT.mask
 
     def payload_written(self) -> None:
-        """A payload came into the FIFO; with CE high it goes out at once."""
+        """A payload was written to the FIFO; with CE high it is sent at once."""
         self.reuse = False
         if self._chip.state is State.STANDBY_II and self.has_work():
             self.start(SETTLING_NS)
 
     def flushed(self) -> None:
-        """FLUSH_TX: a packet that is under way ends without TX_DS or MAX_RT."""
+        """FLUSH_TX: the current packet ends without TX_DS or MAX_RT."""
         self.reuse = False
 
     def ce_rose(self) -> None:
@@ -115,7 +115,7 @@ class Transmitter:
         if until_ns is None or until_ns <= chip.clock.now_ns:
             chip.stop_listening()
             chip.state = State.RETRY_WAIT
-        else:  # to the end of that frame; if it was broken, the wait is over [DS 7.5.1, Fig. 10]
+        else:  # to the end of that frame; if it is broken, the wait is over [DS 7.5.1, Fig. 10]
             chip.after(until_ns - chip.clock.now_ns, self._window_over)
 
     def _no_answer(self) -> None:
@@ -130,14 +130,14 @@ class Transmitter:
             chip.after(SETTLING_NS, self._send_frame)
         else:
             self.packets_lost = min(self.packets_lost + 1, _COUNTER_MAX)
-            # Back in standby whatever the level of CE; continuing needs another rise of CE.
+            # Back to standby at any level of CE; continuing requires another rise of CE.
             chip.state = State.STANDBY_I
             chip.set_flags(MAX_RT.mask)
             if chip.registers.receiver:
                 chip.settle()
 
     def answer_arrived(self, frame: Frame) -> bool:
-        """A frame with the address of pipe 0, while waiting for it; True if it was valid."""
+        """A frame with the address of pipe 0 arrived in the wait; returns whether it was valid."""
         chip = self._chip
         answer = frame.decode(chip.registers.ack_formats[0])
         if answer is None:

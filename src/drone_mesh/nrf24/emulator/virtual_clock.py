@@ -1,14 +1,14 @@
-"""A clock that jumps from event to event, with tasks that take turns: same seed, same result.
+"""A clock that jumps from event to event, with cooperative tasks: same seed, same result.
 
-Drivers block, so each of them needs a stack of its own. The stacks are greenlets: one runs at a
-time, and switching costs less than a microsecond where handing over between threads costs twenty.
-A task that sleeps or waits handles the events that come before its own time is up. When one of
-them wakes another task, it switches to that one. So all state of the air and of the clock belongs
-to the task that has the turn, the order of events never depends on the scheduler of the machine,
-and a minute of a quiet mesh takes milliseconds.
+Drivers block, so each of them needs its own stack. The stacks are greenlets: one runs at a time,
+and a switch takes less than a microsecond, while a switch between threads takes twenty. A task that
+sleeps or waits processes the events that are due before its own time. When one of them wakes
+another task, it switches to that one. So all state of the air and of the clock belongs to the task
+that has the turn, the order of events never depends on the machine's scheduler, and a minute of a
+quiet mesh takes milliseconds.
 
-Tasks are started with `start`; the code that made the clock has the first turn. Everything runs in
-the thread that made the clock.
+`start` creates tasks; the code that created the clock has the first turn. Everything runs in the
+thread that created the clock.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ logger = logging.getLogger(__name__)
 
 
 def _nanoseconds(duration_s: float) -> int:
-    """At least one if there is anything to wait for, or a loop that waits would not end."""
+    """At least one if the duration is positive, otherwise a loop that waits would never end."""
     return max(round(duration_s * NS_PER_S), 1 if duration_s > 0 else 0)
 
 
@@ -40,7 +40,7 @@ class _Turn:
 
     def __init__(self, stack: greenlet.greenlet) -> None:
         self.stack = stack
-        self.parked = 0  # counts the waits, so that a wake-up for an earlier one is recognised
+        self.parked = 0  # number of waits, to recognise wake-ups for earlier ones
 
 
 class _VirtualTask(Task):
@@ -52,12 +52,12 @@ class _VirtualTask(Task):
         self._clock = clock
         self._run = run
         self.ended = clock.signal()
-        # A stack counts its depth from where it is first entered. Entered here, that stays low;
+        # The depth of a stack counts from where it is first entered. Entered here, it stays low;
         # entered wherever its turn comes, the depths of all tasks would add up.
         self.turn.stack.switch(greenlet.getcurrent())
 
     def join(self) -> None:
-        """Wait until it has ended; an exception that ended it is raised here."""
+        """Wait until it has ended; raises an exception that ended it."""
         self.ended.wait_for(lambda: self.done, math.inf)
         if self.failure is not None:
             raise RuntimeError(f"{self.name} failed") from self.failure
@@ -73,11 +73,11 @@ class _VirtualTask(Task):
             self.failure = failure
         self.done = True
         self.ended.notify()
-        self.turn.stack.parent = self._clock.next_turn().stack  # goes on when this returns
+        self.turn.stack.parent = self._clock.next_turn().stack  # continues when this returns
 
 
 class VirtualClock(Runtime, EmulatorClock):
-    """Both the clock of the air and the runtime of the drivers on it."""
+    """Both the clock of the air and the runtime of its drivers."""
 
     def __init__(self) -> None:
         self._now_ns = 0
@@ -89,7 +89,7 @@ class VirtualClock(Runtime, EmulatorClock):
 
     @property
     def first_stack(self) -> greenlet.greenlet:
-        """Of the code that made the clock."""
+        """The stack of the code that created the clock."""
         return self._first.stack
 
     @property
@@ -134,7 +134,7 @@ class VirtualClock(Runtime, EmulatorClock):
         return task
 
     def wait(self, waiting: list[tuple[_Turn, int]], until_ns: float) -> None:
-        """Put the running task on the list, and wait to be woken or until that time."""
+        """Add the running task to the list, and wait to be woken or until that time."""
         turn = self._running
         turn.parked += 1
         entry = (turn, turn.parked)
@@ -146,7 +146,7 @@ class VirtualClock(Runtime, EmulatorClock):
             waiting.remove(entry)
 
     def wake(self, waiting: list[tuple[_Turn, int]]) -> None:
-        """Let all on the list go on: at this same time, when the caller waits itself."""
+        """Wake all tasks on the list; they run at this same time, when the caller itself waits."""
         for turn, parked in waiting:
             if turn.parked == parked:
                 self._wake_at(self._now_ns, turn)
@@ -162,10 +162,10 @@ class VirtualClock(Runtime, EmulatorClock):
             following.stack.switch()
         if self._stuck:
             raise RuntimeError("every task on the virtual clock waits for ever")
-        turn.parked += 1  # any other wake-up that is still queued is for the wait that ends here
+        turn.parked += 1  # other queued wake-ups belong to the wait that ends here
 
     def next_turn(self) -> _Turn:
-        """Handle events until one wakes a task; that task has the turn from now on."""
+        """Process events until one wakes a task, which then has the turn."""
         events = self._events
         while events:
             self._now_ns, _, event, arguments = heapq.heappop(events)
@@ -176,7 +176,7 @@ class VirtualClock(Runtime, EmulatorClock):
             if turn.parked == arguments[1]:
                 self._running = turn
                 return turn
-        self._stuck = True  # raised in the code that made the clock; the tasks never go on
+        self._stuck = True  # raised in the code that created the clock; the tasks never continue
         self._running = self._first
         return self._first
 
@@ -203,7 +203,7 @@ class _VirtualSignal(Signal):
 
 
 class _VirtualLock(ContextManager[object]):
-    """Goes to the waiting tasks in the order in which they came, so that none starves."""
+    """Goes to the waiting tasks in order of arrival, so that none starves."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock

@@ -1,8 +1,8 @@
-"""An air on the wall clock: for interactive use and for simulations in real time.
+"""The clock of an air in real time: for interactive use and simulations in real time.
 
-One thread processes events at their time. Every access to a chip first processes overdue events,
-so that a chip never answers from the past. Events carry the time for which they
-were meant: chips acknowledge and repeat in time, however late the machine is.
+One thread processes events at their time. Every access to a chip first processes overdue events, so
+a chip never answers from the past. Events carry the time for which they were scheduled, so chips
+acknowledge and retransmit on time, however late the machine is.
 
 The lock guards the air, its chips and the queue; every access and every event holds it.
 """
@@ -40,7 +40,7 @@ class WallClock(EmulatorClock):
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread; events that are still queued never happen."""
+        """End the thread; queued events never happen."""
         with self._lock:
             self._closed = True
             self._earlier.notify()
@@ -68,7 +68,7 @@ class WallClock(EmulatorClock):
             yield
 
     def elapse(self, duration_ns: int) -> None:
-        """No extra delay: the host is slower than SPI anyway."""
+        """Does nothing: the host is slower than SPI anyway."""
 
     def signal(self) -> Signal:
         return ThreadSignal()
