@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import random
 import threading
+import time
 from typing import Iterator
 
 import pytest
@@ -23,6 +24,7 @@ from drone_mesh.raspberry.bench_radio import BenchRadio
 BASE = RadioSettings()
 AT_1M = dataclasses.replace(BASE, data_rate=DataRate.MBPS_1)
 FAR_ID = 5
+SAID_WITHIN_S = 30.0
 FOLLOW_1M_FOR_1_S = bytes.fromhex("fd fd ff 05 05 52 41 4e 47 45 01 01 00") + bytes(19)
 
 
@@ -45,7 +47,8 @@ class Pair:
 
         def run() -> None:
             if follows:
-                self.said.extend(range_test.answer(radio, ended.is_set))
+                for line in range_test.answer(radio, ended.is_set):
+                    self.said.append(line)
             while not ended.is_set():
                 radio.receive()
 
@@ -56,6 +59,12 @@ class Pair:
         finally:
             ended.set()
             thread.join()
+
+    def wait_until_far_end_says(self, beginning: str) -> None:
+        deadline_s = time.monotonic() + SAID_WITHIN_S
+        while not any(line.startswith(beginning) for line in tuple(self.said)):
+            assert time.monotonic() < deadline_s, f"not said: {beginning!r}; said: {self.said}"
+            time.sleep(0.005)
 
 
 @pytest.fixture
@@ -115,11 +124,11 @@ def test_after_silence_the_far_end_is_back_at_its_own_rate(pair):
     with pair.far_end(far):
         while not pair.near.send(address, FOLLOW_1M_FOR_1_S, 15).acknowledged:
             pass
+        pair.wait_until_far_end_says("node 253 measures at 1000 kbit/s")
         lost = 0
         while not pair.near.send(address, bytes(32), 15).acknowledged:
             lost += 1
     assert lost > 0  # it was away
-    assert "node 253 measures at 1000 kbit/s" in pair.said
     assert "nothing heard for 1 s: back at 250 kbit/s" in pair.said
     assert far.settings is BASE
 
@@ -153,5 +162,5 @@ def test_a_chip_without_plus_says_that_it_has_no_such_rate(pair):
     with pair.far_end(far):
         while not near.send(at_1m.node_address(FAR_ID), follow_250k.ljust(32, b"\0"), 15)[0]:
             pass
-    assert pair.said[1].startswith("node 1 asked for 250 kbit/s: ")
+        pair.wait_until_far_end_says("node 1 asked for 250 kbit/s: ")
     assert far.settings is at_1m

@@ -18,7 +18,7 @@ TEXT_COLOURS = (
     "gateway", "connected", "flying", "disconnected", "off", "silent", "crashed", "ink", "muted",
     "accent",
 )  # fmt: skip
-COLOUR = r"(?<=[\"': ])#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b(?!\()"
+COLOUR = r"(?<=[\"': ])#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})(?![-\w(])"
 ENOUGH = 4.5  # WCAG 2.1, 1.4.3
 
 

@@ -44,7 +44,11 @@ def t_total_s(run: RunRecord) -> float:
     return run.healed_at_s - run.fault_s
 
 
-@metric("s", "t_total_s, or observed_s if not healed; only for tables that average caps in")
+@metric(
+    "s",
+    "t_total_s, or observed_s if not healed; "
+    "only to compare with published tables that average such caps in",
+)
 def t_capped_s(run: RunRecord) -> float:
     total_s = t_total_s(run)
     return observed_s(run) if math.isnan(total_s) else total_s
