@@ -50,7 +50,7 @@ def test_a_demonstration_that_was_asked_for_at_the_start_begins_with_the_first_p
     found = Axe().run(page.page)
     assert found.violations_count == 0, found.generate_report()
     page.page.click("#demonstrate")
-    wait_for_sentence(page, "Not finished: ended by hand")
+    wait_for_sentence(page, "Not finished: ended by the user")
     page.wait_for("the rest is on again", lambda: page.page.inner_text("#demonstrate") != "End")
 
 

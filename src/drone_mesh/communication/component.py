@@ -122,7 +122,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         ):
             self.complaints.add("another origin", f"that of node {creator}", now_s)
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
-            self._drop("a place from a node whose origin is another, or not known yet", payload)
+            self._drop("a place from a node with another origin, or an unknown one", payload)
             return
         if forward != me and forward != BROADCAST:
             if kind == _HEARTBEAT:

@@ -161,7 +161,7 @@ class OrderBook:
             return
         order.unanswered = 0
         if outcome is OrderOutcome.UNKNOWN:
-            reason = "the drone does not know it any more"
+            reason = "the drone no longer knows this order"
         order.settled = outcome is not OrderOutcome.ACCEPTED
         self._move(order, _STATE_AFTER[outcome], reason)
         is_own = order.drone == self._parts.node_id
@@ -190,7 +190,7 @@ class OrderBook:
             order.due_s = self._parts.now_s + REPEAT_AFTER_S[order.unanswered]
         elif order.state is OrderState.UNDER_WAY:
             if order.unanswered > MOST_QUERIES:
-                self._move(order, OrderState.GIVEN_UP, "nothing more was heard of the drone")
+                self._move(order, OrderState.GIVEN_UP, "the drone fell silent")
                 return
             query = OrderQuery.packet(order.number, self._parts.node_id, order.drone)
             self._send_if_routed(order, query)

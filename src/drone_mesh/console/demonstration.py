@@ -204,7 +204,7 @@ def _pace(group: Sequence[NodeStatus]) -> float:
 
 def _why_not(nodes: Sequence[NodeStatus]) -> str:
     places = {node.place_of for node in nodes} - {NO_ROUTE}
-    return "have no gateway, though one flew" if places else "have no gateway, and none flew"
+    return "have no gateway, although one flew" if places else "have no gateway, and none flew"
 
 
 def _power(node_id: int, on: bool) -> Order:

@@ -57,7 +57,7 @@ class Stage:
         except OrderRefused as error:
             await self._stop(demonstration, str(error), shown)
         except asyncio.CancelledError:
-            await self._stop(demonstration, "ended by hand", shown)
+            await self._stop(demonstration, "ended by the user", shown)
         if shown is not None:
             self._store.set_story(describe(story, shown, running=False))
 

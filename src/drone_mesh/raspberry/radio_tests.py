@@ -68,7 +68,11 @@ def _check_irq(radio: BenchRadio, irq: IrqPin) -> str:
     radio.broadcast(_probe(), keep_flags=True)
     fell = irq.wait_low(0.1)
     radio.clear_flags()
-    return "ok   IRQ: falls when a packet was sent" if fell else "FAIL IRQ: never falls: wiring?"
+    return (
+        "ok   IRQ: falls when a packet was sent"
+        if fell
+        else "FAIL IRQ: never falls: check the wiring"
+    )
 
 
 def scan(radio: BenchRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
@@ -89,8 +93,8 @@ def scan(radio: BenchRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
         yield f"{channel:3d} {2400 + channel} MHz {count / rounds:5.0%} {bar}{note}"
     quiet = quietest(heard, suggest)
     yield f"quietest in the licence-free band: {' '.join(map(str, quiet))}"
-    yield f"data rate by number of nodes, slower reaches further: {_RATES_IN_WORDS}"
-    yield f"options of all nodes alike: --channel {quiet[0]} --rate {rate_for(nodes)}"
+    yield f"data rate by number of nodes (a lower rate reaches further): {_RATES_IN_WORDS}"
+    yield f"options for all nodes: --channel {quiet[0]} --rate {rate_for(nodes)}"
 
 
 def rate_for(nodes: int) -> str:

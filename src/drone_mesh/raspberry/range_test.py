@@ -156,11 +156,11 @@ class _Partner:
         if not heard:
             return (
                 f"no answer from node {self._id} at {base} kbit/s: start '{there}' at the far end, "
-                "with the same --channel and --rate, or go nearer"
+                "with the same --channel and --rate, or move closer"
             )
         return (
             f"node {self._id} does not follow to {rate.value // 1000} kbit/s: at the far end, run "
-            f"'{there}' in place of the node; a chip without '+' has no 250 kbit/s"
+            f"'{there}' in place of the node; a chip without '+' lacks 250 kbit/s"
         )
 
 

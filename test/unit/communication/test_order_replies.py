@@ -261,13 +261,13 @@ def test_a_drone_that_falls_silent_is_asked_and_given_up_after_five_minutes():
     assert rig.sent(65) == [packet("00 00 41 05 05 01 00")] * 19
     assert state(rig)[0] is OrderState.UNDER_WAY
     rig.wait(20.0)
-    assert state(rig) == (OrderState.GIVEN_UP, "nothing more was heard of the drone")
+    assert state(rig) == (OrderState.GIVEN_UP, "the drone fell silent")
 
 
 def test_a_drone_that_was_restarted_does_not_know_its_order():
     rig = gateway_rig()
     rig.hear("05 05 40 00 00 01 00 01", "05 05 40 00 00 01 00 05")
-    assert state(rig) == (OrderState.GIVEN_UP, "the drone does not know it any more")
+    assert state(rig) == (OrderState.GIVEN_UP, "the drone no longer knows this order")
 
 
 def test_a_relay_that_cannot_pass_an_order_on_ends_it_at_once():

@@ -63,7 +63,7 @@ def test_a_drone_that_flew_out_of_reach_is_given_up():
     network = line()
     assert network.order(3, 400.0, 400.0)
     network.run_for(30.0 + 21 * 15.0)
-    assert ends(network) == [(3, "given up", "nothing more was heard of the drone")]
+    assert ends(network) == [(3, "given up", "the drone fell silent")]
 
 
 def test_a_relay_that_dies_under_an_order_ends_it_without_a_route():

@@ -73,7 +73,7 @@ class Authority:
             own = autopilot.mode_name(autopilot.own_mode)
             if not self._may_leave(telemetry.mode, autopilot, bool(on_ground)):
                 hold = autopilot.mode_name(autopilot.hold_mode)
-                return f"in {name}, under its pilot's hand: only {own} (or {hold}) is ours"
+                return f"in {name}, flown by its pilot: this needs {own} (or {hold})"
             if not may.may_change_mode:
                 return f"in {name}: the pilot has to choose {own}, or --may-change-mode"
         if not telemetry.armed and not may.may_arm:

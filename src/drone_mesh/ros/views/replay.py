@@ -25,7 +25,7 @@ class AlreadyATime(MeshError):
     def __init__(self, nodes: list[str]) -> None:
         super().__init__(
             f"{', '.join(nodes)} already publishes {names.CLOCK_TOPIC}: stop it, or set "
-            "ROS_MASTER_URI to a master of its own"
+            "ROS_MASTER_URI to another master"
         )
 
 

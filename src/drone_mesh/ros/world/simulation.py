@@ -28,7 +28,7 @@ from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.factory import DroneFactory
 
-MQTT_SENDER = {0: "with internet mqtt it sends what programs publish to the broker"}
+MQTT_SENDER = {0: "with internet mqtt it sends the messages published on the broker"}
 
 _log = logging.getLogger(__name__)
 
@@ -62,8 +62,8 @@ class Simulation:
         )
         if parameters.settings.key is None:
             _log.warning(
-                "no key: packets that any program on this ROS network sends as a node are obeyed, "
-                "orders to fly too; raspberry_key new makes a key, key:=FILE uses it"
+                "no key: any program on this ROS network can pose as a node and order flights; "
+                "raspberry_key new makes a key, key:=FILE uses it"
             )
 
     def run(self, stop: OrderlyStop) -> None:
