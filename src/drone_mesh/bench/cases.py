@@ -1,4 +1,4 @@
-"""The cases that are measured: number of drones, spacing, speed of simulated time."""
+"""The benchmark's cases: number of drones, spacing, speed of simulated time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.errors import ConfigurationError
 
-FLY = "fly"  # in a size on the command line
+FLY = "fly"  # suffix of a size on the command line
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class Case:
     drones: int  # the gateway included
     spacing_m: float
     real_time_factor: float = 1.0  # 0: as fast as possible
-    flying: bool = False  # all drones fly while they are measured, and physics moves them
+    flying: bool = False  # all drones fly during the measurement, moved by physics
 
     def __post_init__(self) -> None:
-        """Raises ConfigurationError for a fleet that the factory would refuse."""
+        """Raise ConfigurationError for a fleet that the factory would refuse."""
         plan_fleet(1, self.routers, self.gridsize, self.spacing_m)
         if not (math.isfinite(self.real_time_factor) and self.real_time_factor >= 0):
             raise ConfigurationError(

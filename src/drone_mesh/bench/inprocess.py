@@ -18,7 +18,7 @@ SIMULATED_S = 60.0  # six rounds of the default timing
 
 @dataclass(frozen=True)
 class InProcessResult:
-    """Several runs of one size: medians, and the best run, which other load disturbed least."""
+    """Several runs of one size: medians, and the best run, which is the least disturbed."""
 
     drones: int
     spacing_m: float
@@ -73,7 +73,8 @@ def measure(
 ) -> InProcessResult:
     """Start a network `runs` times and measure two phases of each run.
 
-    The first phase costs more, because the nodes find each other in it. With a `key` all packets
+    The first phase costs more, because the nodes find each other in it. With a `key`, all packets
+    are sealed.
     are sealed.
     """
     case = Case(drones, SPACING_M)

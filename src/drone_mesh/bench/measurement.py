@@ -12,9 +12,9 @@ from drone_mesh.bench.progress import Progress
 from drone_mesh.bench.system import BenchmarkError, System
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE, WORST_LAG
 
-ON_WITHIN_S = 180.0  # wall; our choice: six times what 254 drones may take
+ON_WITHIN_S = 180.0  # wall; our choice: six times the allowed time for 254 drones
 CONNECTED_WITHIN_S = 120.0  # wall; the same limit as for the original
-SETTLE_S = 5.0  # wall; the start costs more than a later second
+SETTLE_S = 5.0  # wall; the start costs more than later seconds
 LOOK_WITHIN_S = 20.0  # wall
 MEGABYTE = 1e6
 
@@ -55,7 +55,7 @@ class _Moment:
     look: Look
     use: Use
     delivered: float | None
-    delivered_s: float  # when `delivered` arrived: once a second, and not with the look
+    delivered_s: float  # when `delivered` arrived: once a second, independent of the look
     lost: float | None
 
 
@@ -107,7 +107,7 @@ def await_all_on(system: System, case: Case, progress: Progress) -> None:
 
 
 def _take_moment(system: System) -> _Moment:
-    """The present figures. The first state may be an old one, so it waits for the second."""
+    """The current figures. The first state may be old, so wait for the second."""
     watch = system.watch
     seen = len(watch.looks)
     if not system.wait_for(lambda: len(watch.looks) >= seen + 2, LOOK_WITHIN_S, lambda: None):

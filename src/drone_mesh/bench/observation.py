@@ -1,4 +1,4 @@
-"""Observations of the probe, and what they say about the start of a fleet."""
+"""Observations of the probe, and what follows from them about the start of a fleet."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Happening:
 
 @dataclass(frozen=True)
 class Figures:
-    """Numbers that a part of the system publishes about itself, by name."""
+    """Measurements that a part of the system publishes about itself, by name."""
 
     of: str
     wall_s: float  # when they arrived, time.monotonic
@@ -55,12 +55,12 @@ _KINDS = {kind.__name__: kind for kind in (Look, Happening, Figures)}
 
 
 def to_line(sight: Sight) -> str:
-    """The sight as one line of text, for the pipe between probe and benchmark."""
+    """An observation as one line of text, for the pipe between probe and benchmark."""
     return json.dumps({"sight": type(sight).__name__, **asdict(sight)})
 
 
 def from_line(line: str) -> Sight:
-    """The sight in a line of `to_line`. Raises ValueError for any other line."""
+    """The observation in a line of `to_line`. Raises ValueError for any other line."""
     try:
         fields = json.loads(line)
         sight: Sight = _KINDS[fields.pop("sight")](**fields)
@@ -104,8 +104,8 @@ class Watch:
     def connected_after_s(self) -> float | None:
         """Simulated seconds from the start of the last node until all were connected; None: never.
 
-        It uses the stamps of the events if they are complete. Events from before the probe
-        subscribed are missing; then it uses the stamps of the states.
+        Uses the stamps of the events if they are complete. If the probe subscribed too late for
+        some, uses the stamps of the states.
         """
         if self.all_on is None or self.all_connected is None:
             return None
@@ -116,7 +116,7 @@ class Watch:
         return self.all_connected.sim_s - self.all_on.sim_s
 
     def disconnected_since(self, sim_s: float) -> int:
-        """How many times a node lost its connection after `sim_s`, by the events so far."""
+        """How many times a node lost its connection after `sim_s`, according to the events."""
         return sum(h.kind == DISCONNECTED and h.sim_s > sim_s for h in tuple(self._happenings))
 
     def total(self, name: str) -> float | None:

@@ -1,4 +1,4 @@
-"""Runs beside programs that never wait: does an overloaded machine lose connections?"""
+"""Runs beside busy loops: does an overloaded machine lose connections?"""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drone_mesh.bench.progress import Progress
 from drone_mesh.bench.system import BenchmarkError, System
 
 SIMULATED_S = 300.0
-SECOND_WITHIN_S = 60.0  # wall, for each simulated second; slower counts as standing still
+SECOND_WITHIN_S = 60.0  # wall, for each simulated second; slower counts as stopped
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class OverloadResult:
 
 @contextlib.contextmanager
 def busy_loops(count: int) -> Iterator[None]:
-    """`count` processes that never wait.
+    """`count` processes that loop without waiting.
 
-    Each has a session of its own; otherwise the kernel's autogroups would give all of them
-    together the share of one.
+    Each has its own session; otherwise the kernel's autogroups would give all of them together the
+    share of one.
     """
     command = [sys.executable, "-c", "while True: pass"]
     loops = [subprocess.Popen(command, start_new_session=True) for _ in range(count)]
@@ -66,7 +66,7 @@ def overload(
 
     `on_result` gets each result at once.
 
-    Raises BenchmarkError when it does not start or connect, ends by itself or stands still.
+    Raises BenchmarkError if the fleet does not start or connect, ends by itself or stops.
     """
     with System(case.drones, [*case.launch_args(), *launch_args], port) as system:
         await_all_on(system, case, progress)

@@ -73,7 +73,7 @@ def name_of(arguments: list[str]) -> str:
 
 
 def take_use(processes: Iterable[psutil.Process], wall_s: float) -> Use:
-    """The present use of each process, except those that have ended meanwhile."""
+    """The current use of each process, except those that have ended."""
     found: dict[int, ProcessUse] = {}
     for process in processes:
         try:
@@ -94,7 +94,7 @@ def take_use(processes: Iterable[psutil.Process], wall_s: float) -> Use:
 
 
 def cores_between(before: Use, after: Use) -> dict[str, float]:
-    """Cores used, by name, of the processes that are in both."""
+    """Cores used by the processes that are in both, by name."""
     seconds = after.wall_s - before.wall_s
     cores: dict[str, float] = {}
     for pid, process in after.processes.items():

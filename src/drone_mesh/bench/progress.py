@@ -9,7 +9,7 @@ QUIET_S = 10.0  # without a terminal: at most one line in this time within a sta
 
 
 class Progress:
-    """One changing line on a terminal; occasional lines in a file or pipe."""
+    """One updating line on a terminal; occasional lines in a file or pipe."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -19,7 +19,7 @@ class Progress:
         self._width = 0
 
     def begin(self, text: str) -> None:
-        """A new stage begins; always printed, on a line of its own."""
+        """Begin a new stage; always printed, on its own line."""
         self.clear()
         print(text, file=self._stream, flush=True)
         self._shown, self._shown_s = text, time.monotonic()
@@ -39,7 +39,7 @@ class Progress:
         self._shown, self._shown_s = text, now_s
 
     def clear(self) -> None:
-        """Remove the changing line."""
+        """Remove the updating line."""
         if self._live and self._width:
             print(f"\r{'':<{self._width + 2}}\r", end="", file=self._stream, flush=True)
             self._width = 0

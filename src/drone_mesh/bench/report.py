@@ -14,7 +14,7 @@ from drone_mesh.bench.overload import OverloadResult
 from drone_mesh.bench.soak import Sample, SoakResult
 
 UNKNOWN = "-"
-SMALL_CORES = 0.005  # a process that uses less gets no column
+SMALL_CORES = 0.005  # processes that use less have no column
 
 
 @dataclass(frozen=True)

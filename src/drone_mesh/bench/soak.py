@@ -15,6 +15,7 @@ SAMPLE_PERIOD_S = 60.0  # simulated
 WARM_UP_S = 600.0  # simulated; growth before this is ignored
 # Wall, after all are on. rospy closes a connection that was idle for 60 s; the master opens such
 # connections when nodes register.
+# connections when nodes register.
 IDLE_CONNECTIONS_CLOSED_S = 90.0
 MEMORY_TOLERANCE = 0.02  # our choice: normal variation of a Python program
 SAMPLE_WITHIN_S = 600.0  # wall
@@ -111,7 +112,7 @@ def soak(
 ) -> SoakResult:
     """Run a fleet for `hours` of simulated time; `on_sample` gets each sample at once.
 
-    Raises BenchmarkError when it does not start, ends by itself or stands still.
+    Raises BenchmarkError if the fleet does not start, ends by itself or stops.
     """
     result = SoakResult(case.drones, case.spacing_m, [])
     with System(case.drones, [*case.launch_args(), *launch_args], port) as system:

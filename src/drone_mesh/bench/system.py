@@ -1,4 +1,4 @@
-"""Starts and stops the system that is measured: master, probe and fleet."""
+"""Starts and stops the measured system: master, probe and fleet."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from drone_mesh.errors import MeshError
 
 LOOPBACK = "127.0.0.1"
 PART_WITHIN_S = 30.0  # wall; our choice, for master and probe
-END_WITHIN_S = 20.0  # wall; roslaunch itself gives each node 15 s before it kills it
+END_WITHIN_S = 20.0  # wall; roslaunch itself waits 15 s before it kills a node
 LOG_LINES_SHOWN = 15
 LOOK_PERIOD_S = 0.05  # wall
 
 
 class BenchmarkError(MeshError):
-    """The system could not be started or measured. The message gives the cause and the remedy."""
+    """The system could not be started or measured. The message gives cause and remedy."""
 
 
 def check_environment() -> None:
@@ -67,7 +67,7 @@ def free_port() -> int:
 class System:
     """One master, one probe, one fleet. A context manager, which always stops all three.
 
-    A thread reads the lines of the probe. The watch belongs to it; others only read the watch.
+    A thread reads the lines of the probe and owns the watch; others only read it.
     """
 
     def __init__(self, drones: int, launch_args: Sequence[str], port: int) -> None:
@@ -91,7 +91,7 @@ class System:
         self._seen: dict[int, psutil.Process] = {}
 
     def __enter__(self) -> System:
-        """Start everything; returns as soon as the fleet is being launched."""
+        """Start everything; returns as soon as the fleet is launching."""
         try:
             if self._master_answers():
                 raise BenchmarkError(f"port {self._port} is taken: use another one")
@@ -122,7 +122,7 @@ class System:
         self.close()
 
     def order(self, order: str) -> None:
-        """Order the probe to watch the state of the mesh, or to rest."""
+        """Order the probe to start or stop watching the state, or to start the flights."""
         assert self._probe is not None
         assert self._probe.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # check() reports it
@@ -130,7 +130,7 @@ class System:
             self._probe.stdin.flush()
 
     def check(self) -> None:
-        """Raises BenchmarkError, with the end of its log, when a part of the system has ended."""
+        """Raise BenchmarkError, with the end of its log, if a part of the system has ended."""
         parts = (
             ("roscore", self._master),
             ("probe", self._probe),
@@ -147,7 +147,7 @@ class System:
     ) -> bool:
         """True as soon as `condition` holds; False after `within_s` wall seconds without it.
 
-        Raises BenchmarkError when a part of the system ends meanwhile.
+        Raises BenchmarkError if a part of the system ends before.
         """
         deadline_s = time.monotonic() + within_s
         while not condition():
@@ -198,7 +198,7 @@ class System:
     def _start(
         self, name: str, command: Sequence[str], piped: bool = False
     ) -> subprocess.Popen[bytes]:
-        """Start it in a session of its own, so that Ctrl-C in the terminal reaches only us."""
+        """Start a process in its own session, so that Ctrl-C in the terminal reaches only us."""
         with self._log_path(name).open("wb") as log:
             return subprocess.Popen(
                 command,

@@ -1,4 +1,4 @@
-"""A virtual clock: events in the order of their time, as fast as they can be worked off."""
+"""A virtual clock: processes events in order of time, as fast as possible."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from collections import deque
 from typing import Any, Callable, Tuple
 
 Event = Tuple[float, int, Callable[[Any], None], Any]
-"""When, its place among those of the same moment, what to call, with what."""
+"""Time, sequence number among events of the same time, function, argument."""
 
 
 class VirtualClock:
-    """Simulated time and what is to happen in it. Everything runs in the thread that runs it."""
+    """Simulated time and the events planned in it. Everything runs in the thread that runs it."""
 
     def __init__(self) -> None:
         self.now_s = 0.0
         self._events: list[Event] = []  # a heap
-        # Events that were asked for in the order of their time: most packets, and cheaper to keep.
+        # Events requested in order of time, like most packets; cheaper than the heap.
         self._line: deque[Event] = deque()
         self._line_ends_s = -math.inf
-        self._order = itertools.count()  # events of one moment happen in the order of their asking
+        self._order = itertools.count()  # events of one time run in the order of the requests
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
-        """Call `function(argument)` at `at_s`, or at once if that is past."""
+        """Call `function(argument)` at `at_s`, or at once if that is in the past."""
         heapq.heappush(self._events, (at_s, next(self._order), function, argument))
 
     def call_in_line(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
-        """As `call_at`, and cheaper where no call asks for a time before that of the last one."""
+        """Like `call_at`, but cheaper if calls request ascending times."""
         if at_s < self._line_ends_s:
             self.call_at(at_s, function, argument)
             return
@@ -36,12 +36,12 @@ class VirtualClock:
         self._line.append((at_s, next(self._order), function, argument))
 
     def next_event_s(self) -> float:
-        """When something happens next; infinity when nothing is planned."""
+        """The time of the next event; infinity if none is planned."""
         first = [events[0][0] for events in (self._events, self._line) if events]
         return min(first, default=math.inf)
 
     def run_until(self, until_s: float) -> None:
-        """Let everything happen up to and including `until_s`."""
+        """Process all events up to and including `until_s`."""
         events, line = self._events, self._line
         pop, pop_line = heapq.heappop, line.popleft
         while True:

@@ -1,7 +1,7 @@
-"""What the mesh carries for users: `python3 -m drone_mesh.inprocess.data_benchmark --help`.
+"""Throughput of users' data: `python3 -m drone_mesh.inprocess.data_benchmark --help`.
 
 Real drivers on emulated chips, on one channel with exact times, under a virtual clock: the figures
-do not depend on the machine. Nodes stand in a line, 6 m apart, with a range of 9 m.
+do not depend on the machine. Nodes are in a line, 6 m apart, with a range of 9 m.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ class Case(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of it."""
+    """The result of a case."""
 
-    kbit_s: float  # of payload, of all flows together
+    kbit_s: float  # of payload, for all flows together
     delivered: float  # share of the messages
     bound_kbit_s: float
     connected: bool  # all nodes, at the end
 
 
 class LossyDisc(IdealDisc):
-    """As IdealDisc, but a share of the frames arrives damaged, acknowledgements included."""
+    """Like IdealDisc, but a share of the frames arrives damaged, including acknowledgements."""
 
     def __init__(self, range_m: float, loss: float, rng: random.Random) -> None:
         super().__init__(range_m)
@@ -59,17 +59,17 @@ class LossyDisc(IdealDisc):
 
 
 def bound_kbit_s(settings: RadioSettings, hops: int) -> float:
-    """What the air allows: a packet and its acknowledgement at a time in each neighbourhood.
+    """The bound of the channel: one packet and its acknowledgement at a time per neighbourhood.
 
-    On k hops each packet is sent k times. From three hops on the first node may send again while
-    the fourth does: 1/3.
+    Over k hops each packet is sent k times. From three hops on, the first node may send again while
+    the fourth sends: 1/3.
     """
     packets = count_of(MAX_MESSAGE_BYTES, BODY_BYTES)
     return MAX_MESSAGE_BYTES * 8 / packets / settings.acknowledged_s / min(hops, 3) / 1e3
 
 
 def measure(case: Case, messages: int, seed: int) -> Outcome:
-    """Send so many messages of 1024 bytes in all from the end of a line to its gateway.
+    """Send this many messages of 1024 bytes in total from the end of a line to its gateway.
 
     With several flows the messages come from the last nodes of the line in turn.
     """
@@ -87,7 +87,7 @@ def _measured(mesh: EmulatedMesh, case: Case, messages: int, settings: RadioSett
     for node in range(1, case.hops + 1):
         mesh.add_router(node, (SPACING_M * node, 0.0, 0.0))
     ends = [case.hops]
-    for flow in range(1, case.flows):  # beside the last node, and as far from the gateway
+    for flow in range(1, case.flows):  # beside the last node, as far from the gateway
         ends.append(case.hops + flow)
         mesh.add_router(ends[-1], (SPACING_M * case.hops, 0.1 * flow, 0.0))
     mesh.run_until(mesh.all_connected, CONNECT_WITHIN_S)
@@ -102,7 +102,7 @@ def _measured(mesh: EmulatedMesh, case: Case, messages: int, settings: RadioSett
     mesh.run_until(
         lambda: len(tickets) == messages and all(ticket.final for ticket in tickets), END_WITHIN_S
     )
-    if not case.reliable:  # the last packets are on their way
+    if not case.reliable:  # wait for the last packets
         mesh.run_for(5.0)
     took_s = (received[-1].received_s if received else mesh.now_s()) - started_s
     delivered = len(received) / messages

@@ -1,4 +1,4 @@
-"""A drone without a world: it flies its path by the virtual clock."""
+"""A drone without a world: it flies its path on the virtual clock."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drone_mesh.errors import GoalRefused
 
 
 class Time(Protocol):
-    """What a drone needs of a clock."""
+    """The functions of a clock that a drone needs."""
 
     @property
     def now_s(self) -> float: ...
@@ -22,7 +22,7 @@ class Time(Protocol):
 
 
 class InProcessDrone(IDroneEngine):
-    """Where one drone is. It flies like the drones of the world."""
+    """The position of one drone, which flies like the drones of the world."""
 
     def __init__(
         self,
@@ -31,24 +31,24 @@ class InProcessDrone(IDroneEngine):
         on_flight: Callable[[bool], None],
         why_not_fly: str = "",
     ) -> None:
-        """`on_flight` is called when a flight starts (True) and when it is over (False)."""
+        """`on_flight` is called with True at the start of a flight and with False at its end."""
         self.flown_m = 0.0  # straight distance from start to goal of all flights, in metres
         self._why_not_fly = why_not_fly
         self._clock = clock
         self._place = start
         self._path: FlightPath | None = None
         self._on_flight = on_flight
-        self.speed_m_s = SPEED_M_S  # of its next flight; experiments change it: wind
-        # None from it: no way, and the drone stays. Obstacles put a planner of their own here.
+        self.speed_m_s = SPEED_M_S  # of its next flight; experiments with wind change it
+        # Returns None if there is no path; the drone then stays. Obstacles replace this planner.
         self.plan_flight: PlanFlight = FlightPath
 
     @property
     def path(self) -> FlightPath | None:
-        """The way it flies; None while it stands."""
+        """The path of the current flight; None while at rest."""
         return self._path
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        """Fly there, if it can. Raises GoalRefused for a place out of bounds or without a way."""
+        """Fly there, if it can. Raises GoalRefused for a goal out of bounds or without a path."""
         check_goal(latitude, longitude, height)
         if self._why_not_fly:
             return
@@ -67,17 +67,17 @@ class InProcessDrone(IDroneEngine):
         self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
 
     def why_not_fly(self) -> str:
-        """As it was made."""
+        """The reason given at creation."""
         return self._why_not_fly
 
     def get_location(self) -> Location:
-        """Where it is now. Never raises."""
+        """Its position now. Never raises."""
         if self._path is None:
             return self._place
         return Location.from_vector(self._path.position_at(self._clock.now_s))
 
     def _arrive(self, path: FlightPath) -> None:
-        if path is self._path:  # not replanned on the way
+        if path is self._path:  # not replanned in flight
             self._place = Location.from_vector(path.goal)
             self.flown_m += math.dist(path.start, path.goal)
             self._path = None

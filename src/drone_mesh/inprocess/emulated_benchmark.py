@@ -1,4 +1,4 @@
-"""How fast the emulator is: `python3 -m drone_mesh.inprocess.emulated_benchmark --help`."""
+"""The speed of the emulator: `python3 -m drone_mesh.inprocess.emulated_benchmark --help`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """A whole mesh on emulated radios: the real core on the real driver, under either clock.
 
-Each node has two threads, as on a Raspberry Pi: the antenna's, which receives, and one that works
-in the mesh component. For tests and experiments, the benchmark, and for trying the programs out
-without hardware.
+Each node has two threads, as on a Raspberry Pi: the antenna's, which receives, and one that runs
+the mesh component. For tests and experiments, the benchmark, and for running the programs without
+hardware.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from drone_mesh.nrf24.settings import RadioSettings
 
 Work = Callable[[float], None]
 
-_STEP_S = 0.1  # how closely run_until looks
+_STEP_S = 0.1  # period at which run_until checks its condition
 _FLIGHT_STEP_S = 0.1  # a flying antenna moves in steps of this
 
 
 class _AirTime:
-    """The clock of the air, as drones in one process see it."""
+    """The air's clock for drones in the same process."""
 
     def __init__(self, clock: EmulatorClock) -> None:
         self._clock = clock
@@ -50,7 +50,7 @@ class _AirTime:
 
 
 class EmulatedNode:
-    """One node. Its queue is filled by the receiving thread and emptied by the working one."""
+    """One node. The receiving thread fills its queue and the working thread empties it."""
 
     def __init__(
         self,
@@ -82,12 +82,12 @@ class EmulatedNode:
         self._working: Task | None = None
 
     def submit(self, work: Work) -> None:
-        """Have something done by the working thread."""
+        """Run this in the working thread."""
         self._queue.append(work)
         self._news.notify()
 
     def _moves(self, started: bool) -> None:
-        """Have the antenna follow the drone: with each step of a flight, and at its end."""
+        """Move the antenna with the drone: in each step of a flight, and at its end."""
         self.chip.position = self.drone.get_location().to_vector()
         if started or self.drone.path is not None:
             self._time.call_at(self._time.now_s + _FLIGHT_STEP_S, self._moves, False)
@@ -97,7 +97,7 @@ class EmulatedNode:
         self._working = self._runtime.start(self._work, f"mesh {self.node_id}")
 
     def stop(self) -> None:
-        """Stop it, and wait until its threads have ended."""
+        """Stop the mesh software, and wait until its threads have ended."""
         self._running = False
         self._news.notify()
         if self._working is not None:
@@ -119,7 +119,7 @@ class EmulatedNode:
 
 
 class EmulatedMesh:
-    """Nodes on one air. Everything is called from the thread that made it."""
+    """Nodes on one air. All calls come from the thread that created it."""
 
     def __init__(
         self,
@@ -162,11 +162,11 @@ class EmulatedMesh:
         node.start()
 
     def now_s(self) -> float:
-        """The time the nodes live by."""
+        """The time of the nodes."""
         return self.clock.runtime.now_s()
 
     def run_for(self, seconds: float) -> None:
-        """Let that much time pass."""
+        """Let time pass."""
         self.clock.runtime.sleep(seconds)
 
     def run_until(self, condition: Callable[[], bool], within_s: float) -> bool:
@@ -179,12 +179,12 @@ class EmulatedMesh:
         return True
 
     def power(self, node_id: int, on: bool) -> None:
-        """Switch a node's antenna, by that node's own thread."""
+        """Switch a node's antenna, in that node's own thread."""
         antenna = self.nodes[node_id].antenna
         self.nodes[node_id].submit(lambda _now_s: antenna.switch_power(on))
 
     def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> None:
-        """Order a drone to (x, y, height) metres through a gateway, by that gateway's thread."""
+        """Order a drone to (x, y, height) metres through a gateway, in that gateway's thread."""
         component = self.nodes[gateway].component
         if not isinstance(component, MeshnetworkGateway):
             raise ValueError(f"node {gateway} is a router: orders go through a gateway")
@@ -204,7 +204,7 @@ class EmulatedMesh:
         return component.get_hops_from_gateway_away()
 
     def all_connected(self) -> bool:
-        """Whether there are antennas that are on, and each of their nodes has a gateway."""
+        """Whether each node with power has a gateway, and there is at least one."""
         on = [node for node in self.nodes.values() if node.antenna.on()]
         return bool(on) and all(node.component.get_connected_to_gateway() for node in on)
 

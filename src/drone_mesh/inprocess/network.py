@@ -47,22 +47,22 @@ from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 from drone_mesh.state.model import EventRecord, MeshStatus
 
-ORACLE = "oracle"  # the repair that knows everything
-STEP_S = 0.1  # how closely run_until looks
+ORACLE = "oracle"  # the repair strategy with global knowledge
+STEP_S = 0.1  # period at which run_until checks its condition
 
 
 class NoInternet(IInternetConnection):
-    """Orders come from whoever holds the network."""
+    """No connection: orders come from the owner of the network."""
 
     def connect(self, commands: IGatewayCommands) -> None:
-        """Nothing to connect."""
+        """Does nothing."""
 
     def disconnect(self) -> None:
-        """Nothing to disconnect."""
+        """Does nothing."""
 
 
 class Node:
-    """One drone of the network with all that it carries, driven by the virtual clock."""
+    """One drone of the network with its mesh software, driven by the virtual clock."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class Node:
         else:
             self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
         self.component: MeshnetworkComponent
-        self.receiver: IMeshNetwork  # what takes the packets: the component, or its sealed antenna
+        self.receiver: IMeshNetwork  # receives the packets: the component or its sealed antenna
         self._planned_s = math.inf
 
     @property
@@ -98,25 +98,25 @@ class Node:
         self.plan()
 
     def hear(self, payload: bytes) -> None:
-        """A packet arrives."""
+        """A packet has arrived."""
         self.receiver.on_msg(payload, self._clock.now_s)
         if self.component.next_tick_s != self._planned_s:
             self.plan()
 
     def submit(self, work: Callable[[float], None]) -> None:
-        """Something is to be done in the component."""
+        """Run this in the component."""
         work(self._clock.now_s)
         if self.component.next_tick_s != self._planned_s:
             self.plan()
 
     def plan(self) -> None:
-        """Have the component called when it wants to be; to be called after every call into it."""
+        """Schedule the component's next tick; to be called after every call into it."""
         self._planned_s = self.component.next_tick_s
         if self._planned_s < math.inf:
             self._clock.call_at(self._planned_s, self._tick, self._planned_s)
 
     def _tick(self, planned_s: float) -> None:
-        if planned_s == self._planned_s:  # else the plan has changed since
+        if planned_s == self._planned_s:  # otherwise it was rescheduled
             self.component.tick(self._clock.now_s)
             self.plan()
 
@@ -146,10 +146,11 @@ class Network:
         repair_options: RepairOptions | None = None,
         key: Keys | Callable[[int], Keys | None] | None = None,
     ) -> None:
-        """`loss`, `delay_s` and `jitter_s` as in InProcessAir; `routing` as in a launch file, or
+        """`loss`, `delay_s` and `jitter_s` as for InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique.
 
-        `repair` names a repair strategy, as in a launch file, or is "oracle"; or it makes one.
+        `repair` is the name of a repair strategy, as in a launch file, or "oracle"; or a function
+        that creates one.
 
         `radio`: "disc", on which packets never meet, or "shared", the channel of nRF24L01+ radios
         at `rate` (250k, 1M or 2M) with the space between them as `links` says (default: an ideal
@@ -164,7 +165,7 @@ class Network:
         self._routing = routing
         self._repair = repair
         if isinstance(repair, str) and repair != ORACLE:
-            create_repair_strategy(repair)  # an unknown name is an error now, not per node
+            create_repair_strategy(repair)  # raises here for an unknown name, not per node
         self._repair_options = repair_options
         self._key = key
         self.clock = VirtualClock()
@@ -189,18 +190,18 @@ class Network:
         self.events: list[MeshEvent] = []
         self.received: dict[int, list[ReceivedMessage]] = {}  # by receiver, in order
 
-    # Building --------------------------------------------------------------------------------
+    # Construction ----------------------------------------------------------------------------
 
     def add_gateway(self, node_id: int, x: float, y: float, start_s: float = 0.0) -> None:
-        """A gateway at (x, y) metres on the ground; it starts at `start_s`."""
+        """Add a gateway at (x, y) metres on the ground; it starts at `start_s`."""
         self._add(node_id, x, y, start_s, gateway=True)
 
     def add_router(
         self, node_id: int, x: float, y: float, start_s: float = 0.0, why_not_fly: str = ""
     ) -> None:
-        """A router at (x, y) metres on the ground; it starts at `start_s`.
+        """Add a router at (x, y) metres on the ground; it starts at `start_s`.
 
-        It flies, unless there is a reason `why_not_fly`.
+        It flies unless `why_not_fly` gives a reason.
         """
         self._add(node_id, x, y, start_s, gateway=False, why_not_fly=why_not_fly)
 
@@ -212,7 +213,7 @@ class Network:
         spacing: float = 1.0,
         apart_s: float = 0.0,
     ) -> None:
-        """The fleet that the factory would make; each drone starts `apart_s` after the last one."""
+        """Add the factory's fleet; each drone starts `apart_s` after the previous one."""
         for place in plan_fleet(gateways, routers, gridsize, spacing):
             self._add(
                 place.node_id,
@@ -277,7 +278,7 @@ class Network:
     # Acting ----------------------------------------------------------------------------------
 
     def restart(self, node_id: int) -> None:
-        """Start the mesh software of a node again; it has lost all that it knew."""
+        """Restart the mesh software of a node, which loses its state."""
         node = self.nodes[node_id]
         node.component.stop()
         self._install(node, node_id, node.is_gateway)
@@ -292,9 +293,9 @@ class Network:
             node.plan()
 
     def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> bool:
-        """Order a drone to (x, y, height) metres through a gateway; as IGatewayCommands.
+        """Order a drone to (x, y, height) metres through a gateway; like IGatewayCommands.
 
-        Raises ValueError if `gateway` is none, and GoalRefused as IGatewayCommands does.
+        Raises ValueError if `gateway` is not a gateway, and GoalRefused like IGatewayCommands.
         """
         node = self.nodes[gateway]
         if not isinstance(node.component, MeshnetworkGateway):
@@ -306,7 +307,7 @@ class Network:
     def send(
         self, node_id: int, to: int, payload: bytes, port: int = 0, reliable: bool = True
     ) -> Ticket:
-        """Have a node send a message; as Transport.send."""
+        """Send a message from a node; like Transport.send."""
         node = self.nodes[node_id]
         ticket = node.component.data.send(
             to, payload, self.clock.now_s, port=port, reliable=reliable
@@ -315,14 +316,14 @@ class Network:
         return ticket
 
     def echo(self, node_id: int, to: int, on_answer: OnEchoAnswer) -> bool:
-        """Have a node send an echo to another one; False: it knows no route."""
+        """Send an echo from a node to another one; False: no route."""
         node = self.nodes[node_id]
         token = node.component.data.echo(to, on_answer, self.clock.now_s)
         node.plan()
         return token is not None
 
     def inject(self, node_id: int, payload: bytes) -> None:
-        """Let a node hear a packet from nowhere, also one whose antenna has no power."""
+        """Deliver a packet without a sender to a node, even if its antenna has no power."""
         self.nodes[node_id].hear(payload)
 
     def run_for(self, seconds: float) -> None:
@@ -330,7 +331,7 @@ class Network:
         self.clock.run_until(self.clock.now_s + seconds)
 
     def run_until(self, condition: Callable[[], bool], within_s: float) -> bool:
-        """Let time pass until `condition()` is true; False if it is not within so many seconds."""
+        """Let time pass until `condition()` is true; returns False if it is not in time."""
         deadline_s = self.clock.now_s + within_s
         while not condition():
             if self.clock.now_s >= deadline_s:
@@ -342,17 +343,17 @@ class Network:
         """Simulated seconds since the start."""
         return self.clock.now_s
 
-    # Looking ---------------------------------------------------------------------------------
+    # Observation -----------------------------------------------------------------------------
 
     def status(self) -> MeshStatus:
-        """All nodes now, as /mesh/state shows them: for tables, samples, reports and pictures."""
+        """The state of all nodes, like /mesh/state: for tables, samples, reports and pictures."""
         state = mesh_status(self.nodes, self.clock.now_s, self.air.max_distance_m)
         repair = self._repair
         repair = repair if isinstance(repair, str) else getattr(repair, "__name__", "")
         return replace(state, routing=self._routing, repair_strategy=repair)
 
     def event_records(self) -> list[EventRecord]:
-        """All events so far, as /mesh/events publishes them: for the story of the run."""
+        """All events so far, like those on /mesh/events: for the story of the run."""
         return event_records(self.events)
 
     def connected(self, node_id: int) -> bool:
@@ -360,27 +361,27 @@ class Network:
         return self.nodes[node_id].component.get_connected_to_gateway()
 
     def all_connected(self, among: Iterable[int] | None = None) -> bool:
-        """Whether each of these nodes (all that have power, if not said) is connected."""
+        """Whether each of these nodes (default: all that have power) is connected."""
         if among is None:
             among = [n for n, node in self.nodes.items() if node.antenna.powered]
         return all(map(self.connected, among))
 
     def links(self, node_id: int) -> list[int]:
-        """The nodes that a node can send to now; none while its antenna has no power."""
+        """The nodes that a node can currently send to; none while its antenna has no power."""
         if not self.nodes[node_id].antenna.powered:
             return []
         return [n for n, antenna in self.air.in_range(node_id).items() if antenna.powered]
 
     def hops(self, node_id: int) -> int:
-        """What a node believes its distance to the gateway to be."""
+        """A node's own count of hops to its gateway."""
         return self.nodes[node_id].component.get_hops_from_gateway_away()
 
     def location(self, node_id: int) -> Location:
-        """Where a drone is."""
+        """The position of a drone."""
         return self.nodes[node_id].drone.get_location()
 
     def shortest_hops(self) -> dict[int, int]:
-        """Hops on the shortest path to a gateway, of all nodes that have a path, by id."""
+        """By id: hops on the shortest path to a gateway, for all nodes with a path."""
         hops = {n: 0 for n, node in self.nodes.items() if node.is_gateway and node.antenna.powered}
         edge = list(hops)
         while edge:
@@ -394,7 +395,7 @@ class Network:
         return hops
 
     def path_to_gateway(self, node_id: int) -> list[int] | None:
-        """The nodes that a packet for the node's gateway would pass; None: it would not arrive."""
+        """The path of a packet to the node's gateway; None: it would not arrive."""
         gateway = self.nodes[node_id].component.get_preferred_gateway()
         path = [node_id]
         while path[-1] != gateway:

@@ -1,4 +1,4 @@
-"""Oracle: a repair that knows everything, which no drone can: the bound for all others."""
+"""Oracle: a repair with global knowledge, which no drone can have: a bound for all others."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ JUST_IN_RANGE = 0.95  # of the range
 
 
 class Oracle(IRepairStrategy):
-    """Flies into the range of the nearest node that is connected, wherever that is."""
+    """Flies into the range of the nearest connected node, wherever it is."""
 
     def __init__(self, connected: Callable[[], Mapping[int, Location]]) -> None:
-        """`connected` gives the places of all connected nodes."""
+        """`connected` returns the positions of all connected nodes."""
         self._connected = connected
 
     def on_emergency(self) -> None:
-        """Fly, unless another drone that flies now will be a relay."""
+        """Fly, unless a drone in flight will become a relay."""
         mesh, here = self.mesh, self.mesh.own_place()
         self.reason = mesh.why_not_fly()
         places = self._connected()

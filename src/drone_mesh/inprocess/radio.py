@@ -23,7 +23,7 @@ Deliver = Callable[[bytes], None]
 
 
 class InProcessAir:
-    """Which nodes hear each other, and how packets are lost, delayed or cut off."""
+    """Which nodes hear each other, and which packets are lost, delayed or cut off."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class InProcessAir:
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,
     ) -> None:
-        """`loss`: share of packets that do not arrive; the sender knows of the loss.
+        """`loss`: share of packets that do not arrive; the sender notices the loss.
 
         A packet arrives after `delay_s` and a random part of `jitter_s`.
         """
@@ -50,10 +50,10 @@ class InProcessAir:
         self.sees: Callable[[Location, Location], bool] | None = None
         # Whether a packet may arrive at all: experiments count packets and lose some.
         self.carries: Callable[[bytes], bool] | None = None
-        # The links between nodes that stand still: looked up for each packet, and changed only when
-        # a node appears, disappears or flies.
+        # The links between nodes at rest: looked up for each packet, and changed only when a node
+        # appears, disappears or flies.
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
-        self._standing: dict[int, Location] = {}  # their places
+        self._standing: dict[int, Location] = {}  # their positions
         self._flying: set[int] = set()
         self.delivered = 0
 
@@ -68,7 +68,7 @@ class InProcessAir:
         self._antennas.pop(antenna.node_id, None)
 
     def flight(self, node: int, started: bool) -> None:
-        """A drone took off (True) or came to a stop."""
+        """A drone took off (True) or stopped (False)."""
         if started:
             self._unlink(node)
             self._flying.add(node)
@@ -83,7 +83,7 @@ class InProcessAir:
         self._link(one)
 
     def in_range(self, node: int) -> dict[int, InProcessAntenna]:
-        """The antennas that `node` could reach if they were on, by id. Do not change it."""
+        """By id: the antennas that `node` could reach if they were on. Do not modify."""
         links = self._links.get(node)
         if links is None:
             return self._heard_by(node, self._places(self._antennas))
@@ -92,7 +92,7 @@ class InProcessAir:
         return links
 
     def _places(self, nodes: Iterable[int]) -> dict[int, Location]:
-        """The places of those of these nodes that have an antenna."""
+        """The positions of those of these nodes that have an antenna."""
         antennas = self._antennas
         return {node: antennas[node].drone.get_location() for node in nodes if node in antennas}
 
@@ -115,7 +115,7 @@ class InProcessAir:
         return heard
 
     def _link(self, node: int) -> None:
-        """Find the links of a node that stands; nothing for one that flies or is not there."""
+        """Find the links of a node at rest; nothing for a node in flight or without an antenna."""
         if node in self._antennas and node not in self._flying:
             links = self._heard_by(node, self._standing)
             self._links[node] = links
@@ -129,7 +129,7 @@ class InProcessAir:
             del self._links[other][node]
 
     def send(self, payload: bytes) -> bool:
-        """Hand a packet over; True when the receiver has it, or will in a moment."""
+        """Send a packet; returns whether the receiver gets it, now or after the delay."""
         if self.carries is not None and not self.carries(payload):
             return False
         from_, to = hop(payload)
@@ -206,6 +206,6 @@ class InProcessAntenna(IWirelessCommunication):
         self.powered = on
 
     def receive(self, payload: bytes) -> None:
-        """A packet arrives; a node that is off hears nothing."""
+        """A packet arrived; ignored without power."""
         if self.powered and self._started:
             self._deliver(payload)

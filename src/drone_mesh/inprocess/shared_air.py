@@ -1,10 +1,10 @@
 """The shared channel, packet by packet: a fast model of nRF24L01+ radios on one air.
 
-It knows what decides the fate of a packet: the time that frames take, that a radio cannot hear
-while it sends, acknowledgements and their loss, frames that overlap (with capture), the FIFO of
+It models what decides the fate of a packet: the duration of frames, that a radio cannot receive
+while it sends, acknowledgements and their loss, overlapping frames (with capture), the FIFO of
 three payloads, and the rules by which the driver uses the channel. Those rules are the driver's own
-(`nrf24.medium_access`), as are the link models (`nrf24.emulator.links`). What it leaves out is the
-chip: registers, SPI and bits. `python3 -m drone_mesh.lab.air_validation` compares the two.
+(`nrf24.medium_access`), as are the link models (`nrf24.emulator.links`). It omits the chip:
+registers, SPI and bits. `python3 -m drone_mesh.lab.air_validation` compares the two.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ class Transmission:
 
 
 class SharedRadio(abc.ABC):
-    """What the air sees of a radio."""
+    """A radio as seen by the air."""
 
     node_id: int
     drone: IDroneEngine
     powered: bool
-    listening_since_s: float | None  # None: it sends, turns round or has no power
+    listening_since_s: float | None  # None: it sends, switches over or has no power
 
     @abc.abstractmethod
     def recognises(self, frame: Transmission) -> bool:
-        """Whether the radio looks for the address of that frame now."""
+        """Whether the radio now listens for the address of that frame."""
 
     @abc.abstractmethod
     def frame_left(self, frame: Transmission) -> None:
@@ -73,12 +73,12 @@ class SharedAir:
         settings: RadioSettings,
         max_distance_m: float,
     ) -> None:
-        """`max_distance_m`: where pictures and path searches believe the range to end."""
+        """`max_distance_m`: the range for pictures and path searches."""
         self.clock = clock
         self.links = links
         self.settings = settings
         self.max_distance_m = max_distance_m
-        self.frames = 0  # that have been on the air
+        self.frames = 0  # frames sent so far
         self.collisions = 0  # receptions that another frame destroyed
         self.delivered = 0  # payloads that reached a mesh component
         self.airtime_s = 0.0  # of all frames together
@@ -98,17 +98,17 @@ class SharedAir:
     # The radios on the air -------------------------------------------------------------------
 
     def add(self, radio: SharedRadio) -> None:
-        """A radio appears."""
+        """Add a radio."""
         self._radios[radio.node_id] = radio
         self._forget(radio.node_id)
 
     def remove(self, radio: SharedRadio) -> None:
-        """A radio is gone."""
+        """Remove a radio."""
         self._radios.pop(radio.node_id, None)
         self._forget(radio.node_id)
 
     def flight(self, node: int, started: bool) -> None:
-        """A drone took off (True) or came to a stop."""
+        """A drone took off (True) or stopped (False)."""
         (self._flying.add if started else self._flying.discard)(node)
         self._forget(node)
 
@@ -123,7 +123,7 @@ class SharedAir:
     def transmit(
         self, sender: SharedRadio, packet: Outgoing, answers: SharedRadio | None = None
     ) -> None:
-        """A frame begins now."""
+        """Start sending a frame now."""
         now_s = self.clock.now_s
         duration_s = self._packet_s if answers is None else self._answer_s
         frame = Transmission(sender, packet, answers, now_s, now_s + duration_s)
@@ -193,7 +193,7 @@ class SharedAir:
         if power_dbm is not None:
             return power_dbm
         if sender == receiver:
-            return -math.inf  # it did not listen then
+            return -math.inf  # its own frame, during which it did not listen
         distance_m = self._distance_m(sender, receiver)
         if distance_m == math.inf:
             return -math.inf

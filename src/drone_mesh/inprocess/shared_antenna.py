@@ -27,14 +27,14 @@ from drone_mesh.nrf24.trains import place_in_train
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
 SETTLING_S = SETTLING_NS / NS_PER_S
-# What the driver's SPI transfers take at 8 MHz, as the emulator counts them.
+# Durations of the driver's SPI transfers at 8 MHz, as counted by the emulator.
 PREPARE_S = 60e-6  # from a listening chip to the rise of CE, without the pause of TX_DELAY_S
 FINISH_S = 20e-6  # from TX_DS or MAX_RT to CE high again
 LOAD_S = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
 READ_S = 80e-6  # from the end of a frame until its payload is in the driver
 
 Submit = Callable[[Callable[[float], None]], None]
-"""Run a function with now_s in the component of the node, and look after what that wants next."""
+"""Runs a function with now_s in the component of the node, and schedules its next call."""
 
 
 class SharedAntenna(IWirelessCommunication, SharedRadio):
@@ -84,13 +84,13 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         return self.access.patience
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
-        """Be reachable."""
+        """Become reachable."""
         self._mesh = mesh
         self.listening_since_s = self._clock.now_s
         self._air.add(self)
 
     def stop_antenna(self) -> None:
-        """Be gone."""
+        """Become unreachable."""
         self._mesh = None
         self.listening_since_s = None
         self.access.clear()
@@ -106,7 +106,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         return taken
 
     def broadcast_message(self, payload: bytes) -> None:
-        """Queue one frame for all."""
+        """Queue one frame for all nodes."""
         if self.powered:
             self.access.offer(ALL_NODES, payload, self._clock.now_s, _priority_of(payload))
             self._plan()
@@ -115,18 +115,18 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         return self.access.data_room()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Nothing: the owner of the network has its nodes."""
+        """Does nothing: the owner of the network can read its nodes."""
 
     def on(self) -> bool:
         """Whether it has power."""
         return self.powered
 
     def statistics(self) -> RadioStatistics:
-        """The counters as they are now."""
+        """The current counters."""
         return replace(self._radio, **self.access.figures())
 
     def switch_power(self, on: bool) -> None:
-        """Power on or off; what waits to be sent is dropped."""
+        """Power on or off; waiting packets are dropped."""
         self.powered = on
         self.access.clear()
         self.listening_since_s = self._clock.now_s if on and self._trying is None else None
@@ -184,7 +184,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
             self._finish(False)
 
     def _finish(self, acknowledged: bool) -> None:
-        """TX_DS or MAX_RT; the driver notices when it looks next."""
+        """TX_DS or MAX_RT; the driver notices it at its next check."""
         self.listening_since_s = None
         now_s, packet = self._clock.now_s, self._trying
         broadcast = packet is not None and packet.receiver == ALL_NODES

@@ -1,4 +1,4 @@
-"""ShortestPath: the routing bound. It sees all links of a network, without any packet."""
+"""ShortestPath: the bound for routing. It sees all links of a network, without any packet."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.inprocess.clock import VirtualClock
 
 SHORTEST_PATH = "shortest_path"
-LOOK_EVERY_S = 0.1  # our choice: links change when drones fly, and are then looked up again
+LOOK_EVERY_S = 0.1  # our choice: period for recomputing links, which change when drones fly
 
 
 class LinkMap:
-    """The next hops of all shortest paths of a network, as its links are now."""
+    """The next hops of all shortest paths over the current links of a network."""
 
     def __init__(self, clock: VirtualClock, links: Callable[[int], Iterable[int]]) -> None:
-        """`links` lists the nodes that a node can send to now, in both directions alike."""
+        """`links` returns the nodes that a node can send to now; links must be symmetric."""
         self._clock = clock
         self._links = links
         self._next_hops: dict[int, dict[int, int]] = {}  # by destination, by node
@@ -27,7 +27,7 @@ class LinkMap:
         return frozenset(self._links(node))
 
     def next_hop(self, node: int, destination: int) -> int:
-        """The neighbour of `node` on a shortest path, the lowest id of several, or NO_ROUTE."""
+        """The next hop of `node` on a shortest path, the lowest id of several, or NO_ROUTE."""
         now_s = self._clock.now_s
         if now_s - self._looked_s >= LOOK_EVERY_S:
             self._next_hops.clear()
@@ -51,7 +51,7 @@ class LinkMap:
 
 
 class ShortestPath(ChildTableTree):
-    """Hands each packet to the next hop of a shortest path."""
+    """Sends each packet to the next hop of a shortest path."""
 
     TAKES_SHORTCUTS = False
 
@@ -67,11 +67,11 @@ class ShortestPath(ChildTableTree):
         self._essentials.send_heartbeats(sorted(self.get_set_of_children()))
 
     def get_direction_to_node(self, node: int) -> int:
-        """As the links are now."""
+        """The next hop over the current links."""
         return self._links.next_hop(self._node_id, node)
 
     def get_set_of_children(self) -> frozenset[int]:
-        """The neighbours, as the links are now."""
+        """The neighbours over the current links."""
         return self._links.neighbours(self._node_id)
 
     def get_amount_of_children(self) -> int:
@@ -83,5 +83,5 @@ class ShortestPath(ChildTableTree):
         return not self.get_set_of_children()
 
     def gateway_lost(self, gateway: int) -> bool:
-        """There is nothing to forget, and nothing that neighbours should know."""
+        """Nothing to forget, and nothing to report to neighbours."""
         return False

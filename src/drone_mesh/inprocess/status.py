@@ -1,4 +1,4 @@
-"""The state of an in-process network in the form that every view reads."""
+"""The state of an in-process network, in the form used by all views."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drone_mesh.state.routes import route_to_gateway
 
 
 class ObservedNode(Protocol):
-    """What is read of a node of the network."""
+    """The attributes of a network node that are read here."""
 
     component: MeshnetworkComponent
     drone: InProcessDrone
@@ -31,7 +31,7 @@ class ObservedNode(Protocol):
 def mesh_status(
     nodes: Mapping[int, ObservedNode], now_s: float, max_distance_m: float
 ) -> MeshStatus:
-    """What /mesh/state would contain for these nodes now; it does not change afterwards."""
+    """The content of /mesh/state for these nodes now; it does not change afterwards."""
     known = {node_id: _node_status(node_id, nodes[node_id], now_s) for node_id in sorted(nodes)}
     for status in known.values():
         status.route = route_to_gateway(status.id, known)
@@ -39,7 +39,7 @@ def mesh_status(
 
 
 def event_records(events: Iterable[MeshEvent]) -> list[EventRecord]:
-    """What /mesh/events would contain for these events, oldest first."""
+    """The content of /mesh/events for these events, oldest first."""
     batcher = EventBatcher()
     records: list[EventRecord] = []
     for event in events:
