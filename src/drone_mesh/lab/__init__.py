@@ -1,1 +1,1 @@
-"""The tester's lab: an experiment is one file, a thousand seeded runs, one report. No ROS."""
+"""The lab: an experiment is one file, thousands of seeded runs, and one report. Without ROS."""

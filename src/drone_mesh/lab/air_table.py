@@ -21,24 +21,24 @@ from drone_mesh.lab.air_trial import (
 )
 from drone_mesh.layouts import Layouts
 
-AFTER_S = 600.0  # watched after the first "all connected"
+AFTER_S = 600.0  # observed after the first "all connected"
 QUICK_AFTER_S = 60.0
 SEEDS = 5
-WITHIN_S = 180.0  # a mesh that is not connected by then counts as never
+WITHIN_S = 180.0  # a mesh that is not connected by then counts as "never"
 
 
 @dataclass(frozen=True)
 class Result:
-    """One line of the table for one seed."""
+    """The result of one row for one seed."""
 
     text: str  # the figures
     reached: bool
-    worth: float  # the lower, the worse: which of several seeds is shown
+    worth: float  # the lower, the worse: the worst of several seeds is shown
 
 
 @dataclass(frozen=True)
 class Row:
-    """One aim."""
+    """One row of the table, with its aim."""
 
     name: str
     aim: str
@@ -96,7 +96,7 @@ def _orders(flight_m: float) -> Row:
     return Row(name, "99 % within 2 s, losses reported", run)
 
 
-# When the last node was connected again on the ideal disc, worst of 20 seeds:
+# Time until the last node was connected again on the ideal disc, worst of 20 seeds:
 # `air_table --radio disc --seeds 20 --row layout`.
 _ON_THE_DISC_S = {
     (101, (3,)): 15.2,
@@ -181,7 +181,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print the table; 1 if an aim was missed."""
+    """Print the table; returns 1 if an aim was missed."""
     arguments = _arguments(argv)
     rows = QUICK_ROWS if arguments.quick else ROWS
     if arguments.radio == DISC:

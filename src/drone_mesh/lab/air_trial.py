@@ -20,20 +20,20 @@ from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 
 CHIPS, MODEL, DISC = "chips", "model", "disc"
-SAMPLE_S = 0.1  # how closely the connection of the nodes is looked at
-SETTLE_S = 20.0  # from "all connected" to what the trial is about
+SAMPLE_S = 0.1  # sampling period of the nodes' connections
+SETTLE_S = 20.0  # from "all connected" to the fault of the trial
 GATEWAY = 0
 
 
 @dataclass(frozen=True)
 class AirTrial:
-    """A gateway and routers on a grid, or at given places."""
+    """A gateway and routers on a grid, or at given positions."""
 
     nodes: int
     rate: str = "250k"
     spacing_m: float = 6.0
     links: str = "disc"  # or "distance": the power falls with it, the edge of the range at 9 m
-    loss: float = 0.0  # share of all frames that get lost by decision
+    loss: float = 0.0  # share of frames that are dropped deliberately
     seed: int = 1
     places: tuple[tuple[float, float], ...] = ()  # x, y of the routers 1, 2, ...; none: a grid
 
@@ -47,7 +47,7 @@ class AirTrial:
 
 
 class AirMesh(Protocol):
-    """What both kinds of mesh offer."""
+    """The common functions of both kinds of mesh."""
 
     events: list[MeshEvent]
 
@@ -63,10 +63,10 @@ class AirMesh(Protocol):
 
 @dataclass(frozen=True)
 class Figures:
-    """What one trial showed."""
+    """The result of one trial."""
 
     connected_s: float  # when all were connected for the first time; infinity: never
-    share: float  # of node-seconds connected after that, gateway left out
+    share: float  # of node-seconds connected after that, without the gateway
     frames: int
     collided: float  # receptions that another frame destroyed, per frame
     airtime: float  # of all frames together, share of the time
@@ -92,11 +92,11 @@ class ChipMesh:
         self.power, self.order, self.stop = self.mesh.power, self.mesh.order, self.mesh.stop
 
     def place(self, node_id: int) -> Location:
-        """Where a drone is."""
+        """The position of a drone."""
         return self.mesh.nodes[node_id].drone.get_location()
 
     def figures(self) -> dict[str, float]:
-        """Of the air and of all radios."""
+        """Figures of the air and of all radios."""
         air, nodes = self.mesh.air, self.mesh.nodes.values()
         radios = [node.antenna.statistics() for node in nodes]
         return _totals(
@@ -112,7 +112,7 @@ class ModelMesh:
     """The mesh on the fast model."""
 
     def __init__(self, trial: AirTrial, shared: bool = True) -> None:
-        """Not `shared`: the ideal disc, which has no figures of its air."""
+        """Not `shared`: the ideal disc, which has no figures for its air."""
         if shared:
             self.network = Network(
                 seed=trial.seed, radio="shared", rate=trial.rate, links=_links(trial)
@@ -132,10 +132,10 @@ class ModelMesh:
         )
 
     def stop(self) -> None:
-        """Nothing to end."""
+        """Does nothing."""
 
     def figures(self) -> dict[str, float]:
-        """Of the air and of all radios."""
+        """Figures of the air and of all radios."""
         air = self.network.air
         assert isinstance(air, SharedAir)
         antennas = [node.antenna for node in self.network.nodes.values()]
@@ -150,12 +150,12 @@ class ModelMesh:
 
 
 def make_mesh(trial: AirTrial, kind: str) -> ChipMesh | ModelMesh:
-    """The mesh of a trial on CHIPS, the MODEL or the DISC; all its nodes start at once."""
+    """The mesh of a trial on CHIPS, the MODEL or the DISC; all nodes start together."""
     return ChipMesh(trial) if kind == CHIPS else ModelMesh(trial, shared=kind == MODEL)
 
 
 def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> Figures:
-    """Wait until all are connected, at most `within_s`, and watch them for `after_s` more."""
+    """Wait at most `within_s` until all are connected, then observe them for `after_s`."""
     cpu_s = time.process_time()
     mesh = make_mesh(trial, kind)
     connected_s = connect(mesh, within_s)
@@ -180,7 +180,7 @@ def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> Figure
 
 
 def connect(mesh: AirMesh, within_s: float) -> float:
-    """When all were connected; infinity if that took longer than `within_s`."""
+    """Time until all were connected; infinity if longer than `within_s`."""
     until_s = mesh.now_s() + within_s
     while not mesh.all_connected():
         if mesh.now_s() >= until_s:
@@ -202,20 +202,20 @@ def share_connected(mesh: AirMesh, nodes: Iterable[int], seconds: float) -> floa
 
 @dataclass(frozen=True)
 class Losses:
-    """What became of a mesh in which nodes died."""
+    """The recovery of a mesh in which nodes died."""
 
-    back_s: float  # after the deaths: the last moment at which a node with a path was unconnected
+    back_s: float  # after the deaths: last time at which a node with a path was unconnected
     cut_off: int  # survivors without any path to the gateway
-    flights: int  # by decision of a node that had a path: congestion is the only reason for those
-    flown: tuple[int, ...]  # all that flew by decision
+    flights: int  # decided by nodes that had a path, which only congestion can cause
+    flown: tuple[int, ...]  # all drones that decided to fly
 
 
 def kill(
     trial: AirTrial, kind: str, dead: Iterable[int], seconds: float, repair: bool = False
 ) -> Losses:
-    """Connect, switch nodes off, and watch the survivors that still have a path.
+    """Connect, switch nodes off, and observe the survivors that still have a path.
 
-    `repair`: watch all survivors, for a drone is expected to fly for the others.
+    `repair`: observe all survivors, because a drone is expected to fly for the others.
     """
     mesh = make_mesh(trial, kind)
     connect(mesh, 120.0)
@@ -247,7 +247,7 @@ def kill(
 
 
 def with_a_path(places: dict[int, Location]) -> frozenset[int]:
-    """The nodes, gateway left out, that a chain of links of the ideal disc leads to it."""
+    """The nodes, without the gateway, that a chain of ideal-disc links connects to the gateway."""
     found, edge = {GATEWAY}, [GATEWAY]
     while edge:
         here = places[edge.pop()]
@@ -260,16 +260,16 @@ def with_a_path(places: dict[int, Location]) -> frozenset[int]:
 
 @dataclass(frozen=True)
 class Orders:
-    """What became of orders."""
+    """The outcomes of orders."""
 
     sent: int
     in_time: int  # reached their drone within two seconds
     later: int
-    reported: int  # of the rest: the gateway that sent them said so
+    reported: int  # of the rest: reported by the gateway that sent them
 
 
 def give_orders(trial: AirTrial, kind: str, count: int, flight_m: float) -> Orders:
-    """One order a second to a random drone, to a place `flight_m` from its own in the grid."""
+    """One order a second to a random drone, to a point `flight_m` from its position in the grid."""
     mesh = make_mesh(trial, kind)
     connect(mesh, 120.0)
     mesh.run_for(SETTLE_S)
@@ -300,7 +300,7 @@ def give_orders(trial: AirTrial, kind: str, count: int, flight_m: float) -> Orde
 
 
 def _first_s(events: list[MeshEvent], kind: MeshEventKind, node: int, since_s: float) -> float:
-    """How long after `since_s` that happened to the node first; infinity: not at all."""
+    """Time from `since_s` to the node's first event of this kind; infinity if there is none."""
     after = (e.now_s - since_s for e in events if e.kind is kind and e.node == node)
     return min((passed_s for passed_s in after if passed_s >= 0), default=math.inf)
 

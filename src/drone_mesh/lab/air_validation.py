@@ -16,13 +16,13 @@ from drone_mesh.lab.air_trial import CHIPS, MODEL, AirTrial, Figures, watch, wit
 SIZES = (17, 26, 50, 101)
 RATES = ("250k", "1M", "2M")
 LINKS = ("disc", "distance")
-# The times and the collisions of single runs scatter by a third of their mean: a mean over so many
-# is known to a few percent. Runs of large meshes scatter less and cost more.
+# Times and collisions of single runs vary by a third of their mean: a mean over this many runs is
+# accurate to a few percent. Runs of large meshes vary less and cost more.
 SEEDS = {17: 40, 26: 40, 50: 20}
 SEEDS_OF_OTHERS = 5
 AFTER_S = 40.0
 WITHIN_S = 180.0
-# What counts as agreement.
+# Limits of agreement.
 SHARE_POINTS = 2.0
 CONNECTED_PART = 0.25
 FRAMES_PART = 0.10
@@ -31,7 +31,7 @@ COLLIDED_PART = 0.10
 
 @dataclass(frozen=True)
 class Means:
-    """Of several seeds."""
+    """Means over several seeds."""
 
     connected_s: float
     share_percent: float
@@ -53,7 +53,7 @@ class Means:
 
 
 def disagreements(chips: Means, model: Means) -> list[str]:
-    """The figures in which the model is too far from the chips."""
+    """The figures for which the model is too far from the chips."""
     found = []
     if abs(model.share_percent - chips.share_percent) > SHARE_POINTS:
         found.append("share")
@@ -105,7 +105,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print the table; 1 if a row disagrees."""
+    """Print the table; returns 1 if a row disagrees."""
     arguments = _arguments(argv)
     names = "nodes | rate | links | seeds | all connected, s | connected, % | frames/s"
     names += " | collided, % | sim. s per core s | disagrees"

@@ -1,4 +1,4 @@
-"""A repair as a moving picture: inline SVG that plays by itself in any browser."""
+"""A repair as an animation: inline SVG that plays in any browser."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SERVED, LOST, OFF, GATEWAY = "#009E73", "#D55E00", "#c5cad3", "#6d3fd1"
 
 
 def animate_repair(states: Sequence[MeshStatus], record: RunRecord) -> str:
-    """SVG text of the time around the repair; empty when there was none to show."""
+    """SVG text of the time around the repair; empty if there was none."""
     if record.fault_s is None:
         return ""
     end_s = record.end_s if record.healed_at_s is None else record.healed_at_s
@@ -74,7 +74,7 @@ class _Scale:
 
 
 def _links(frames: Sequence[MeshStatus], scale: _Scale, seconds: float) -> list[str]:
-    """The routes in use; frames with the same ones share them."""
+    """The routes in use; consecutive frames with the same routes share them."""
     pictures = []
     for frame in frames:
         nodes = {node.id: node for node in frame.nodes}
@@ -133,7 +133,7 @@ def _animate(attribute: str, values: Sequence[str], seconds: float, mode: str) -
 
 
 def _visible(start: int, stop: int, frames: int, seconds: float) -> str:
-    """Shown in the frames start..stop-1."""
+    """Makes an element visible in the frames start..stop-1."""
     values = ["visible" if start <= frame < stop else "hidden" for frame in range(frames)]
     changes = [0, *(i for i in range(1, frames) if values[i] != values[i - 1])]
     times = ";".join(f"{change / frames:.4f}" for change in changes)
@@ -145,7 +145,7 @@ def _visible(start: int, stop: int, frames: int, seconds: float) -> str:
 
 
 def _runs(items: Sequence[str]) -> list[tuple[int, int, str]]:
-    """Stretches of equal items: first, behind the last, item."""
+    """Runs of equal items: first index, index after the last, item."""
     found: list[tuple[int, int, str]] = []
     for index, item in enumerate(items):
         if found and found[-1][2] == item:

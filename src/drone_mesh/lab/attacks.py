@@ -1,8 +1,7 @@
-"""Attacks on a mesh, as a stranger with one radio can make them (docs/security.md, "Attacks").
+"""Attacks on a mesh that an outsider with one radio can make (docs/security.md, "Attacks").
 
-Each function here is one attack. It is called when the mesh is connected, takes as much simulated
-time as it needs, and returns the places where the owner of the mesh wants drones to be that had
-orders meanwhile.
+Each function here is one attack. It is called once the mesh is connected, takes as much simulated
+time as it needs, and returns where the owner has ordered drones meanwhile.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ Attack = Callable[[Stranger], Dict[int, Location]]
 
 
 def order_gateway_away(stranger: Stranger) -> dict[int, Location]:
-    """One order to fly, for the gateway's own drone."""
+    """One order to fly, to the gateway's own drone."""
     _order(stranger, 0, 0)
     stranger.network.run_for(ATTACK_S)
     return {}
 
 
 def order_all_away(stranger: Stranger) -> dict[int, Location]:
-    """One order to fly for each drone, the far ones first."""
+    """One order to fly to each drone, far ones first."""
     near = stranger.in_range()
     for node in sorted(stranger.network.nodes, reverse=True):
         _order(stranger, node if node in near else near[-1], node)
@@ -50,7 +49,7 @@ def order_all_away(stranger: Stranger) -> dict[int, Location]:
 
 
 def false_gateway(stranger: Stranger) -> dict[int, Location]:
-    """A radio that claims to be a gateway, and answers each heartbeat."""
+    """A radio that claims to be a gateway and answers each heartbeat."""
     me = stranger.node_id
 
     def answer(payload: bytes) -> None:
@@ -66,7 +65,7 @@ def false_gateway(stranger: Stranger) -> dict[int, Location]:
 
 
 def black_hole(stranger: Stranger) -> dict[int, Location]:
-    """A radio that presents itself as the best way to the gateway, and forwards nothing."""
+    """A radio that introduces itself as the best route to the gateway but forwards nothing."""
     me = stranger.node_id
     for _ in stranger.every(1.0, ATTACK_S):
         for node in stranger.in_range():
@@ -86,7 +85,7 @@ def swallowing_relay(stranger: Stranger) -> dict[int, Location]:
 
 
 def missing_storm(stranger: Stranger) -> dict[int, Location]:
-    """Once a second, under each id: the gateway is missing."""
+    """Once a second, with each id as sender: the gateway is missing."""
     for _ in stranger.every(1.0, ATTACK_S):
         for node in stranger.in_range():
             for creator in stranger.network.nodes:
@@ -96,7 +95,7 @@ def missing_storm(stranger: Stranger) -> dict[int, Location]:
 
 
 def invented_ids(stranger: Stranger) -> dict[int, Location]:
-    """Ten heartbeats a second, each of another node that does not exist."""
+    """Ten heartbeats a second, each from another invented node."""
     chance = random.Random(stranger.node_id)
     for _ in stranger.every(0.1, ATTACK_S):
         creator = chance.randrange(100, 250)
@@ -119,12 +118,12 @@ def far_place(stranger: Stranger) -> dict[int, Location]:
 
 
 def highest_bid(stranger: Stranger) -> dict[int, Location]:
-    """The drones behind node 1 are cut off for good; a bid each 3 s is higher than theirs."""
+    """The drones behind node 1 are cut off permanently; a higher bid than theirs every 3 s."""
     return _bid(stranger, LARGEST_BID)
 
 
 def plausible_bid(stranger: Stranger) -> dict[int, Location]:
-    """The same with bids that a real drone could make."""
+    """The same, with bids that a real drone could make."""
     return _bid(stranger, PLAUSIBLE_BID)
 
 
@@ -139,12 +138,12 @@ def _bid(stranger: Stranger, score: float) -> dict[int, Location]:
 
 
 def replayed_order(stranger: Stranger) -> dict[int, Location]:
-    """The owner sends drone 1 away and back; a second later its first order comes again."""
+    """The owner sends drone 1 away and back; a second later its first order is replayed."""
     return _replay(stranger, lambda: None)
 
 
 def replay_after_restart(stranger: Stranger) -> dict[int, Location]:
-    """The same, and drone and gateway start again before the order comes again."""
+    """The same, but drone and gateway restart before the order is replayed."""
 
     def restart() -> None:
         for node in (1, 0):
@@ -155,7 +154,7 @@ def replay_after_restart(stranger: Stranger) -> dict[int, Location]:
 
 
 def replay_on_another_path(stranger: Stranger) -> dict[int, Location]:
-    """The same; the order comes again through another neighbour of the drone."""
+    """The same, but the order is replayed through another neighbour of the drone."""
     return _replay(stranger, lambda: None, through=6)
 
 

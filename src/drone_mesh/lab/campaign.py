@@ -1,4 +1,4 @@
-"""Runs what an experiment still lacks, until it is complete."""
+"""Runs the missing runs of an experiment until it is complete."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Campaign:
     """One experiment and its results folder."""
 
     def __init__(self, loaded: LoadedExperiment, folder: Path, command: Sequence[str]) -> None:
-        """`command`: how this was called, for provenance and for going on later."""
+        """`command`: the command line, for provenance and for resuming."""
         self.loaded = loaded
         self.folder = folder
         self._command = list(command)
@@ -35,9 +35,9 @@ class Campaign:
         retry_failed: bool = False,
         stream: TextIO = sys.stderr,
     ) -> None:
-        """Run what is missing; add seeds where the experiment says so.
+        """Execute missing runs; add seeds if the experiment requests it.
 
-        Raises StoreError or EngineError; what had been done until then is kept, and in order.
+        Raises StoreError or EngineError; completed runs are kept, in order.
         """
         plan = Plan(self.loaded)
         store = Store(self.folder, plan)
@@ -98,7 +98,7 @@ class Campaign:
         return f"python3 -m drone_mesh.lab show {shlex.quote(str(self.folder))} {run}"
 
     def _more_seeds(self, plan: Plan, store: Store) -> int | None:
-        """How many seeds each cell shall have next; None: enough."""
+        """The number of seeds for each cell in the next round; None: enough."""
         stop = self.loaded.experiment.stop
         if stop is None or plan.seeds >= stop.max_seeds:
             return None

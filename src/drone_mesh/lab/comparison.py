@@ -23,7 +23,7 @@ class ComparedMetric(NamedTuple):
 
 
 def compare_cells(results: Results, a: int, b: int, metrics: Sequence[str]) -> list[ComparedMetric]:
-    """Each metric over the seeds that both cells have; Holm over the metrics."""
+    """Compare metrics over the seeds that both cells have; Holm over the metrics."""
     rows_a, rows_b = results.of_cell(a), results.of_cell(b)
     common = sorted(rows_a.keys() & rows_b.keys())
     found = []
@@ -41,7 +41,7 @@ def compare_cells(results: Results, a: int, b: int, metrics: Sequence[str]) -> l
 
 
 def print_comparison(folder: Path, a: str, b: str, metrics: Sequence[str]) -> None:
-    """Print the table. Raises ConfigurationError for cells or metrics that are not there."""
+    """Print the table. Raises ConfigurationError for unknown cells or metrics."""
     results = load_results(folder)
     cell_a, cell_b = results.find_cell(a), results.find_cell(b)
     chosen = list(metrics) or results.metrics

@@ -14,7 +14,7 @@ _PATTERN = re.compile(
 
 
 class Condition(NamedTuple):
-    """So many seconds after this has happened for the first time."""
+    """A delay after the first occurrence of an event."""
 
     event: str  # one of EVENTS
     delay_s: float

@@ -15,10 +15,10 @@ from drone_mesh.lab.ideal_moves import Flown
 from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.random_layouts import Point, cut_vertices, random_layout
 
-LAYOUTS = {20: 40, 50: 20, 100: 8}  # drones -> layouts, as many as in the ideal figures
+LAYOUTS = {20: 40, 50: 20, 100: 8}  # drones -> layouts, the same number as for the ideal figures
 SIDE_M = {20: 24.0, 50: 37.5, 100: 56.25}  # of the square: 120 m of range scaled to 9 m
 HEALED_WITHIN_S = 300.0
-CALM_S = 30.0  # afterwards: a drone that still follows has landed
+CALM_S = 30.0  # afterwards: drones that still follow have landed by then
 IDEAL: dict[str, Callable[..., Flown]] = {
     "nearest": ideal_moves.nearest,
     "inward": ideal_moves.inward,
@@ -105,13 +105,13 @@ def _row(drones: int, deaths: Sequence[tuple[Sequence[Point], int]], repair: str
 
 
 def _run(points: Sequence[Point], vertex: int, repair: str, seed: int) -> tuple[bool, Flown]:
-    """The same death in a network: whether it healed, and what each drone flew."""
+    """The same death in a network: whether it healed, and how far each drone flew."""
     network = Network(seed=seed, repair=repair)
     network.add_gateway(0, *points[0])
     for node, point in enumerate(points[1:], start=1):
         network.add_router(node, *point)
     network.run_until(network.all_connected, within_s=60.0)
-    network.run_for(20.0)  # each node has asked where its next hop is
+    network.run_for(20.0)  # each node has requested its next hop's place
     network.power(vertex, False)
     network.run_for(15.0)  # the loss is noticed
     is_healed = network.run_until(network.all_connected, within_s=HEALED_WITHIN_S)

@@ -1,4 +1,4 @@
-"""What an attack does to a mesh: nodes cut off, drones lured away."""
+"""The damage that an attack does to a mesh: nodes cut off, drones lured away."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from drone_mesh.lab.stranger import BESIDE, Stranger
 NODES, SHARED_NODES = 25, 9
 SPACING_M = 6.0
 STRANGER = 200
-LURED_M = 50.0  # further than any repair flies here
-OFF_ORDER_M = 3.0  # of a drone that its owner ordered to a place
+LURED_M = 50.0  # farther than any repair flies here
+OFF_ORDER_M = 3.0  # tolerance for a drone that its owner ordered to a place
 _SECRET = b"the key of a lab"
 KEY = MeshKey(_SECRET)
 
 
 class Case(enum.Enum):
-    """Whether there is a key, and which kind of attacker."""
+    """Whether there is a key, and the kind of attacker."""
 
     NOBODY = "no attack"
     WITHOUT_KEY = "without key"
@@ -37,16 +37,16 @@ RECOVERY_S = 60.0
 
 
 class Damage(NamedTuple):
-    """Of one attack on one mesh."""
+    """The damage of one attack on one mesh."""
 
-    cut_off: float  # share of the routers without a working path to a gateway, mean over its time
-    later: float  # the same, at a moment a minute later
-    lured: int  # drones more than LURED_M from where they belong
-    metres: float  # the farthest of them
+    cut_off: float  # share of routers without a working path to a gateway, mean during the attack
+    later: float  # the same, one minute after the attack
+    lured: int  # drones more than LURED_M from their proper positions
+    metres: float  # distance of the farthest of them
 
 
 def trial(name: str, case: Case, seed: int) -> Damage:
-    """One attack, on a mesh without a key, with one, or by a captured node of one with a key."""
+    """One attack: on a mesh without a key, with one, or with one by a captured node."""
     attack = ATTACKS[name]
     shared = attack is invented_ids  # where an answer to an absent node costs airtime
     radio = "shared" if shared else "disc"
@@ -85,7 +85,7 @@ def trial(name: str, case: Case, seed: int) -> Damage:
 
 
 def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> float:
-    """The share of the powered routers from which no packet would arrive at a gateway.
+    """The share of powered routers whose packets would not arrive at a gateway.
 
     `swallow`: nodes that drop what they should forward; they do not count.
     """
@@ -95,14 +95,14 @@ def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> 
 
 
 def table(names: Sequence[str], runs: int) -> Iterator[str]:
-    """The lines of a Markdown table: means over the runs, the farthest of all drones."""
+    """The lines of a Markdown table: means over the runs, and the farthest of all drones."""
     yield "| attack | " + " | ".join(case.value for case in Case) + " |"
     yield "|---" * (1 + len(Case)) + "|"
     for name in names:
         cells = []
         for case in Case:
             if case is Case.CAPTURED and ATTACKS[name] in RECORDING:
-                cells.append("")  # it would play what it recorded like any other radio
+                cells.append("")  # a captured node replays recordings like any other radio
                 continue
             damage = [trial(name, case, seed) for seed in range(runs)]
             cells.append(_in_words(damage))
@@ -125,14 +125,14 @@ def keys_of(node_id: int) -> Keys | None:
 
 
 def _get_acquainted(stranger: Stranger) -> None:
-    """A captured node is a neighbour of the others before it does any harm."""
+    """A captured node becomes a neighbour of the others before it attacks."""
     me = stranger.node_id
     stranger.antenna.broadcast_message(bytes((me, me, 3, 254, 254, 255, 0)).ljust(32, b"\0"))
     stranger.network.run_for(12.0)
 
 
 def _arrives(network: Network, node: int, swallow: AbstractSet[int]) -> bool:
-    """Whether a packet for the node's gateway would get there, over living links."""
+    """Whether a packet for the node's gateway would arrive over live links."""
     component = network.nodes[node].component
     gateway = component.get_preferred_gateway()
     if not component.get_connected_to_gateway() or gateway not in network.nodes:
@@ -151,7 +151,7 @@ def _arrives(network: Network, node: int, swallow: AbstractSet[int]) -> bool:
 def _away(
     network: Network, before: dict[int, Location], ordered: dict[int, Location]
 ) -> list[float]:
-    """How far drones are, or will be, from where they belong, in metres."""
+    """How far drones are, or will be, from their proper positions, in metres."""
     distances = []
     for node, was_at in before.items():
         place = ordered.get(node, was_at)
@@ -164,7 +164,7 @@ def _away(
 
 
 class _Sampler:
-    """Looks at the mesh once a second."""
+    """Samples the mesh once a second."""
 
     def __init__(self, network: Network, swallow: AbstractSet[int]) -> None:
         self._network = network
@@ -173,7 +173,7 @@ class _Sampler:
         self._look()
 
     def mean(self) -> float:
-        """Over the time so far; it looks no more."""
+        """The mean so far; ends the sampling."""
         shares, self._shares = self._shares, None
         return statistics.fmean(shares or [0.0])
 

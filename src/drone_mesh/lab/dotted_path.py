@@ -1,4 +1,4 @@
-"""Sets the value at a dotted path, as in `faults.kill.share`, within the content of a file."""
+"""Sets the value at a dotted path, such as `faults.kill.share`, in the content of a file."""
 
 from typing import Any, List, Sequence, Union
 
@@ -6,11 +6,11 @@ from drone_mesh.lab.marked_yaml import Place
 
 
 class NoSuchPlace(Exception):
-    """A dotted path that leads nowhere."""
+    """A dotted path that does not exist."""
 
 
 def put(content: Any, path: str, value: Any) -> Place:
-    """Set the value at a dotted path. A step into the faults is an index or the action's name."""
+    """Set the value at a dotted path. A step into the faults is an index or an action's name."""
     place: List[Union[str, int]] = []
     steps = path.split(".")
     for index, step in enumerate(steps):

@@ -1,6 +1,6 @@
-"""Runs a batch, in this process or on workers, and yields what came of each run.
+"""Runs a batch, in this process or on workers, and yields the outcome of each run.
 
-The store owns what is done; nothing here remembers anything. dask.distributed moves the work off
+The store records what is done; the engine keeps no state. dask.distributed reassigns the work of
 dead workers, from a laptop (LocalCluster) to a laboratory's cluster, with one API.
 """
 
@@ -22,21 +22,21 @@ from drone_mesh.lab.worker import Outcome, execute, execute_batch
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-BATCH_S = 0.5  # work that goes to a worker at a time: the scheduler's milliseconds do not count
+BATCH_S = 0.5  # work sent to a worker at once, so that the scheduler's overhead is negligible
 LARGEST_BATCH = 64
-TASKS_PER_WORKER = 2  # one at work, one waiting
-DEATHS_ALLOWED = 2  # a run whose worker dies once more is a failure
+TASKS_PER_WORKER = 2  # one running, one waiting
+DEATHS_ALLOWED = 2  # after one more death of its worker a run counts as failed
 SLURM = "slurm"
 
 
 class EngineError(MeshError):
-    """No workers are available, or they have ended. Outcomes already yielded are kept."""
+    """No workers are available, or they have ended. Outcomes yielded before are kept."""
 
 
 def run_all(specs: Iterable[RunSpec], workers: int, cluster: str | None) -> Iterator[Outcome]:
-    """The outcome of each of these runs, in the order in which they end.
+    """Yield the outcome of each of these runs, in order of completion.
 
-    `workers`: 0 is this very process; otherwise so many local processes, or jobs of a SLURM
+    `workers`: 0 for this process; otherwise the number of local processes, or of jobs on a SLURM
     cluster. `cluster`: the address of a dask scheduler, or "slurm". Raises EngineError.
     """
     if workers == 0 and cluster is None:
@@ -87,7 +87,7 @@ def _client(workers: int, cluster: str | None) -> Iterator[Client]:
 
 @contextlib.contextmanager
 def _children_ignore_ctrl_c() -> Iterator[None]:
-    """A terminal signals the workers too. Only this process answers; it ends the others."""
+    """A terminal sends Ctrl-C to the workers too. Only this process handles it, and ends them."""
     if threading.current_thread() is not threading.main_thread():
         yield  # no Ctrl-C arrives here
         return
@@ -124,7 +124,7 @@ def _run_on(client: Client, waiting: deque[RunSpec]) -> Iterator[Outcome]:
     under_way: dict[Future, list[RunSpec]] = {}
     done = as_completed(loop=client.loop)
     lengths_s: deque[float] = deque(maxlen=50)
-    alone: deque[RunSpec] = deque()  # of batches whose worker died: now one by one
+    alone: deque[RunSpec] = deque()  # runs of batches whose worker died: retried one by one
 
     def submit() -> None:
         size = 1

@@ -1,4 +1,4 @@
-"""How long an experiment will take, from trial runs of its own cells."""
+"""Estimates the duration of an experiment, from trial runs of its own cells."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.worker import execute, measured, scenario_of, simulation_of
 
 BUDGET_S = 20.0  # of trial runs
-MOST_CELLS = 60  # that get a trial; of more, every n-th
-MOST_TRIALS = 8  # of one cell, if there are several
-ENOUGH_TRIALS = 40  # of a few cells together
-LEAST_SHARE = 0.25  # of a run is simulated before a trial is cut off: its start is not typical
-START_S = 2.5  # until local workers have started and loaded the code
-TASK_S = 0.004  # per run beside its own time: scheduling, storing
+MOST_CELLS = 60  # cells that get a trial; of more, every n-th
+MOST_TRIALS = 8  # per cell, if there are several cells
+ENOUGH_TRIALS = 40  # for a few cells together
+LEAST_SHARE = 0.25  # least simulated share of a run in a trial: the start is not typical
+START_S = 2.5  # time in which local workers start and load the code
+TASK_S = 0.004  # additional time per run: scheduling, storing
 
 Clock = Callable[[], float]
-"""Seconds of processor time of this process: other processes do not count."""
+"""Processor time of this process, in seconds; other processes do not count."""
 
 
 class Trial(NamedTuple):
-    """What one run costs, in seconds of processor time."""
+    """The cost of one run, in seconds of processor time."""
 
     run_s: float
     outside_s: float | None  # of these, outside the simulation; None: cut off, or without packets
 
 
 class Estimate(NamedTuple):
-    """Seconds that the experiment needs on cores that have nothing else to do."""
+    """The seconds that the experiment needs on otherwise idle cores."""
 
     wall_s: float
     run_s: float  # mean of one run
-    outside_s: float | None  # of these, outside the simulation; None: no trial came to its end
+    outside_s: float | None  # of these, outside the simulation; None: no trial was completed
     trials: int
 
 
@@ -44,10 +44,10 @@ class EstimateError(MeshError):
 
 
 def estimate(plan: Plan, workers: int, clock: Clock = time.process_time) -> Estimate:
-    """Try every cell once, or every n-th of many, and all of them again while there is time.
+    """Try every cell once, or every n-th of many; repeat them while there is time.
 
     A trial of a long run is cut off and extrapolated, so that each cell has one. Raises
-    EstimateError when a trial fails.
+    EstimateError if a trial fails.
     """
     most_trials = min(plan.seeds, max(MOST_TRIALS, ENOUGH_TRIALS // len(plan.cells)))
     by_cell: dict[int, list[RunSpec]] = {}
@@ -58,7 +58,7 @@ def estimate(plan: Plan, workers: int, clock: Clock = time.process_time) -> Esti
     stride = -(-len(by_cell) // MOST_CELLS)
     cells = [by_cell[cell] for cell in list(by_cell)[::stride]]
     most_s = BUDGET_S / len(cells)
-    _trial(cells[0][0], most_s, clock)  # loads what a first run loads
+    _trial(cells[0][0], most_s, clock)  # loads the modules of a first run
     trials: list[list[Trial]] = [[] for _ in cells]
     started_s = clock()
     for repetition in range(most_trials):
@@ -115,7 +115,7 @@ def _try_packets(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
 
 
 def _extrapolated(samples: Sequence[tuple[float, float]], duration_s: float) -> float:
-    """The whole run, by the second half of what was simulated: a start costs more than the rest."""
+    """Extrapolate from the second half of the samples, because a start costs more than the rest."""
     now_s, spent_s = samples[-1]
     half_s, spent_at_half_s = next(sample for sample in samples if sample[0] >= now_s / 2)
     if half_s == now_s:

@@ -1,4 +1,4 @@
-"""An experiment file: read, overridden from the command line, checked, and expanded into cells."""
+"""An experiment file: read, overridden from the command line, checked, expanded into cells."""
 
 import copy
 import hashlib
@@ -20,7 +20,7 @@ from drone_mesh.lab.expression import ExpressionError, Where
 from drone_mesh.lab.marked_yaml import Place, read_marked
 from drone_mesh.lab.scenario import Fault, Part, Scenario
 
-NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # it becomes a folder
+NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder
 
 
 class Stop(Part):
@@ -40,7 +40,7 @@ class Compare(Part):
 
 
 class Experiment(BaseModel):
-    """The whole file, before its cells are made."""
+    """The whole file, before its cells are expanded."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -68,7 +68,7 @@ class Cell(NamedTuple):
 
     @property
     def label(self) -> str:
-        """For people and tables; empty without a sweep."""
+        """The label for display and tables; empty without a sweep."""
         return " ".join(f"{axis}={as_text(value)}" for axis, value in self.values.items())
 
 
@@ -88,7 +88,7 @@ class LoadedExperiment(NamedTuple):
 
     @property
     def digest(self) -> str:
-        """A hash of all that the file says, independent of its comments and order of keys."""
+        """A hash of the file's content, independent of comments and the order of keys."""
         content = self.experiment.model_dump(mode="json")
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -96,9 +96,9 @@ class LoadedExperiment(NamedTuple):
 def load_experiment(
     path: Path, overrides: Sequence[str] = (), folder: Optional[Path] = None
 ) -> LoadedExperiment:
-    """Read and check all of it. Raises ConfigurationError: file, line, key and what is wrong.
+    """Read and check the file. Raises ConfigurationError: file, line, key and what is wrong.
 
-    `folder`: where the files and modules that it names are, if not beside it.
+    `folder`: the location of the files and modules that it names, if not beside it.
     """
     content, lines = read_marked(path)
     source = Source(path, lines, folder or path.parent)
@@ -118,7 +118,7 @@ def load_experiment(
 
 
 def as_text(value: Any) -> str:
-    """A swept value as a word for tables and file names."""
+    """A swept value as text for tables and file names."""
     if isinstance(value, (str, int, float, bool)) or value is None:
         return str(value)
     if isinstance(value, dict):
@@ -127,7 +127,7 @@ def as_text(value: Any) -> str:
 
 
 def _override(content: Dict[str, Any], override: str, source: Source) -> None:
-    """Put the value of `a.b=c` into the content."""
+    """Apply an override `a.b=c` to the content."""
     path, equals, text = override.partition("=")
     if not equals or not path:
         raise ConfigurationError(f"argument {override}: expected key=value, as in seeds=50")
@@ -218,7 +218,7 @@ def _scenario(
 
 
 def _read_files(content: Dict[str, Any], source: Source) -> None:
-    """Put what other files say into the scenario: its id has to depend on that, not on a path."""
+    """Read other files into the scenario, because its id must depend on their content, not path."""
     for part, key, read in (
         ("layout", "places", places.rows_of_file),
         ("obstacles", "boxes", obstacle_file.rows_of_file),

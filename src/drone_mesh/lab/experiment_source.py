@@ -1,4 +1,4 @@
-"""Where an experiment's content comes from: errors that point into the file or at an argument."""
+"""The source of an experiment's content, for errors that point into the file or at an argument."""
 
 import difflib
 from pathlib import Path
@@ -12,7 +12,7 @@ from drone_mesh.lab.marked_yaml import Lines, Place, nearest_line
 
 
 class Source:
-    """Makes errors that point into the file, or at the argument that overrode it."""
+    """Creates errors that point into the file, or at the argument that overrode it."""
 
     def __init__(self, path: Path, lines: Lines, folder: Path) -> None:
         self.path = path
@@ -21,7 +21,7 @@ class Source:
         self.overrides: Dict[Place, str] = {}
 
     def error(self, place: Place, message: str) -> ConfigurationError:
-        """The error to raise about what stands at `place`."""
+        """The error to raise about the value at `place`."""
         for end in range(len(place), 0, -1):
             if place[:end] in self.overrides:
                 return ConfigurationError(f"argument {self.overrides[place[:end]]}: {message}")
@@ -32,7 +32,7 @@ class Source:
     def error_of(
         self, error: ValidationError, before: Place, model: Any, shown: Place = ()
     ) -> ConfigurationError:
-        """The first thing that pydantic found, as one line. `shown`: where to point instead."""
+        """The first problem that pydantic found, as one line. `shown`: where to point instead."""
         first = error.errors()[0]
         inside: Place = tuple(first["loc"])
         key = ".".join(map(str, (*before, *inside))) or "the file"
@@ -51,13 +51,13 @@ class Source:
 
 
 def nearest_name(name: str, known: Sequence[str]) -> str:
-    """A hint for an unknown name: the nearest one, or all of them."""
+    """A hint for an unknown name: the closest one, or all of them."""
     close = difflib.get_close_matches(name, known, n=1)
     return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
 
 
 def _keys_at(model: Any, place: Place) -> List[str]:
-    """The keys that a model has at this place."""
+    """The keys of a model at this place."""
     for step in place:
         if isinstance(step, int):
             continue

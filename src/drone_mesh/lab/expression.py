@@ -1,4 +1,4 @@
-"""The `where:` of a sweep: a small expression over the axes, and nothing else of Python."""
+"""The `where:` of a sweep: a small expression over the axes, not full Python."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Where:
     """A condition on one cell: comparisons, and/or/not, + - * /, lists, numbers and texts."""
 
     def __init__(self, text: str, axes: Sequence[str]) -> None:
-        """Raises ExpressionError for what it does not understand, before any cell is made."""
+        """Raise ExpressionError for an unsupported expression, before any cell is expanded."""
         self._axes = axes
         try:
             self._root = ast.parse(text, mode="eval").body
@@ -41,7 +41,7 @@ class Where:
         self._check(self._root)
 
     def holds(self, values: Mapping[str, Any]) -> bool:
-        """Whether a cell with these values of its axes is part of the experiment."""
+        """Whether a cell with these axis values is part of the experiment."""
         return bool(self._value(self._root, values))
 
     def _check(self, node: ast.AST) -> None:
@@ -92,7 +92,7 @@ class Where:
 
 
 def _dotted(node: ast.AST) -> str | None:
-    """The name that a chain of attributes spells: faults.kill.share."""
+    """The dotted name of a chain of attributes, such as faults.kill.share, or None."""
     if isinstance(node, ast.Name):
         return node.id
     if isinstance(node, ast.Attribute):

@@ -1,4 +1,4 @@
-"""The user's own parts of an experiment: techniques and metrics by `package.module:Name`."""
+"""User-defined parts of an experiment: techniques and metrics named `package.module:Name`."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ OwnMetric = Callable[[RunRecord], float]
 
 
 def search_in(folder: Path) -> None:
-    """Let `module:Name` find modules that lie beside the experiment file."""
+    """Let `module:Name` find modules beside the experiment file."""
     search_in_text(str(folder.resolve()))
 
 
 def search_in_text(folder: str) -> None:
-    """The same for an absolute path; nothing where the folder is there already."""
+    """The same for an absolute path; nothing changes if the folder is already included."""
     if folder not in sys.path:
         sys.path.insert(0, folder)
 
 
 def check_technique(kind: str, name: str, model: str) -> None:
-    """Raises ConfigurationError if there is no such routing or repair technique."""
+    """Raise ConfigurationError if there is no such routing or repair technique."""
     if kind == "repair" and model == "ideal":
         from drone_mesh.lab.ideal import IDEAL_RULES
 
@@ -45,7 +45,7 @@ def check_technique(kind: str, name: str, model: str) -> None:
 
 
 def check_metric(name: str) -> None:
-    """Raises ConfigurationError for a name that is neither a metric nor a function of the user."""
+    """Raise ConfigurationError for a name that is neither a metric nor a user's function."""
     if ":" in name:
         own_metric(name)
     elif name not in METRICS:
@@ -55,7 +55,7 @@ def check_metric(name: str) -> None:
 
 
 def own_metric(name: str) -> OwnMetric:
-    """The function behind `package.module:function`. Raises ConfigurationError if there is none."""
+    """The function named `package.module:function`. Raises ConfigurationError if there is none."""
     module_name, _, function_name = name.partition(":")
     with _one_line(f"metric {name} cannot be loaded"):
         function = getattr(importlib.import_module(module_name), function_name)
@@ -70,7 +70,7 @@ def own_metric(name: str) -> OwnMetric:
 
 @contextlib.contextmanager
 def _one_line(what: str) -> Iterator[None]:
-    """A user's module may raise anything, also SyntaxError and SystemExit: it is the user's error.
+    """A user's module may raise anything, even SyntaxError and SystemExit: report it as its error.
 
     Raises ConfigurationError, in one line.
     """
@@ -86,5 +86,5 @@ def _one_line(what: str) -> Iterator[None]:
 
 
 def own_column(name: str) -> str:
-    """The column of runs.csv that holds a user's metric."""
+    """The column of runs.csv for a user's metric."""
     return name.partition(":")[2]

@@ -16,7 +16,7 @@ from drone_mesh.lab.results import Results, is_share, number
 from drone_mesh.lab.statistics import Interval, kaplan_meier
 from drone_mesh.lab.tables import summary_of
 
-WIDTH_IN = 7.2  # a text width of A4; the page scales it
+WIDTH_IN = 7.2  # the text width of A4; the page scales it
 # Okabe and Ito's palette, distinguishable for the colour-blind, without its yellow.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#444444")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
@@ -32,7 +32,7 @@ MOST_TICKS = 9
 
 
 class Drawing(NamedTuple):
-    """A figure with what a reader needs beside it; `name` names its file."""
+    """A figure with its heading and caption; `name` is its file name."""
 
     name: str
     title: str
@@ -40,14 +40,14 @@ class Drawing(NamedTuple):
     figure: Figure
 
     def to_svg(self) -> str:
-        """SVG text without a date, so that the same rows give the same report."""
+        """SVG text without a date, so that the same rows produce the same report."""
         text = io.StringIO()
         self.figure.savefig(text, format="svg", metadata={"Date": None})
         return text.getvalue().partition("<svg")[1] + text.getvalue().partition("<svg")[2]
 
 
 def axis_drawings(results: Results) -> list[Drawing]:
-    """Per axis one figure with a panel for each metric."""
+    """One figure per axis, with a panel for each metric."""
     drawings = []
     series = _series_axis(results)
     for axis in results.loaded.axes:
@@ -58,7 +58,7 @@ def axis_drawings(results: Results) -> list[Drawing]:
 
 
 def _series_axis(results: Results) -> str | None:
-    """The axis whose values have different colours."""
+    """The axis whose values are distinguished by colour."""
     compare = results.loaded.experiment.compare
     if compare is not None:
         return compare.over
@@ -167,7 +167,7 @@ def _draw_points(
 
 
 def phases_drawing(results: Results) -> Drawing | None:
-    """Stacked bars: where the time to heal goes, mean of the runs that healed."""
+    """Stacked bars: the phases of the time to heal, mean of the runs that healed."""
     bars: list[tuple[str, list[float], int]] = []
     for index, cell in enumerate(results.loaded.cells):
         healed = [
@@ -266,7 +266,7 @@ def _distinct(values: Any) -> list[Any]:
 
 
 def metric_title(metric: str) -> str:
-    """Its name, and its unit where the name does not end with it."""
+    """The metric's name, with its unit unless the name ends with it."""
     unit = METRICS[metric].unit if metric in METRICS else ""
     is_said = unit in ("", "0/1", metric) or metric.endswith(f"_{unit}")
     return metric if is_said else f"{metric} ({unit})"

@@ -1,4 +1,4 @@
-"""Which drones flew when, and how far; wind and batteries act here."""
+"""Records which drones flew when, and how far; wind and batteries act here."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, Fligh
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.look import gateways_of, physical_graph
 
-EVENTS_BACK = 20  # a flight's event is among the last ones when it begins
+EVENTS_BACK = 20  # a flight's event is among this many latest ones when it starts
 
 
 @dataclass
 class Leg:
-    """One straight piece of a flight, until it is over or another goal replaces it."""
+    """One straight part of a flight, until it ends or another goal replaces it."""
 
     node: int
     path: FlightPath
-    is_start: bool  # the drone stood before
-    had_path: bool  # it left to find a gateway although a path to one existed
+    is_start: bool  # the drone was at rest before
+    had_path: bool  # a repair flight although a path to a gateway existed
     replaced_s: float | None = None
 
     @property
     def end_s(self) -> float:
-        """When it ended, or would end."""
+        """When it ended or will end."""
         planned_s = self.path.start_s + self.path.duration_s
         return planned_s if self.replaced_s is None else min(planned_s, self.replaced_s)
 
@@ -36,13 +36,13 @@ class Leg:
 
 
 class Flights:
-    """Watches the goals of all drones of a network."""
+    """Observes the goals of all drones of a network."""
 
     def __init__(self, network: Network) -> None:
         self.legs: list[Leg] = []
         self._network = network
         self._current: dict[int, Leg] = {}
-        self._flown_m: dict[int, float] = {}  # on legs that are over
+        self._flown_m: dict[int, float] = {}  # on completed legs
         self._may_fly_m: dict[int, float] = {}
         self._on_empty: Callable[[int], None] = lambda node: None
         for node_id, node in network.nodes.items():
@@ -53,7 +53,7 @@ class Flights:
 
     @property
     def in_the_air(self) -> list[int]:
-        """Drones that fly now."""
+        """Drones that currently fly."""
         nodes = self._network.nodes
         return [node for node in self._current if nodes[node].drone.path is not None]
 
@@ -64,7 +64,7 @@ class Flights:
         return self._flown_m.get(node, 0.0) + now
 
     def limit(self, nodes: list[int], metres: float, on_empty: Callable[[int], None]) -> None:
-        """From now on these drones can fly so far; then `on_empty(node)` is called."""
+        """From now on these drones can fly this far; then call `on_empty(node)`."""
         self._on_empty = on_empty
         for node in nodes:
             self._may_fly_m[node] = self.flown_m(node) + metres
@@ -99,7 +99,7 @@ class Flights:
         way_m = leg.path.ground_m
         if left_m < way_m:
             clock = self._network.clock
-            across = DESCENT_STARTS_AT - CLIMB_ENDS_AT  # share of the time that it takes
+            across = DESCENT_STARTS_AT - CLIMB_ENDS_AT  # share of the flight's time
             share = CLIMB_ENDS_AT + across * max(0.0, left_m) / way_m
             at_s = leg.path.start_s + leg.path.duration_s * share
             clock.call_at(max(clock.now_s, at_s), self._battery_is_empty, leg)
@@ -113,7 +113,7 @@ class Flights:
         return node in graph.hops_from(gateways_of(self._network))
 
     def _decided_by_itself(self, node: int) -> bool:
-        """Whether this flight is a repair and not an order: the node has just said so."""
+        """Whether this flight is a repair and not an order, from the node's latest events."""
         for event in reversed(self._network.events[-EVENTS_BACK:]):
             if event.node == node and event.kind is MeshEventKind.FLIGHT_DECIDED:
                 return event.now_s == self._network.clock.now_s

@@ -1,4 +1,4 @@
-"""Mutated packets: whatever arrives, a node drops or handles it, and keeps working."""
+"""Fuzzing with mutated packets: a node must drop or handle each of them and keep working."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from drone_mesh.lab.stranger import Recorded, Tap
 
 NODES = 6
 SPACING_M = 6.0
-PACKETS_PER_S = 500  # what a channel at 250 kbit/s takes
+PACKETS_PER_S = 500  # the capacity of a channel at 250 kbit/s
 REPORT_EVERY = 10_000
 _CORE = "drone_mesh.communication"
-_ROUND = 50  # packets between which simulated time passes
+_ROUND = 50  # packets after which simulated time advances
 
 
 class FuzzResult(NamedTuple):
-    """What became of a mesh in which mutated packets arrived."""
+    """The state of a mesh after mutated packets."""
 
     packets: int
-    moved: int  # drones that are not where they were
+    moved: int  # drones that have moved
     connected: int  # routers, a minute after the last packet
 
 
@@ -41,9 +41,9 @@ def fuzz(
     key: Keys | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> FuzzResult:
-    """Send so many packets to the nodes of a small mesh, each a recorded one with changes.
+    """Send mutated packets, derived from recorded ones, to the nodes of a small mesh.
 
-    An exception of a node ends it with an AssertionError that quotes the packet.
+    Raises AssertionError, which quotes the packet, if a node raises an exception.
     """
     rng = random.Random(seed)
     network = Network(seed, key=key)
@@ -126,7 +126,7 @@ def tables(roots: Iterable[object]) -> Tables:
 
 
 def mutated(payload: bytes, rng: random.Random) -> bytes:
-    """The packet with some changes; seldom of another length."""
+    """The packet with some changes, rarely of another length."""
     changed = bytearray(payload)
     for _ in range(rng.choice((1, 1, 2, 4, 8))):
         at = rng.randrange(len(changed))

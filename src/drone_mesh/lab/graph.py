@@ -1,4 +1,4 @@
-"""Which drones could hear each other: parts, hops, and whose loss would split them."""
+"""The graph of drones that can hear each other: parts, hops, cut vertices."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Graph:
         self.near = {node: tuple(others) for node, others in adjacency.items()}
 
     def without(self, gone: Iterable[int]) -> Graph:
-        """The graph of the others."""
+        """The graph without these nodes."""
         left = self.near.keys() - set(gone)
         return Graph({n: [o for o in self.near[n] if o in left] for n in self.near if n in left})
 
     def hops_from(self, sources: Iterable[int]) -> dict[int, int]:
-        """Hops to the nearest source, of all that have a path to one."""
+        """Hops to the nearest source, for all nodes with a path to one."""
         hops = {node: 0 for node in sources if node in self.near}
         queue = deque(hops)
         while queue:
@@ -44,7 +44,7 @@ class Graph:
         return hops
 
     def parts(self) -> list[set[int]]:
-        """Connected components, each a set of ids, in the order of their first node."""
+        """Connected components, each a set of ids, ordered by their first node."""
         seen: set[int] = set()
         found = []
         for node in self.near:

@@ -1,7 +1,7 @@
-"""Runs without packets: each drone knows everything at once, and flies straight on a plane.
+"""Runs without packets: each drone knows everything immediately, and flies straight on a plane.
 
-Published repair methods are evaluated in this way. It shows what a rule can do at best, and lets
-our runs stand beside published tables; detection, decisions and routes take no time in it.
+Published repair methods are evaluated in this way. It shows the best that a rule can do, and makes
+our runs comparable with published tables; detection, decisions and routes take no time.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ Rule = Callable[[Swarm], np.ndarray]
 
 
 def centering(swarm: Swarm) -> np.ndarray:
-    """All fly to the mean of all survivors, up to one metre of a range of 120."""
+    """All fly to the mean of all survivors, to within one metre per 120 m of range."""
     return _towards(swarm, swarm.places.mean(axis=0), stop_m=swarm.step_m)
 
 
 def home(swarm: Swarm) -> np.ndarray:
-    """A drone without a path to the gateway flies to it; a part stops when it has one."""
+    """Drones without a path to the gateway fly to it; a part stops once it has one."""
     moves = _towards(swarm, swarm.places[swarm.home])
     moves[swarm.parts == swarm.parts[swarm.home]] = 0.0
     return moves
 
 
 def oracle(swarm: Swarm) -> np.ndarray:
-    """Each part without a gateway moves as a block to the nearest drone that has one.
+    """Each part without a gateway moves as a block to the nearest drone with one.
 
-    The shortest vector brings it into range: no rule can connect a single part with less.
+    It moves by the shortest vector into range: no rule can connect a single part with less.
     """
     moves = np.zeros_like(swarm.places)
     rooted = np.flatnonzero(swarm.parts == swarm.parts[swarm.home])
@@ -69,9 +69,9 @@ def oracle(swarm: Swarm) -> np.ndarray:
 
 
 def hero(swarm: Swarm) -> np.ndarray:
-    """Towards the lost neighbours; one that lost none follows the change of its neighbours' mean.
+    """Towards the lost neighbours; a drone that lost none follows the mean of its neighbours.
 
-    Mi, Yang, Liu, ICRA 2011, as it is described; only neighbours are known.
+    Mi, Yang, Liu, ICRA 2011, as described; only neighbours are known.
     """
     lost = ~np.isnan(swarm.near_lost[:, 0])
     moves = np.zeros_like(swarm.places)
@@ -87,15 +87,15 @@ def hero(swarm: Swarm) -> np.ndarray:
 def sidr(swarm: Swarm) -> np.ndarray:
     """Each part flies as a block from its own mean to the middle of the area.
 
-    Chen, Wang, Chang, Wei, IEEE Access 8:77089, 2020, as it is described.
+    Chen, Wang, Chang, Wei, IEEE Access 8:77089, 2020, as described.
     """
     return _blocks(swarm, lambda mean: swarm.middle - mean)
 
 
 def sidr_as_coded(swarm: Swarm) -> np.ndarray:
-    """SIDR as two public repositories code it: the mean is one number for x and y.
+    """SIDR as implemented in two public repositories: the mean is one number for x and y.
 
-    Every part then flies along a diagonal, whatever its place.
+    Every part then flies along a diagonal, wherever it is.
     """
     return _blocks(swarm, lambda mean: swarm.middle - mean.mean())
 
@@ -132,9 +132,9 @@ def _blocks(swarm: Swarm, direction: Callable[[np.ndarray], np.ndarray]) -> np.n
 
 
 def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], str]:
-    """All metrics (NaN where there is none without packets), and a hash of the final places.
+    """All metrics (NaN for those undefined without packets), and a hash of the final positions.
 
-    Raises ConfigurationError for a scenario that is not one kill of a random share or number.
+    Raises ConfigurationError unless the scenario is one kill of a random share or number.
     """
     kill = scenario.faults[0].kill if len(scenario.faults) == 1 else None
     if kill is None or kill.pick != "random" or kill.ids is not None:

@@ -1,6 +1,6 @@
-"""What `nearest` and `inward` would fly with ideal information, after the death of one node.
+"""The flights of `nearest` and `inward` with ideal information, after the death of one node.
 
-Distances on a plane, no packets and no delays: the bound that cut_vertices.py compares runs with.
+Distances on a plane, no packets and no delays: the bound for the runs in cut_vertices.py.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ROUNDING_M = 1e-9  # two drones that move to half the range on opposite sides ar
 
 
 def without(points: Sequence[Point], dead: int) -> Places:
-    """The places of the survivors."""
+    """The positions of the survivors."""
     return {node: place(point) for node, point in enumerate(points) if node != dead}
 
 
@@ -29,7 +29,7 @@ def place(point: Point) -> Location:
 
 
 def cut_off(places: Places, range_m: float, root: int) -> frozenset[int]:
-    """The nodes that no hops shorter than `range_m` lead to from `root`."""
+    """The nodes that are not reachable from `root` by hops shorter than `range_m`."""
     known, edge = {root}, [root]
     while edge:
         here = places[edge.pop()]
@@ -40,7 +40,7 @@ def cut_off(places: Places, range_m: float, root: int) -> frozenset[int]:
 
 
 def nearest(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
-    """Of `acting`, the nearest neighbour of the hole takes it; those that it leaves repeat that."""
+    """The nearest neighbour of the hole, in `acting`, takes it; those it leaves repeat that."""
     places = dict(places)
     flown: Flown = {}
     while cut_off(places, range_m, 0):
@@ -54,7 +54,7 @@ def nearest(places: Places, hole: Location, range_m: float, acting: AbstractSet[
 
 
 def inward(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
-    """Those of `acting` that were neighbours of the dead node move in, the others follow."""
+    """Neighbours of the dead node, in `acting`, move in; the others follow."""
     now = dict(places)
     flown: Flown = {}
     first = [n for n in acting if hole.distance_m(places[n]) < range_m]
@@ -73,7 +73,7 @@ def inward(places: Places, hole: Location, range_m: float, acting: AbstractSet[i
 def _follow(
     before: Places, now: Places, flown: Flown, rest: AbstractSet[int], range_m: float
 ) -> None:
-    """Whoever loses neighbours that moved follows the nearest of them, up to the range."""
+    """A node that loses neighbours that moved follows the nearest of them, up to the range."""
     moved = {node for node in now if now[node] != before[node]}
     rest = set(rest)
     while moved:

@@ -1,4 +1,4 @@
-"""Observes a network from outside: the nodes that could reach a gateway, and that do."""
+"""Observes a network from outside: which nodes could reach a gateway, and which do."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ class Look:
 
     now_s: float
     alive: frozenset[int]  # routers whose antenna has power
-    served: frozenset[int]  # of these, the ones that are connected over a path that works
+    served: frozenset[int]  # of these, the ones connected over a working path
 
     @property
     def share(self) -> float:
-        """Served, of all that are alive; 1 when none is."""
+        """Share of live routers that are served; 1 if none is alive."""
         return len(self.served) / len(self.alive) if self.alive else 1.0
 
 
 def look_at(network: Network) -> Look:
-    """A router is served while it believes to be connected and the next hops, from one to the
-    other, lead to a gateway over links that exist now: a stale route does not count."""
+    """A router is served while it considers itself connected and the chain of next hops leads to
+    a gateway over links that exist now: a stale route does not count."""
     nodes = network.nodes
     leads = {n: node.antenna.powered for n, node in nodes.items() if node.is_gateway}
     alive = []
@@ -41,7 +41,7 @@ def look_at(network: Network) -> Look:
 
 
 def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:
-    """Whether the next hops from here lead to a gateway; notes it for each node on the way."""
+    """Whether the next hops from here lead to a gateway; stores the result for nodes on the way."""
     nodes = network.nodes
     chain = []
     node_id = start
@@ -61,7 +61,7 @@ def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:
 
 
 def route_hops(network: Network, served: frozenset[int]) -> dict[int, int]:
-    """Hops of the route in use, of each served router."""
+    """Hops of the current route of each served router."""
     hops: dict[int, int] = {}
     for start in served:
         chain: list[int] = []
@@ -76,7 +76,7 @@ def route_hops(network: Network, served: frozenset[int]) -> dict[int, int]:
 
 
 def physical_graph(network: Network) -> Graph:
-    """The pairs of nodes with power that could hear each other now, known or not."""
+    """The pairs of powered nodes that could hear each other now, known to them or not."""
     powered = [node_id for node_id, node in network.nodes.items() if node.antenna.powered]
     alive = set(powered)
     return Graph(

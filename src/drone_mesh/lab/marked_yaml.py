@@ -1,4 +1,4 @@
-"""A YAML file with the line of each of its values, for error messages that point at it."""
+"""A YAML file with the line of each value, for error messages that point at it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import yaml
 from drone_mesh.errors import ConfigurationError
 
 Place = Tuple[Union[str, int], ...]
-"""Where a value is: the keys and list indices that lead to it."""
+"""The position of a value: the keys and list indices that lead to it."""
 
 Lines = Dict[Place, int]
 """The line of each value, from 1."""
 
 
 def read_marked(path: Path) -> tuple[dict[str, Any], Lines]:
-    """The mapping that this file holds, and the line of each key and list entry.
+    """The mapping in this file, and the line of each key and list entry.
 
     Raises ConfigurationError (one line: file, line, what is wrong) for a file that cannot be read,
-    is not YAML, holds a key twice or is not a mapping.
+    is invalid YAML, has a duplicate key or is not a mapping.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -44,7 +44,7 @@ def read_marked(path: Path) -> tuple[dict[str, Any], Lines]:
 
 
 def nearest_line(lines: Lines, place: Place) -> int | None:
-    """The line of this place, or of the innermost one around it that the file has."""
+    """The line of this place, or of its innermost enclosing place in the file."""
     for end in range(len(place), 0, -1):
         if place[:end] in lines:
             return lines[place[:end]]

@@ -1,4 +1,4 @@
-"""What a run adds to the in-process radio: counts, losses per link, jammed circles."""
+"""The additions of a run to the in-process radio: counts, losses per link, jammed circles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drone_mesh.inprocess.radio import InProcessAir
 
 @dataclass
 class Traffic:
-    """Packets of one type that were handed to the radio."""
+    """Packets of one type that were passed to the radio."""
 
     own: int = 0
     forwarded: int = 0
@@ -35,8 +35,8 @@ class Jamming:
 class Medium:
     """Counts the packets that are handed to the air, and loses some.
 
-    The n-th packet from one drone to another meets the same fate in every cell of an experiment,
-    whatever is sent elsewhere: each link has a random stream of its own.
+    The n-th packet from one drone to another has the same fate in every cell of an experiment,
+    whatever is sent elsewhere, because each link has its own random stream.
     """
 
     network: Network
@@ -59,12 +59,12 @@ class Medium:
 
     @property
     def disc(self) -> InProcessAir:
-        """The air; cuts, jams and losses are for the disc alone, as the experiment's check says."""
+        """The air; cuts, jams and losses exist only on the disc, as the file's check ensures."""
         assert isinstance(self.network.air, InProcessAir)
         return self.network.air
 
     def _watch(self, antenna: IWirelessCommunication) -> None:
-        """Count what is handed to an antenna of the shared channel."""
+        """Count the packets passed to an antenna of the shared channel."""
         send, broadcast = antenna.send_message_to, antenna.broadcast_message
 
         def counted_send(payload: bytes) -> bool:
@@ -87,7 +87,7 @@ class Medium:
         return True
 
     def _count(self, payload: bytes) -> tuple[int, int]:
-        """Returns the sender and the receiver of this hop."""
+        """Count a packet; returns sender and receiver of this hop."""
         creator, sender, kind, to, _forward = messages.header(payload)
         counted = self.traffic.get(kind)
         if counted is None:

@@ -1,4 +1,4 @@
-"""Puts the shards of an experiment together."""
+"""Merges the shards of an experiment."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from drone_mesh.lab.store import (
 
 
 def merge(into: Path, shards: Sequence[Path]) -> int:
-    """Add all rows of the shards that are not there yet; returns how many runs that were.
+    """Add all new rows of the shards; returns the number of runs added.
 
     Raises StoreError for shards of different experiments.
     """

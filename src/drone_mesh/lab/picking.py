@@ -1,4 +1,4 @@
-"""Which drones a fault hits."""
+"""Selects the drones that a fault affects."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from drone_mesh.lab.scenario import Pick
 def pick_drones(
     pick: Pick, alive: bool, network: Network, medium: Medium, rng: random.Random
 ) -> list[int]:
-    """Drones with power (or without, for `alive=False`) that this fault hits, by the rule's order.
+    """The drones with power (or without, for `alive=False`) that this fault affects, in order.
 
-    The order is drawn over all drones, so that with the same stream a smaller share is a part of a
-    larger one, whatever happened before.
+    The order is drawn over all drones, so that with the same stream a smaller share is a subset of
+    a larger one, whatever happened before.
     """
     gateways = set(gateways_of(network))
     spared = gateways if pick.spare == "gateways" else set()
@@ -47,7 +47,7 @@ def pick_drones(
 
 
 def _cut_vertices(network: Network, order: Sequence[int], number: int) -> list[int]:
-    """So many, each a cut vertex of what the ones before it leave; fewer where there are none."""
+    """Up to `number` nodes, each a cut vertex of what the previous ones leave."""
     graph, gateways = physical_graph(network), gateways_of(network)
     chosen: list[int] = []
     while len(chosen) < number:
@@ -67,7 +67,7 @@ def _in_circle(pick: Pick, network: Network, fit: Sequence[int], rng: random.Ran
     else:
         middle = places[rng.choice(sorted(places))]
         x, y = middle.longitude, middle.latitude
-    assert pick.radius_m is not None  # the file's check
+    assert pick.radius_m is not None  # ensured by the check of the file
     return [
         n
         for n in fit

@@ -1,4 +1,4 @@
-"""Start places of a run's drones, drawn from a layout."""
+"""Start positions of a run's drones, drawn from a layout."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drone_mesh.lab.scenario import Layout
 from drone_mesh.layouts import Layouts, UnknownCase
 
 MEAN_DEGREE = 8.0  # the published layouts have 7.3..8.8
-MOST_DRAWS = 2000  # of a random layout that has to be connected
+MOST_DRAWS = 2000  # for a random layout that must be connected
 PLACES_HEADER = ["id", "x", "y", "role"]
 
 
@@ -25,7 +25,7 @@ Draw = Callable[[Layout, float, Callable[[], float]], List[Tuple[float, float]]]
 
 
 class StartPlace(NamedTuple):
-    """Where one drone starts, in metres."""
+    """The start position of one drone, in metres."""
 
     node_id: int
     x: float
@@ -36,9 +36,9 @@ class StartPlace(NamedTuple):
 def draw_places(
     layout: Layout, range_m: float, rng: random.Random, obstacles: Obstacles | None = None
 ) -> list[StartPlace]:
-    """All drones by id. Raises ConfigurationError for a layout that cannot be had.
+    """All drones by id. Raises ConfigurationError for a layout that cannot be drawn.
 
-    Random places keep out of the obstacles; "connected" counts what these do to the links.
+    Random positions avoid the obstacles; "connected" includes the obstacles' effect on links.
     """
     if layout.kind == "file":
         return [StartPlace(int(i), x, y, bool(g)) for i, x, y, g in layout.places or ()]
@@ -56,7 +56,7 @@ def draw_places(
 
 
 def rows_of_file(path: Path) -> list[list[float]]:
-    """The places of a file as numbers: id, x, y, 1 for a gateway. Raises ConfigurationError."""
+    """The positions in a file as numbers: id, x, y, 1 for a gateway. Raises ConfigurationError."""
     return [[float(p.node_id), p.x, p.y, float(p.gateway)] for p in read_places(path)]
 
 
@@ -89,7 +89,7 @@ def read_places(path: Path) -> list[StartPlace]:
 
 
 def _casus(layout: Layout) -> list[StartPlace]:
-    """The drones of a DroneManager layout at their places, and its gateway."""
+    """The drones of a DroneManager layout at their positions, and its gateway."""
     try:
         orders = Layouts.shipped().orders(layout.case)
     except UnknownCase as error:
@@ -136,7 +136,7 @@ def _moved_out(
     draw: Draw,
     rng: random.Random,
 ) -> list[tuple[float, float]]:
-    """Draw again what lies in a box, until nothing does."""
+    """Redraw positions in a box until there are none."""
     for _ in range(MOST_DRAWS):
         inside = [i for i, (x, y) in enumerate(points) if not obstacles.is_free((x, y, 0.0))]
         if not inside:
@@ -162,9 +162,9 @@ def _graph(points: list[tuple[float, float]], range_m: float, obstacles: Obstacl
 
 
 def width_for(drones: int, mean_degree: float, range_m: float) -> float:
-    """Side of a square in which uniform drones have so many neighbours each on average.
+    """Side of a square in which uniform drones have this many neighbours on average.
 
-    A neighbour circle reaches over the edge: the expected share of pairs within a distance d in a
+    A neighbour circle extends over the edge: the expected share of pairs within distance d in a
     unit square is pi d^2 - 8/3 d^3 + d^4/2 for d <= 1 (square line picking).
     """
     low, high = range_m, range_m * math.sqrt(math.pi * drones)
@@ -187,7 +187,7 @@ def _uniform(
 def _clusters(
     layout: Layout, range_m: float, draw: Callable[[], float]
 ) -> list[tuple[float, float]]:
-    """Centres uniform in the square, drones uniform in a disc about them, in turn."""
+    """Centres uniform in the square, drones uniform in a disc around each, in turn."""
     width_m = layout.width_m or 2 * layout.cluster_radius_m * math.sqrt(layout.clusters)
     centres = [(draw() * width_m, draw() * width_m) for _ in range(layout.clusters)]
     points = []
@@ -202,7 +202,7 @@ def _clusters(
 def _with_gateways(
     layout: Layout, points: list[tuple[float, float]], rng: random.Random
 ) -> list[StartPlace]:
-    """Gateways are the drones nearest to where they are wanted, and get the lowest ids."""
+    """The drones nearest to the wanted positions become gateways and get the lowest ids."""
     if layout.gateway_at == "random":
         order = rng.sample(range(len(points)), len(points))
     else:

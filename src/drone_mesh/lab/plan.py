@@ -9,12 +9,12 @@ from typing import Any, Iterator, NamedTuple, Sequence
 from drone_mesh.lab.experiment import Cell, LoadedExperiment, as_text
 from drone_mesh.lab.scenario import Scenario
 
-LONGEST_VALUE = 200  # letters in one field of runs.csv; a file of places becomes its hash
-SCHEMA = 1  # of runs.csv; another number makes every run a new one
+LONGEST_VALUE = 200  # characters in one field of runs.csv; longer values become a hash
+SCHEMA = 1  # of runs.csv; a new number makes every run a new one
 
 
 class RunSpec(NamedTuple):
-    """One run, in a form that travels to a worker."""
+    """One run, in a form that can be sent to a worker."""
 
     run: str  # id
     scenario: str  # JSON
@@ -26,14 +26,14 @@ class RunSpec(NamedTuple):
 
 
 class PlannedRun(NamedTuple):
-    """One run and the cell that it belongs to."""
+    """One run and its cell."""
 
     spec: RunSpec
     cell: int
 
 
 class Plan:
-    """All runs of an experiment: every cell with one seed, then every cell with the next one."""
+    """All runs of an experiment: every cell with one seed, then every cell with the next seed."""
 
     def __init__(self, loaded: LoadedExperiment, seeds: int | None = None) -> None:
         self.loaded = loaded
@@ -60,7 +60,7 @@ class Plan:
 
     @property
     def parameter_columns(self) -> list[str]:
-        """All parameters that any cell has, flattened, in the order of their first appearance."""
+        """All parameters of any cell, flattened, in order of first appearance."""
         columns: dict[str, None] = {}
         for text in self._texts:
             columns.update(dict.fromkeys(flatten(json.loads(text))))
@@ -73,22 +73,22 @@ def as_json(scenario: Scenario) -> str:
 
 
 def identity(scenario: Scenario) -> Any:
-    """What makes a scenario another one: what differs from the defaults.
+    """The parts of a scenario that identify it: the values that differ from the defaults.
 
-    So a parameter that a later version adds does not make old runs new ones; a default that a
-    later version changes has to raise SCHEMA.
+    Therefore a parameter added in a later version does not change old run ids; a changed default
+    requires a new SCHEMA.
     """
     return scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
 
 
 def run_id(what: Any, seed: int, repetition: int, own_metrics: Sequence[str]) -> str:
-    """Names a run by what it is: its parameters, seed and what is measured, not by its time."""
+    """A run's id from its content: its parameters, seed and metrics, not its time."""
     text = json.dumps([SCHEMA, what, seed, repetition, list(own_metrics)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def flatten(content: Any, before: str = "") -> dict[str, str]:
-    """Every leaf of nested mappings by its dotted path; the list of faults by index."""
+    """Every leaf of nested mappings, by its dotted path; the list of faults by index."""
     if isinstance(content, dict) and content:
         items = [(str(key), value) for key, value in content.items()]
     elif isinstance(content, list) and content and all(isinstance(v, dict) for v in content):

@@ -11,7 +11,7 @@ LOG_PERIOD_S = 15.0
 
 
 class Progress:
-    """Prints how far a batch is: runs done, rate, time left. Use it as a context manager."""
+    """Prints the progress of a batch: runs done, rate, time left. A context manager."""
 
     def __init__(self, missing: int, stream: TextIO = sys.stderr) -> None:
         self.done = self.failed = 0
@@ -30,7 +30,7 @@ class Progress:
             self._show()
 
     def close(self) -> None:
-        """Show the last state."""
+        """Print the final state."""
         self._show()
         if self._on_terminal:
             self._stream.write("\n")
@@ -48,7 +48,7 @@ class Progress:
 
 
 def as_duration(seconds: float) -> str:
-    """40 s, 3 min 20 s, 2 h 5 min."""
+    """For example: 40 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,4 +1,4 @@
-"""What obstacles and fading do to the links and the flights of one run."""
+"""The effect of obstacles and fading on the links and flights of one run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MARGIN_STEP_DB = 0.1  # of the fading table
 
 
 def obstacles_of(part: given.Obstacles) -> Obstacles:
-    """The boxes of a scenario. A material is one of CUT_DB; brick is as damped as `cut_db` says."""
+    """The boxes of a scenario. A material is one of CUT_DB; `cut_db` is the loss of brick."""
     boxes = [box.to_box(part.cut_db) for box in part.boxes]
     return Obstacles(boxes, part.radio == "block", part.metre_db, part.exponent, part.ceiling_m)
 
@@ -47,9 +47,9 @@ def _faded(steps: int, fading: str, k_db: float) -> float:
 
 
 def put_obstacles(network: Network, medium: Medium, scenario: given.Scenario) -> Planner | None:
-    """Let the boxes act on links and flights; None where a scenario has neither boxes nor fading.
+    """Apply the boxes to links and flights; None if the scenario has neither boxes nor fading.
 
-    To be called before the nodes start.
+    Call this before the nodes start.
     """
     part = scenario.obstacles
     if not part.boxes and part.fading == "none":
@@ -74,7 +74,7 @@ def put_obstacles(network: Network, medium: Medium, scenario: given.Scenario) ->
 
 
 class Planner:
-    """Plans flights past the boxes, and remembers those that there was no way for."""
+    """Plans flights past the boxes, and records those without a path."""
 
     def __init__(self, obstacles: Obstacles) -> None:
         self.obstacles = obstacles
@@ -84,7 +84,7 @@ class Planner:
     def plan(
         self, node: int, start: Vector, goal: Vector, start_s: float, speed_m_s: float
     ) -> FlightPath | None:
-        """As Obstacles.plan_flight."""
+        """Like Obstacles.plan_flight."""
         path = self.obstacles.plan_flight(start, goal, start_s, speed_m_s)
         if path is None:
             self.refused.append(node)

@@ -1,4 +1,4 @@
-"""Which code, on which machine, made a row of results."""
+"""Which code, on which machine, produced a row of results."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PACKAGES = ("drone_mesh", "numpy", "pydantic", "scipy", "dask", "distributed", 
 
 @functools.lru_cache(maxsize=None)
 def code_version() -> str:
-    """The commit of this checkout, with "+dirty" after it where files differ; or the version."""
+    """The commit of this checkout, with "+dirty" if files differ; or the package version."""
     commit = _git("rev-parse", "--short=12", "HEAD")
     if commit is None:
         return _version("drone_mesh") or "unknown"

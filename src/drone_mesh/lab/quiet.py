@@ -1,4 +1,4 @@
-"""Quiet nodes: a thousand runs would log each warning of the nodes a thousand times."""
+"""Silences nodes: a thousand runs would log each warning a thousand times."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Iterator
 
 @contextlib.contextmanager
 def quiet_nodes() -> Iterator[None]:
-    """Only critical messages of the package are logged; the level comes back at the end."""
+    """Log only critical messages of the package; restore the level at the end."""
     logger = logging.getLogger("drone_mesh")
     level = logger.level
     logger.setLevel(logging.CRITICAL)

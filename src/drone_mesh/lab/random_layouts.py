@@ -1,4 +1,4 @@
-"""Random layouts: drones in a square, all of them connected by radio."""
+"""Random layouts: drones in a square, all connected by radio."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Sequence, Tuple
 
 Point = Tuple[float, float]  # x, y in metres
 
-LEAST_DISTANCE_M = 1.0  # our choice: drones start well clear of each other
+LEAST_DISTANCE_M = 1.0  # our choice: least distance between drones at the start
 MOST_TRIES = 10_000
 
 
 def random_layout(rng: random.Random, nodes: int, degree: float, range_m: float) -> list[Point]:
-    """So many points, uniform in a square in which a node has `degree` neighbours on average.
+    """Points uniform in a square in which a node has `degree` neighbours on average.
 
-    Points that are too close to another one, and layouts that are not connected, are drawn again.
+    Redraws points that are too close to others, and layouts that are not connected.
     """
     side_m = math.sqrt(nodes * math.pi * range_m**2 / (degree + 1.0))
     for _try in range(MOST_TRIES):
@@ -32,7 +32,7 @@ def random_layout(rng: random.Random, nodes: int, degree: float, range_m: float)
 def reachable(
     points: Sequence[Point], range_m: float, start: int, without: int | None = None
 ) -> set[int]:
-    """The points that hops shorter than `range_m` reach from `start`, except over `without`."""
+    """The points reachable from `start` by hops shorter than `range_m`, without `without`."""
     known, edge = {start}, [start]
     while edge:
         here = points[edge.pop()]

@@ -1,4 +1,4 @@
-"""What one run leaves behind, ready to be measured."""
+"""The record of one run, ready to be measured."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from drone_mesh.lab.timeline import Happened, OrderSent
 from drone_mesh.state.model import EventRecord
 
 Place = Tuple[float, float, float]  # x, y, z in metres
-HOLD_S = 5.0  # our choice: served again means for so long without a break
+HOLD_S = 5.0  # our choice: least uninterrupted service that counts as healed
 
 
 class Scene(NamedTuple):
-    """The network's shape at one moment."""
+    """The network's topology at one moment."""
 
     graph: Graph  # of all nodes with power
     route_hops: Mapping[int, int]  # of each served router
@@ -34,7 +34,7 @@ class ServiceGap:
     restored_s: float | None  # None: not until the end
 
     def seconds(self, end_s: float) -> float:
-        """Its length; up to the end of the run where it lasts."""
+        """Its duration; up to the end of the run if it has not ended."""
         return (end_s if self.restored_s is None else self.restored_s) - self.lost_s
 
 
@@ -45,7 +45,7 @@ class RunRecord:
     scenario: Scenario
     gateways: frozenset[int]
     start: Scene
-    before: Scene | None  # right before the first fault that has to be healed
+    before: Scene | None  # right before the first fault that must be healed
     after_fault: Graph | None  # right after it
     end: Scene
     fault_s: float | None  # when it was
@@ -56,7 +56,7 @@ class RunRecord:
     traffic: Mapping[int, Traffic]  # by message type
     orders: Sequence[OrderSent]
     collisions: int
-    min_distance_m: float  # of two drones that were not that near at the start; inf: never measured
+    min_distance_m: float  # of two drones that were not as close at the start; inf: not measured
     end_s: float
     airtime_s: float | None  # of all frames, on the shared channel
     frames_destroyed: int | None  # by other frames, on the shared channel
@@ -64,7 +64,7 @@ class RunRecord:
 
     @property
     def healed_at_s(self) -> float | None:
-        """The first moment after the fault from which all live routers are served for HOLD_S.
+        """The first time after the fault from which all live routers are served for HOLD_S.
 
         None: not before the end. A run without such a fault is healed from its start.
         """
@@ -82,7 +82,7 @@ class RunRecord:
         return None
 
     def gaps(self) -> list[ServiceGap]:
-        """Each router's times without service since the fault, or since all were served first."""
+        """Each router's gaps in service since the fault, or since all were first served."""
         begin_s = self.fault_s
         if begin_s is None:
             begin_s = next((look.now_s for look in self.looks if look.share == 1.0), None)
@@ -97,7 +97,7 @@ class RunRecord:
                 gaps.append(ServiceGap(node, open_since.pop(node), look.now_s))
             for node in list(open_since):
                 if node not in look.alive:
-                    del open_since[node]  # it died: nothing left to repair
+                    del open_since[node]  # it died, so there is nothing left to repair
             for node in sorted(look.alive - look.served):
                 open_since.setdefault(node, look.now_s)
         gaps += [ServiceGap(node, since_s, None) for node, since_s in open_since.items()]

@@ -1,4 +1,4 @@
-"""The web console on a recorded run, with its time line."""
+"""The web console for a recorded run, with its time line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.web.access import Access
 
 LOOPBACK = "127.0.0.1"
-LOOK_PERIOD_S = 0.5  # for Ctrl-C
+LOOK_PERIOD_S = 0.5  # period of checks for Ctrl-C
 
 
 def serve_replay(

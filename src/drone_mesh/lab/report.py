@@ -1,4 +1,4 @@
-"""The report of an experiment: one HTML file with everything in it, and files for a paper."""
+"""The report of an experiment: one self-contained HTML file, and files for a paper."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ReportError(MeshError):
 
 
 def write_report(folder: Path, out: Path | None, formats: Sequence[str]) -> list[Path]:
-    """Write the page and the exports; returns what was written. Raises MeshError."""
+    """Write the page and the exports; returns the paths written. Raises MeshError."""
     results = load_results(folder)
     if not results.rows:
         raise ReportError(f"{folder}: no run is finished yet")
@@ -77,7 +77,7 @@ def _render(results: Results, tables: Sequence[Table], drawings: Sequence[Drawin
 
 
 def _animation(results: Results) -> tuple[str, str]:
-    """(run id, SVG) of the healed run with the median time among those in which a drone flew."""
+    """(run id, SVG) of the healed run with the median time among those with a flight."""
     flown = [
         (total_s, row["run"])
         for planned in results.plan

@@ -1,4 +1,4 @@
-"""A results folder, read for analysis."""
+"""Reads a results folder for analysis."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ Row = Mapping[str, str]
 
 
 class Results(NamedTuple):
-    """All runs of an experiment's plan that are done."""
+    """All completed runs of an experiment's plan."""
 
     folder: Path
     loaded: LoadedExperiment
     plan: Sequence[PlannedRun]
     rows: Mapping[str, Row]  # by run id
-    by_cell: Mapping[int, dict[int, Row]]  # the same by cell and repetition
+    by_cell: Mapping[int, dict[int, Row]]  # the same, by cell and repetition
     failures: Sequence[Row]
     sessions: Sequence[Mapping[str, object]]
 
     @property
     def metrics(self) -> list[str]:
-        """The columns that the experiment asks for."""
+        """The columns that the experiment requests."""
         wanted = self.loaded.experiment.metrics or DEFAULT_METRICS
         return [extensions.own_column(name) if ":" in name else name for name in wanted]
 
     def of_cell(self, cell: int) -> dict[int, Row]:
-        """The rows of one cell that the report counts, by repetition."""
+        """The rows of one cell that count in the report, by repetition."""
         return {r: row for r, row in self.drawn(cell).items() if self.counts(row)}
 
     def drawn(self, cell: int) -> dict[int, Row]:
@@ -50,20 +50,20 @@ class Results(NamedTuple):
         return self.by_cell.get(cell, {})
 
     def counts(self, row: Row) -> bool:
-        """Whether the report counts this run: `draws:` may leave out what split, or did not."""
+        """Whether the report counts this run: `draws:` may exclude split runs, or all others."""
         draws = self.loaded.experiment.draws
         return draws == "all" or (row.get("split") == "1") == (draws == "split")
 
     @property
     def axis_names(self) -> dict[str, str]:
-        """Axes as tables and figures call them: by their last words, where these are unique."""
+        """The names of axes in tables and figures: their last words if these are unique."""
         short = {axis: _last_words(axis) for axis in self.loaded.axes}
         if len(set(short.values())) < len(short):
             return {axis: axis for axis in short}
         return short
 
     def find_cell(self, text: str) -> int:
-        """The one cell that fits axis=value[,axis=value...]. Raises ConfigurationError."""
+        """The one cell that matches axis=value[,axis=value...]. Raises ConfigurationError."""
         wanted: dict[str, str] = {}
         for part in filter(None, text.split(",")):
             axis, equals, value = part.partition("=")
@@ -78,7 +78,7 @@ class Results(NamedTuple):
         return fit[0]
 
     def find_run(self, beginning: str) -> PlannedRun:
-        """The one planned run whose id begins so. Raises ConfigurationError."""
+        """The one planned run with this prefix of its id. Raises ConfigurationError."""
         fit = [planned for planned in self.plan if planned.spec.run.startswith(beginning)]
         if len(fit) != 1:
             raise ConfigurationError(
@@ -88,7 +88,7 @@ class Results(NamedTuple):
 
 
 def load_results(folder: Path) -> Results:
-    """Read a folder that `lab run` wrote. Raises StoreError or ConfigurationError."""
+    """Read a folder written by `lab run`. Raises StoreError or ConfigurationError."""
     sessions = read_provenance(folder)
     if not sessions or not (folder / EXPERIMENT).exists():
         raise StoreError(f"{folder}: not a results folder of lab run")
@@ -107,13 +107,13 @@ def load_results(folder: Path) -> Results:
 
 
 def number(row: Row, column: str) -> float | None:
-    """A metric of a run; None where it is not defined."""
+    """A metric of a run; None if undefined."""
     text = row.get(column, "")
     return float(text) if text else None
 
 
 def is_share(column: str) -> bool:
-    """Whether every run has 0 or 1 here."""
+    """Whether every run has 0 or 1 in this column."""
     return column in METRICS and METRICS[column].is_share
 
 
@@ -127,7 +127,7 @@ def _fits(cell: Cell, wanted: Mapping[str, str]) -> bool:
 
 
 def _seeds(loaded: LoadedExperiment, rows: Mapping[str, Row]) -> int:
-    """Repetitions, with those that `stop:` added."""
+    """The number of repetitions, including those added by `stop:`."""
     most = max((int(row["repetition"]) for row in rows.values()), default=-1) + 1
     stop = loaded.experiment.stop
     if stop is None:

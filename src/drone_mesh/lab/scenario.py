@@ -1,4 +1,4 @@
-"""What one run is: layout, radio, techniques and faults, as an experiment file describes them."""
+"""One run as an experiment file describes it: layout, radio, techniques and faults."""
 
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
 from typing import Any, ClassVar, Dict, FrozenSet, List, Optional, Tuple
@@ -34,7 +34,7 @@ class Part(BaseModel):
 
 
 class Layout(Part):
-    """Where the drones stand at the start."""
+    """The start positions of the drones."""
 
     KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
         "uniform": frozenset({"drones", "mean_degree", "width_m", "require", "gateway_at"}),
@@ -61,7 +61,7 @@ class Layout(Part):
     spacing_m: Above0 = 6.0
     case: int = 0  # of config/casus.yaml
     path: Optional[str] = None  # file: id,x,y,role lines, beside the experiment
-    places: Optional[List[List[float]]] = None  # what stands in it: id, x, y, 1 for a gateway
+    places: Optional[List[List[float]]] = None  # its content: id, x, y, 1 for a gateway
 
     @model_validator(mode="after")
     def _only_what_its_kind_uses(self) -> "Layout":
@@ -108,7 +108,7 @@ class Radio(Part):
 
 
 class Timing(Part):
-    """The adjustable times of the protocol, as MeshTiming has them."""
+    """The adjustable times of the protocol, as in MeshTiming."""
 
     check_period_s: Above0 = 10.0
     connection_lost_after_s: Above0 = 30.0
@@ -116,14 +116,14 @@ class Timing(Part):
 
 
 class Repair(Part):
-    """The adjustable numbers of a repair, as RepairOptions has them; the range is range_m."""
+    """The adjustable numbers of a repair, as in RepairOptions; the range is range_m."""
 
     clearance_m: Above0 = CLEARANCE_M
     avoid_wrecks: bool = False
 
 
 class Pick(Part):
-    """Which drones: exactly so many (share, number) by some rule, or these (ids)."""
+    """The drones: a share or number selected by some rule, or these ids."""
 
     share: Optional[Share] = None  # of all drones of the layout that are not spared
     number: Optional[Annotated[int, Field(ge=0, le=MAX_DRONES)]] = None
@@ -177,7 +177,7 @@ class Loss(Part):
 
 
 class Battery(Part):
-    """Drones that die after so much flight, or so much time."""
+    """Drones that die after some distance of flight, or some time."""
 
     share: Share = 1.0
     fly_m: Optional[Above0] = None
@@ -203,8 +203,8 @@ class Order(Part):
 
     id: Optional[NodeId] = None
     to: Optional[Annotated[List[float], Field(min_length=2, max_length=3)]] = None
-    every_s: Optional[Above0] = None  # random drones, again and again
-    within_m: Above0 = 1.0  # of where the random drone stands
+    every_s: Optional[Above0] = None  # random drones, periodically
+    within_m: Above0 = 1.0  # distance from the random drone's position
     for_s: Optional[Above0] = None
 
     @model_validator(mode="after")
@@ -215,14 +215,14 @@ class Order(Part):
 
 
 class Wind(Part):
-    """Flights are slower."""
+    """Wind, which slows flights."""
 
     speed_factor: Annotated[float, Field(gt=0, le=1)]
     for_s: Optional[Above0] = None
 
 
 class Fault(Part):
-    """One thing that happens to the network, at a time or when a condition holds."""
+    """One event in the network, at a time or when a condition holds."""
 
     ACTIONS: ClassVar[Tuple[str, ...]] = (
         "kill", "revive", "cut_link", "jam", "gateway_off", "loss", "battery", "churn", "order",
@@ -260,12 +260,12 @@ class Fault(Part):
 
     @property
     def action(self) -> str:
-        """Which of ACTIONS it is."""
+        """The name of its action, one of ACTIONS."""
         return next(name for name in self.ACTIONS if getattr(self, name) is not None)
 
     @property
     def what(self) -> Any:
-        """The action's own part."""
+        """The settings of its action."""
         return getattr(self, self.action)
 
 
@@ -284,7 +284,7 @@ class Obstacles(Part):
 
 
 class Scenario(Part):
-    """Everything that makes a run, but for its seed."""
+    """Everything that defines a run, except its seed."""
 
     model: Literal["mesh", "ideal"] = "mesh"
     layout: Layout = Layout()
@@ -297,7 +297,7 @@ class Scenario(Part):
     obstacles: Obstacles = Obstacles()
     faults: List[Fault] = []
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
-    sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # how often the network is looked at
+    sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # sampling period of the network
     speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""One sequence: a random mesh, a few misfortunes, and what its drones made of them."""
+"""One sequence: a random mesh, a few faults, and how its drones handled them."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from drone_mesh.lab.random_layouts import cut_vertices, random_layout
 
 SMALLEST, LARGEST = 8, 60  # nodes of a mesh
 CLEARANCE_M = 0.5  # two drones at rest that are nearer than this are stacked
-NOTICED_S = 12.0  # each node has checked its connection once
+NOTICED_S = 12.0  # time in which each node checks its connection
 HEALED_WITHIN_S = 120.0
-SETTLED_S = 60.0  # nothing has changed for so long
-MOST_S = 1500.0  # after the last misfortune
-STEP_S = 2.0  # how closely it looks
-BESIDE_M = 1.0  # a drone does not go nearer than this to the exact place of a gateway
+SETTLED_S = 60.0  # time without changes
+MOST_S = 1500.0  # after the last fault
+STEP_S = 2.0  # sampling period
+BESIDE_M = 1.0  # least distance of drones from the exact place of a gateway
 ROUNDING_M = 1e-6
 
 
 @dataclass
 class Outcome:
-    """What a sequence ended with; counts are of nodes unless said otherwise."""
+    """The outcome of a sequence; counts are of nodes unless noted otherwise."""
 
     seed: int
     nodes: int
@@ -35,11 +35,11 @@ class Outcome:
     stacked: int = 0  # pairs of living drones at rest at the end
     flew_connected: int = 0  # flights of drones that were connected
     flew_grounded: int = 0  # flights of drones that cannot fly
-    cut_off: int = 0  # nodes that a misfortune left without a radio path to a gateway
+    cut_off: int = 0  # nodes that a fault left without a radio path to a gateway
     healed: int = 0  # of these, connected again within 120 s
     unhealed: int = 0  # unconnected at the end
-    unexplained: int = 0  # of these, the ones that can fly and know where the gateway is
-    why: str = ""  # what each of the unconnected ones says
+    unexplained: int = 0  # of these, the ones that can fly and know the gateway's place
+    why: str = ""  # the reason of each unconnected one
     flights: int = 0
     flown_m: float = 0.0
     endless: int = 0  # heartbeats that reached the limit of hops
@@ -51,7 +51,7 @@ FIELDS = tuple(asdict(Outcome(0, 0, "")))
 
 @dataclass
 class Mesh:
-    """A network in the middle of a sequence."""
+    """A network during a sequence."""
 
     network: Network
     rng: random.Random
@@ -68,20 +68,20 @@ class Mesh:
         return [node for node in self.network.nodes if node and node not in self.dead]
 
     def run_for(self, seconds: float) -> None:
-        """Let time pass, and note which nodes are connected again."""
+        """Let time pass, and record which nodes are connected again."""
         end_s = self.network.clock.now_s + seconds
         while self.network.clock.now_s < end_s:
             self.network.run_for(min(STEP_S, end_s - self.network.clock.now_s))
             self._note_healed()
 
     def kill(self, node: int) -> None:
-        """Switch a router off for good."""
+        """Switch a router off permanently."""
         self.dead.add(node)
         self.cut_off_s.pop(node, None)
         self.network.power(node, False)
 
     def note_cut_off(self) -> None:
-        """Note which nodes have no radio path to a gateway now."""
+        """Record which nodes have no radio path to a gateway now."""
         with_path = self.network.shortest_hops()
         now_s = self.network.clock.now_s
         for node in self.alive():
@@ -98,7 +98,7 @@ class Mesh:
 
 
 def run_sequence(seed: int, repair: str = DEFAULT_REPAIR, largest: int = LARGEST) -> Outcome:
-    """The sequence with this number, with this repair, in a mesh of 8..`largest` nodes.
+    """Run the sequence with this seed and repair, in a mesh of 8..`largest` nodes.
 
     The same arguments give the same outcome.
     """
@@ -128,7 +128,7 @@ def _random_mesh(seed: int, repair: str, largest: int) -> Mesh:
     return Mesh(network, rng, points, grounded)
 
 
-# Misfortunes ---------------------------------------------------------------------------------
+# Faults --------------------------------------------------------------------------------------
 
 
 def _kill_cut_vertex(mesh: Mesh) -> None:
@@ -176,7 +176,7 @@ def _kill_in_flight(mesh: Mesh) -> None:
 
 
 def _kill_at(mesh: Mesh, kind: MeshEventKind, after_s: float) -> None:
-    """Kill the first router to which an event of this kind happens, a moment later."""
+    """Kill the first router with an event of this kind, shortly after it."""
     seen = len(mesh.network.events)
     until_s = mesh.network.clock.now_s + 60.0
     while mesh.network.clock.now_s < until_s:
@@ -199,11 +199,11 @@ INCIDENTS: Mapping[str, Callable[[Mesh], None]] = {
 }
 
 
-# The end -------------------------------------------------------------------------------------
+# Outcome -------------------------------------------------------------------------------------
 
 
 def _settle(mesh: Mesh) -> None:
-    """Let time pass until nothing changes any more."""
+    """Let time pass until nothing changes."""
     network = mesh.network
     end_s = network.clock.now_s + MOST_S
     mesh.run_for(NOTICED_S)
@@ -225,7 +225,7 @@ def _may_still_fly(mesh: Mesh, node: int) -> bool:
 
 
 def _is_able(mesh: Mesh, node: int) -> bool:
-    """Whether a drone can fly and knows a way: the gateway is in range of where it believes it."""
+    """Whether a drone can fly and the gateway is in range of its believed place."""
     believed = mesh.network.nodes[node].component.places.gateway
     if believed is None or node in mesh.grounded:
         return False

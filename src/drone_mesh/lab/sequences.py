@@ -1,4 +1,4 @@
-"""Thousands of seeded sequences of misfortunes: `python3 -m drone_mesh.lab.sequences --help`."""
+"""Thousands of seeded sequences of faults: `python3 -m drone_mesh.lab.sequences --help`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from drone_mesh.communication.repair_options import DEFAULT_REPAIR
 from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.sequence import FIELDS, Outcome, run_sequence
 
-PROGRESS_S = 5.0  # of the wall
+PROGRESS_S = 5.0  # wall
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run what is not in the table yet, then sum up the table. 1 if a drone did harm."""
+    """Run the seeds missing from the table, then summarise it. Returns 1 if a drone did harm."""
     arguments = _arguments(argv)
     seeds = range(arguments.first, arguments.first + arguments.runs)
     rows = _read(arguments.csv, seeds) if arguments.csv is not None else []
@@ -37,14 +37,14 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def harm(row: Outcome) -> bool:
-    """Whether something happened in a sequence that a repair must never do."""
+    """Whether a sequence contains something that a repair must never do."""
     return bool(
         row.stacked or row.flew_connected or row.flew_grounded or row.unexplained or row.endless
     )
 
 
 def summary(rows: list[Outcome], repair: str) -> str:
-    """What a table of outcomes says, in lines for people."""
+    """A summary of a table of outcomes, as lines of text."""
     if not rows:
         return "no sequence was run"
     runs = len(rows)

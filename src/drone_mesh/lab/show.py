@@ -21,7 +21,7 @@ from drone_mesh.state.model import MeshStatus
 
 
 class Replay(NamedTuple):
-    """A run, repeated."""
+    """A repeated run."""
 
     planned: PlannedRun
     label: str
@@ -31,7 +31,7 @@ class Replay(NamedTuple):
 
 
 def replay(results: Results, beginning: str) -> Replay:
-    """Run it again. Raises MeshError as the run does."""
+    """Run it again. Raises MeshError like the run itself."""
     planned = results.find_run(beginning)
     spec = planned.spec
     scenario = scenario_of(spec.scenario)
@@ -45,7 +45,7 @@ def replay(results: Results, beginning: str) -> Replay:
 
 
 def explain_hash(results: Results, shown: Replay) -> str:
-    """Whether this run reproduced that of the folder; if not, why."""
+    """Whether this run reproduced the stored one, and if not, why."""
     run = shown.planned.spec.run
     row = results.rows.get(run)
     if row is None:
@@ -63,7 +63,7 @@ def explain_hash(results: Results, shown: Replay) -> str:
 
 
 def show_run(options: argparse.Namespace) -> int:
-    """`lab show`: 0, or 1 when it was not the same run; with --rviz the exit code of lab_run."""
+    """`lab show`: 0, or 1 if it was not the same run; with --rviz the exit code of lab_run."""
     if options.rviz:
         _show_in_rviz(options)
     results = load_results(options.results)
@@ -85,7 +85,7 @@ def show_run(options: argparse.Namespace) -> int:
 
 
 def _show_in_rviz(options: argparse.Namespace) -> NoReturn:
-    """In a program of the ROS side: nothing here imports ROS."""
+    """Runs a program of the ROS side, because this package does not import ROS."""
     if shutil.which("rosrun") is None:
         raise MeshError("--rviz needs ROS: rosrun not found; source its setup.bash first")
     command = ["rosrun", "drone_mesh", "lab_run", str(options.results), options.run_id]

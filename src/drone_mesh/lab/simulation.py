@@ -1,4 +1,4 @@
-"""One run: a network under a virtual clock, its faults, and what came of them."""
+"""One run: a network under a virtual clock, its faults, and its record."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ OnStatus = Callable[[MeshStatus], None]
 
 
 class Simulation:
-    """A run of a mesh over packets. Build it, `run()` it once, and read its record."""
+    """A run of a mesh with packets. Create it, call `run()` once, and read its record."""
 
     def __init__(self, scenario: Scenario, streams: Streams) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
@@ -51,7 +51,7 @@ class Simulation:
         self._min_distance_m = math.inf
 
     def run(self, on_status: OnStatus | None = None) -> RunRecord:
-        """Let all of it happen. `on_status` gets the state after each sample, for pictures."""
+        """Run to the end. `on_status` gets the state after each sample, for pictures."""
         boxes = describe_obstacles(obstacles_of(self.scenario.obstacles).boxes)
         for _now_s in self.samples():
             if on_status is not None:
@@ -59,7 +59,7 @@ class Simulation:
         return self.record()
 
     def samples(self) -> Iterator[float]:
-        """Let time pass up to the end; yields the time (s) of each sample, once it is taken."""
+        """Let time pass until the end; yields the time (s) of each sample once it is taken."""
         network, scenario = self.network, self.scenario
         end_s = scenario.duration_s
         step = 0
@@ -73,7 +73,7 @@ class Simulation:
             yield network.clock.now_s
 
     def record(self) -> RunRecord:
-        """What has happened, once all samples are taken."""
+        """The record, once all samples are taken."""
         network, scenario = self.network, self.scenario
         assert self._start is not None  # a run has at least one sample
         return RunRecord(
@@ -99,7 +99,7 @@ class Simulation:
         )
 
     def event_hash(self) -> str:
-        """A hash of everything that the mesh software reported: the same run has the same one."""
+        """A hash of all events of the mesh software: equal for equal runs."""
         digest = hashlib.sha256()
         for event in self.network.events:
             what = f"{event.kind.value} {event.peer} {event.detail}"
@@ -121,12 +121,12 @@ class Simulation:
         return look
 
     def before_disruption(self) -> None:
-        """A fault is about to happen that has to be healed."""
+        """A fault that must be healed is about to happen."""
         if self._before is None:
             self._before = self._scene(look_at(self.network))
 
     def after_disruption(self) -> None:
-        """It has happened."""
+        """The fault has happened."""
         if self._after_fault is None:
             self._after_fault = physical_graph(self.network)
         self._look()
@@ -183,7 +183,7 @@ def _places(scenario: Scenario, streams: Streams) -> list[StartPlace]:
 
 
 def _options(scenario: Scenario) -> dict[str, Any]:
-    """What is not left as the network has it by default."""
+    """The arguments that differ from the network's defaults."""
     options: dict[str, Any] = {
         "repair": scenario.repair,
         "repair_options": RepairOptions(

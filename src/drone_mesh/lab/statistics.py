@@ -1,4 +1,4 @@
-"""Intervals and tests, by scipy; and the two figures of survival analysis that reports need.
+"""Intervals and tests, by scipy; and the two survival statistics that reports need.
 
 Kaplan-Meier and the restricted mean are thirty lines here: lifelines would bring pandas and six
 more packages for these two.
@@ -15,8 +15,8 @@ from scipy import stats
 
 RESAMPLES = 2000
 CONFIDENCE = 0.95
-FEWEST = 5  # our choice: resampling fewer values says next to nothing
-SEED = 1  # of the resampling: the same rows give the same report
+FEWEST = 5  # our choice: resampling fewer values is meaningless
+SEED = 1  # for resampling: the same rows produce the same report
 
 
 def plain(value: float) -> str:
@@ -31,7 +31,7 @@ class Interval(NamedTuple):
     low: float
     high: float
     n: int
-    note: str = ""  # what was not as usual
+    note: str = ""  # a remark on its method
 
     def __str__(self) -> str:
         if math.isnan(self.value):
@@ -94,7 +94,7 @@ class Paired(NamedTuple):
 
 
 def paired_difference(a: Sequence[float], b: Sequence[float]) -> Paired:
-    """Both by seed, in the same order."""
+    """Compare values by seed, in the same order."""
     differences = [y - x for x, y in zip(a, b)]
     interval = mean_interval(differences)
     if not any(differences):
@@ -103,7 +103,7 @@ def paired_difference(a: Sequence[float], b: Sequence[float]) -> Paired:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """Adjusted p values of one family of tests (Holm 1979); NaN stays and does not count."""
+    """Adjusted p values of one family of tests (Holm 1979); NaN is kept and not counted."""
     order = sorted(
         (i for i, p in enumerate(p_values) if not math.isnan(p)), key=p_values.__getitem__
     )
@@ -116,29 +116,29 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 class Survival(NamedTuple):
-    """Times to an event of which some were not seen."""
+    """Times to an event, some of them censored."""
 
     events: int
     censored: int
     median: float  # Kaplan-Meier; NaN: less than half had the event
     restricted_mean: Interval  # mean time up to `until`
-    until: float  # the smallest time at which a run was still watched without doubt
+    until: float  # the earliest time at which a run is censored
 
 
 def survival(times: Sequence[float], seen: Sequence[bool]) -> Survival:
-    """`seen[i]`: the event came at times[i]; otherwise it had not come by then."""
+    """`seen[i]`: the event happened at times[i]; otherwise it had not happened by then."""
     events = sum(seen)
     if not times:
         return Survival(0, 0, math.nan, Interval(math.nan, math.nan, math.nan, 0), math.nan)
     censored_at = [t for t, s in zip(times, seen) if not s]
     until = min(censored_at) if censored_at else max(times)
-    # No run is censored before `until`: up to there the mean of the cut times is exact.
+    # No run is censored before `until`, so up to there the mean of the truncated times is exact.
     area = mean_interval([min(t, until) for t in times])
     return Survival(events, len(times) - events, _km_median(times, seen), area, until)
 
 
 def kaplan_meier(times: Sequence[float], seen: Sequence[bool]) -> list[tuple[float, float]]:
-    """(time, share that has not had the event) at each time of an event, from (0, 1) on."""
+    """(time, share without the event) at each time of an event, starting with (0, 1)."""
     curve = [(0.0, 1.0)]
     share = 1.0
     for time in sorted({t for t, s in zip(times, seen) if s}):

@@ -1,4 +1,4 @@
-"""How far a results folder is."""
+"""The progress of a results folder."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drone_mesh.lab.store import FAILURES, PLAN, RUNS, StoreError, read_provenan
 
 
 def describe_folder(folder: Path) -> str:
-    """A few lines for people. Raises StoreError for a folder that holds no results."""
+    """A few lines of text. Raises StoreError if the folder has no results."""
     if not (folder / PLAN).exists():
         raise StoreError(f"{folder}: no {PLAN} there, so it is not a results folder of lab run")
     with (folder / PLAN).open(encoding="utf-8", newline="") as file:

@@ -1,4 +1,4 @@
-"""The results folder: what is done is what stands in it; nothing in it is lost or written twice."""
+"""The results folder: its tables record what is done; no row is lost or repeated."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ PLAN, PROVENANCE, EXPERIMENT, LOGS = "plan.csv", "provenance.json", "experiment.
 
 
 class StoreError(MeshError):
-    """The results folder cannot be used. The message says why and what to do."""
+    """The results folder cannot be used. The message gives the reason and the remedy."""
 
 
 class Table:
-    """A CSV file that only grows: rows are whole or not there."""
+    """An append-only CSV file whose rows are either complete or absent."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
-        """Repairs what a killed writer left: an unfinished last line goes."""
+        """Repair the file of a killed writer: remove an incomplete last line."""
         self.path = path
         self.columns = list(columns)
         self.rows = read_rows(path)
@@ -41,7 +41,7 @@ class Table:
         self.rewrite(self.rows)
 
     def append(self, rows: Iterable[Mapping[str, str]]) -> None:
-        """Write these rows, all or none. Raises StoreError when the disk does not take them."""
+        """Write these rows, all or none. Raises StoreError if writing fails."""
         text = io.StringIO()
         writer = csv.DictWriter(text, self.columns, lineterminator="\n", restval="")
         writer.writerows(rows)
@@ -56,7 +56,7 @@ class Table:
             raise _cannot("write", self.path, error) from error
 
     def rewrite(self, rows: Iterable[Mapping[str, str]]) -> None:
-        """Replace the file by these rows at once, and go on behind them."""
+        """Replace the file by these rows atomically, and append after them from now on."""
         new = self.path.with_suffix(".new")
         try:
             with new.open("w", encoding="utf-8", newline="") as file:
@@ -72,7 +72,7 @@ class Table:
             raise _cannot("write", self.path, error) from error
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         if hasattr(self, "_file"):
             os.close(self._file)
             del self._file
@@ -82,7 +82,7 @@ class Store:
     """One results folder, open for writing by this process alone."""
 
     def __init__(self, folder: Path, plan: Plan) -> None:
-        """Raises StoreError: unwritable, or another `lab run` is writing there."""
+        """Raises StoreError if it is not writable, or another `lab run` is writing to it."""
         self.folder = folder
         self._plan = plan
         try:
@@ -115,19 +115,19 @@ class Store:
         self._lock.flush()
 
     def _drop_orphans(self) -> None:
-        """Outages of runs that are not in runs.csv: a writer was killed between the two."""
+        """Remove outages of runs that are not in runs.csv, left by a writer killed in between."""
         kept = [row for row in self.outages.rows if row["run"] in self.done]
         if len(kept) != len(self.outages.rows):
             self.outages.rewrite(kept)
             self.outages.rows = kept
 
     def use(self, plan: Plan) -> None:
-        """Go on with another plan of the same experiment, one with more seeds."""
+        """Continue with another plan of the same experiment, with more seeds."""
         self._plan = plan
         self._write_plan()
 
     def describe(self, session: Mapping[str, Any]) -> None:
-        """Write down what is run here: the file as given, the plan, and this session."""
+        """Write down the session: the file as given, the plan, and this session."""
         loaded = self._plan.loaded
         sessions = read_provenance(self.folder)
         try:
@@ -153,12 +153,12 @@ class Store:
             raise _cannot("write", path, error) from error
 
     def add(self, outcome: Outcome, cell: str, command: str) -> None:
-        """Keep what came of a run: its row and its outages, or its failure."""
+        """Store the outcome of a run: its row and its outages, or its failure."""
         spec = outcome.spec
         if outcome.failure:
             self._add_failure(outcome, cell, command)
             return
-        if spec.run in self.done:  # a worker that was thought dead had finished it
+        if spec.run in self.done:  # a worker presumed dead had finished it
             return
         if self._plan.loaded.experiment.output == "runs_and_outages":
             self.outages.append(
@@ -185,7 +185,7 @@ class Store:
         self.done.add(spec.run)
 
     def take_from(self, other: Path) -> int:
-        """Copy what another results folder has and this one lacks; returns how many runs."""
+        """Copy the rows of another results folder that this one lacks; returns how many runs."""
         rows = [row for row in read_rows(other / RUNS) if row["run"] not in self.done]
         new = {row["run"] for row in rows}
         self.outages.append(row for row in read_rows(other / OUTAGES) if row["run"] in new)
@@ -216,13 +216,13 @@ class Store:
             raise _cannot("write", self.folder / LOGS, error) from error
 
     def forget_failures(self) -> None:
-        """Let failed runs be missing again."""
+        """Remove failed runs, so that they count as missing."""
         self.failures.rewrite([])
         self.failures.rows = []
         self.failed = set()
 
     def put_in_order(self) -> None:
-        """Sort all tables as the plan is sorted: the same runs give the same bytes."""
+        """Sort all tables in the order of the plan: the same runs produce the same bytes."""
         order = {planned.spec.run: place for place, planned in enumerate(self._plan)}
         last = len(order)
         for table in (self.runs, self.outages, self.failures):
@@ -231,7 +231,7 @@ class Store:
             table.rewrite(rows)
 
     def close(self) -> None:
-        """Let others write here."""
+        """Release the folder for other writers."""
         for table in (self.runs, self.outages, self.failures):
             table.close()
         self._lock.truncate(0)
@@ -239,7 +239,7 @@ class Store:
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
-    """The whole rows of a CSV file; none if it does not exist. An unfinished last one is left out.
+    """The complete rows of a CSV file; none if it does not exist. Omits an incomplete last row.
 
     Raises StoreError for a file that cannot be read.
     """
@@ -257,7 +257,7 @@ def read_rows(path: Path) -> list[dict[str, str]]:
 
 
 def read_provenance(folder: Path) -> list[dict[str, Any]]:
-    """All sessions that wrote into this folder, oldest first."""
+    """All sessions that wrote to this folder, oldest first."""
     try:
         sessions = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Stranger: a radio that does not belong to the mesh, or a node of it that was captured."""
+"""Stranger: a radio outside the mesh, or a captured node."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BESIDE = 201  # a router of the stranger, without a key
 
 
 class Recorded(NamedTuple):
-    """A packet as it was on the air."""
+    """A packet as recorded on the air."""
 
     at_s: float
     receiver: int
@@ -29,7 +29,7 @@ class Recorded(NamedTuple):
 
 
 class Tap(IMeshNetwork):
-    """Hears what a node hears, without changing it."""
+    """Records what a node hears, without changing it."""
 
     def __init__(self, network: Network, node_id: int, record: list[Recorded]) -> None:
         self._network = network
@@ -67,14 +67,14 @@ class Hole(Tap):
 
 
 class Stranger(IMeshNetwork):
-    """Records and invents packets from one place, over a radio that answers as `node_id`."""
+    """Records and forges packets at one position, over a radio that answers as `node_id`."""
 
     def __init__(self, network: Network, node_id: int, x: float, y: float) -> None:
         """At (x, y) metres on the ground, with a radio like those of the network."""
         self.node_id = node_id
         self._x, self._y = x, y
         self.network = network
-        self.mute = False  # True: it does nothing at all
+        self.mute = False  # True: it does nothing
         self.record: list[Recorded] = []
         self.heard: list[bytes] = []  # on its own address
         self.swallows: set[int] = set()  # nodes that drop what they should forward
@@ -99,11 +99,11 @@ class Stranger(IMeshNetwork):
         self._receiver = sealed
 
     def switch_on(self) -> None:
-        """Be reachable."""
+        """Become reachable."""
         self.antenna.start_antenna(self)
 
     def listen(self) -> None:
-        """Record what the nodes in its range hear, from now on."""
+        """Start recording what the nodes in range hear."""
         for node_id in self.in_range():
             self.network.nodes[node_id].receiver = Tap(self.network, node_id, self.record)
 
@@ -128,13 +128,13 @@ class Stranger(IMeshNetwork):
         self.swallows.add(relay)
 
     def in_range(self) -> list[int]:
-        """The nodes that hear it."""
+        """The nodes that can hear it."""
         return sorted(self._air.in_range(self.node_id))
 
     def say(self, kind: int, creator: int, to: int, forward: int, body: bytes = b"") -> None:
-        """A packet of `creator`, to the neighbour `to`.
+        """Send a packet of `creator` to the neighbour `to`.
 
-        A radio without keys pretends to be `creator`; a captured node pretends to be its relay.
+        A radio without keys impersonates `creator`; a captured node pretends to be its relay.
         """
         if self._is_inside and not self.mute:
             packet = messages.packet(kind, creator, self.node_id, to, forward, body)
@@ -143,12 +143,12 @@ class Stranger(IMeshNetwork):
             self.play(to, messages.packet(kind, creator, creator, to, forward, body))
 
     def play(self, receiver: int, payload: bytes) -> None:
-        """Put bytes on the air for one node."""
+        """Send bytes to one node."""
         if not self.mute and receiver in self._air.in_range(self.node_id):
             self.network.inject(receiver, payload)
 
     def every(self, period_s: float, seconds: float) -> Iterator[None]:
-        """Once per period, while simulated time passes."""
+        """Yield once per period, while simulated time passes."""
         end_s = self.network.now_s() + seconds
         while self.network.now_s() < end_s:
             yield
@@ -169,7 +169,7 @@ class Stranger(IMeshNetwork):
         return self.node_id
 
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        """Does not care."""
+        """Ignored."""
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         """Does not care."""

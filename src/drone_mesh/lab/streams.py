@@ -1,4 +1,4 @@
-"""Random numbers by purpose: what one part draws does not shift what another part gets."""
+"""Random numbers by purpose: the draws of one part do not shift those of another."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Streams:
         self._root = f"{seed}/{repetition}"
 
     def of(self, purpose: str) -> random.Random:
-        """A generator for this purpose; the same one for the same seed, repetition and purpose."""
-        return random.Random(f"{self._root}/{purpose}")  # seeded by SHA-512, alike on each Python
+        """A generator for this purpose; equal for equal seed, repetition and purpose."""
+        return random.Random(f"{self._root}/{purpose}")  # seeded by SHA-512, equal in each Python
 
     def number(self, purpose: str) -> int:
         """A 32-bit seed for a part that wants a number."""

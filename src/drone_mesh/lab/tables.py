@@ -1,4 +1,4 @@
-"""The tables of a report, and their forms for a paper: CSV and LaTeX."""
+"""The tables of a report, also as CSV and LaTeX for a paper."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LATEX = {
 
 @dataclass(frozen=True)
 class Table:
-    """Header and rows of text; `name` names its file."""
+    """Header and rows of text; `name` is its file name."""
 
     name: str
     title: str
@@ -41,13 +41,13 @@ class Table:
     rows: Sequence[Sequence[str]]
 
     def to_csv(self) -> str:
-        """With the header as the first line."""
+        """As CSV, with the header as the first line."""
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([self.header, *self.rows])
         return text.getvalue()
 
     def to_latex(self) -> str:
-        """A table for the booktabs package."""
+        """As LaTeX, for the booktabs package."""
         lines = [
             r"\begin{table}",
             rf"\caption{{{_latex(self.caption)}}}",
@@ -64,7 +64,7 @@ class Table:
 
 
 def summary_of(rows: Mapping[int, Row], metric: str) -> Interval:
-    """A metric over the runs of a cell: a share with Wilson, else a mean with BCa."""
+    """A metric over the runs of a cell: a share with Wilson, otherwise a mean with BCa."""
     values = [value for row in rows.values() if (value := number(row, metric)) is not None]
     if is_share(metric):
         return share_interval(round(sum(values)), len(values))
@@ -72,7 +72,7 @@ def summary_of(rows: Mapping[int, Row], metric: str) -> Interval:
 
 
 def survival_of(rows: Mapping[int, Row]) -> Survival:
-    """Time to heal over the runs of a cell; what did not heal is censored at its end."""
+    """Time to heal over the runs of a cell; unhealed runs are censored at their end."""
     times: list[float] = []
     seen: list[bool] = []
     for row in rows.values():
@@ -107,7 +107,7 @@ def cells_table(results: Results) -> Table:
 
 
 def healing_table(results: Results) -> Table | None:
-    """Share healed by certain times, and the time to heal as censored data; None without faults."""
+    """Share healed by certain times, and the censored time to heal; None without faults."""
     rows = []
     for index, cell in enumerate(results.loaded.cells):
         counted = results.of_cell(index)
@@ -119,7 +119,7 @@ def healing_table(results: Results) -> Table | None:
         shares = []
         for by_s in HEALED_BY_S:
             if by_s > min(watched):
-                shares.append("-")  # the runs end before that
+                shares.append("-")  # the runs end earlier
                 continue
             healed = sum(
                 (t := number(row, "t_total_s")) is not None and t <= by_s
@@ -158,7 +158,7 @@ def healing_table(results: Results) -> Table | None:
 
 
 def paired_table(results: Results) -> Table | None:
-    """Each value of the compared axis against its baseline, per seed."""
+    """Each value of the compared axis against its baseline, paired by seed."""
     compare = results.loaded.experiment.compare
     if compare is None:
         return None
@@ -191,7 +191,7 @@ def paired_table(results: Results) -> Table | None:
 
 
 def worst_table(results: Results) -> Table | None:
-    """The runs that healed last, or not at all, with the command that repeats each."""
+    """The runs that healed last or not at all, with the command that repeats each."""
     ranked = []
     for index, cell in enumerate(results.loaded.cells):
         for repetition, row in results.of_cell(index).items():

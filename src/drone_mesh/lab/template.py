@@ -1,4 +1,4 @@
-"""A commented experiment to start from."""
+"""A commented template of an experiment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Makes the faults of a scenario happen in a running network."""
+"""Executes the faults of a scenario in a running network."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HEALING_STARTS_WITH = frozenset({"kill", "cut_link", "jam", "gateway_off"})
 
 
 class Happened(NamedTuple):
-    """One fault, as it happened."""
+    """One fault as it happened."""
 
     at_s: float
     action: str
@@ -32,7 +32,7 @@ class Happened(NamedTuple):
 
 @dataclass
 class OrderSent:
-    """One flight order: when it left, and whether a next hop took it."""
+    """One flight order: when it was sent, and whether a next hop took it."""
 
     at_s: float
     node: int
@@ -40,13 +40,13 @@ class OrderSent:
 
 
 class Witness(Protocol):
-    """Looks at the network around each fault that it has to heal."""
+    """Observes the network around each fault that must be healed."""
 
     def before_disruption(self) -> None:
-        """It is about to happen."""
+        """A fault is about to happen."""
 
     def after_disruption(self) -> None:
-        """It has happened."""
+        """The fault has happened."""
 
 
 class Timeline:
@@ -61,7 +61,7 @@ class Timeline:
         streams: Streams,
         witness: Witness,
     ) -> None:
-        """Put the faults on the network's clock."""
+        """Schedule the faults on the network's clock."""
         self.happened: list[Happened] = []
         self.orders: list[OrderSent] = []
         self.first_disruption_s: float | None = None
@@ -78,7 +78,7 @@ class Timeline:
                 self._waiting.append((parse_condition(str(fault.when)), index))
 
     def check(self, look: Look) -> None:
-        """Start what waits for a condition; to be called with every look."""
+        """Start faults that wait for a condition; to be called with every look."""
         if not self._waiting:
             return
         self._note_events(look)

@@ -1,4 +1,4 @@
-"""Executes one run, wherever it is: in this process or on a worker of a cluster."""
+"""Executes one run, in this process or on a worker of a cluster."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from drone_mesh.lab.streams import Streams
 
 
 class OutageRow(NamedTuple):
-    """One row of outages.csv, but for the run's id; seconds of simulated time."""
+    """One row of outages.csv, without the run's id; seconds of simulated time."""
 
     node: int
     lost_s: float
@@ -32,7 +32,7 @@ class OutageRow(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of one run."""
+    """The outcome of one run."""
 
     spec: RunSpec
     wall_s: float
@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
 
 
 class RunTimeout(Exception):
-    """A run took longer than it may."""
+    """A run exceeded its time limit."""
 
 
 def execute_batch(specs: list[RunSpec]) -> list[Outcome]:
@@ -55,7 +55,7 @@ def execute_batch(specs: list[RunSpec]) -> list[Outcome]:
 
 
 def execute(spec: RunSpec) -> Outcome:
-    """Never raises for what the run does: that is its outcome."""
+    """Execute a run. Never raises for an error of the run, which is part of the outcome."""
     started = time.perf_counter()
     try:
         with quiet_nodes(), _Alarm(spec.timeout_s):
@@ -96,7 +96,7 @@ def simulation_of(spec: RunSpec) -> Simulation:
 
 
 def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float]:
-    """All metrics of a run, the user's own ones behind the others."""
+    """All metrics of a run, with the user's own ones last."""
     values = measure_all(record)
     for name in own_metrics:
         values[extensions.own_column(name)] = float(extensions.own_metric(name)(record))
@@ -110,20 +110,20 @@ def scenario_of(text: str) -> Scenario:
 
 
 def metric_columns(own_metrics: tuple[str, ...]) -> list[str]:
-    """The columns of runs.csv that hold metrics."""
+    """The metric columns of runs.csv."""
     return [*METRICS, *map(extensions.own_column, own_metrics)]
 
 
 def as_cell(value: float) -> str:
-    """A metric as text: alike on each Python, empty where it is not defined."""
+    """A metric as text: the same in each Python, empty if undefined."""
     return "" if math.isnan(value) else f"{round(value, 6):.10g}"
 
 
 class _Alarm:
-    """Raises RunTimeout in the thread that entered it, when the time is over.
+    """Raises RunTimeout in the thread that entered it when the time is over.
 
-    A signal would reach the main thread only, and a worker runs its tasks in another one. It stops
-    what runs in Python, also an endless loop, but not a library that never returns.
+    A signal would reach only the main thread, but a worker runs its tasks in another one. It stops
+    Python code, even an endless loop, but not a library call that never returns.
     """
 
     def __init__(self, seconds: float) -> None:

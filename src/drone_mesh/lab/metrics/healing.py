@@ -1,4 +1,4 @@
-"""Metrics of healing: whether, when, and what the routers missed meanwhile."""
+"""Metrics of healing: whether, when, and the outages of routers meanwhile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Metrics of movement: distances, flights, and drones that came too near."""
+"""Metrics of movement: distances, flights, and drones that came too close."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.metrics.registry import NAN, metric
 from drone_mesh.lab.record import RunRecord, Scene
 
-STACKED_M = 0.3  # nearer than this two drones stand on one another
+STACKED_M = 0.3  # two drones closer than this are stacked
 
 
 def _flown(run: RunRecord) -> dict[int, float]:

@@ -1,4 +1,4 @@
-"""All metrics by name, and how a function becomes one."""
+"""All metrics by name, and the decorator that registers them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class Metric(NamedTuple):
 
     unit: str
     definition: str
-    measure: Measure  # NaN: not defined for this run, an empty cell
+    measure: Measure  # NaN: undefined for this run, an empty cell
     better: str = ""  # "less", "more" or neither
     is_share: bool = False  # every run yields 0 or 1
-    censored: bool = False  # a time that is empty where the run did not get there
+    censored: bool = False  # a time that is empty if the event did not happen
 
 
 METRICS: dict[str, Metric] = {}  # in the order of the columns
@@ -31,7 +31,7 @@ def measure_all(record: RunRecord) -> dict[str, float]:
 
 
 def metric(unit: str, definition: str, **about: object) -> Callable[[Measure], Measure]:
-    """The decorated function is the metric of its name; `about`: more fields of Metric."""
+    """Register the decorated function as a metric under its name; `about`: fields of Metric."""
 
     def note(measure: Measure) -> Measure:
         METRICS[measure.__name__] = Metric(unit, definition, measure, **about)  # type: ignore[arg-type]

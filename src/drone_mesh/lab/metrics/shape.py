@@ -69,7 +69,7 @@ def coverage(run: RunRecord) -> float:
 
 
 def covered(points: Sequence[Sequence[float]], range_m: float) -> int:
-    """Cells of a grid, an eighth of the range wide, whose middle a drone reaches."""
+    """The number of cells of a grid, an eighth of the range wide, whose centre is in range."""
     cell = range_m / 8
     places = np.asarray(points, dtype=float)
     cells = np.floor(places / cell).astype(np.int64)[:, :, None] + np.arange(-8, 9)  # (n, 2, 17)

@@ -9,7 +9,7 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.lab.metrics.registry import METRICS, NAN, Metric, metric
 from drone_mesh.lab.record import RunRecord
 
-DELIVERED_WITHIN_S = 10.0  # an order that comes later counts as lost
+DELIVERED_WITHIN_S = 10.0  # an order that arrives later counts as lost
 
 
 @metric(
@@ -78,7 +78,7 @@ def _order_delays(run: RunRecord) -> list[float | None]:
 
 
 def _note_traffic() -> None:
-    """Two columns per message type: sent by its creator, and forwarded."""
+    """Register two columns per message type: sent by its creator, and forwarded."""
     for kind in MessageType:
         word = kind.name.lower()
         for attribute, name, words in (
