@@ -139,6 +139,10 @@ class IWirelessCommunication(abc.ABC):
         """The message; None unless `creator` sealed it for `to` and this place."""
         return sealed
 
+    def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
+        """Proves that `creator` acknowledges this to `to`; empty without a key."""
+        return b""
+
     def may_be_gateway(self, node: int) -> bool:
         """Whether to believe a forwarded packet that `node` is a gateway."""
         return True

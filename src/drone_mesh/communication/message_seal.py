@@ -16,6 +16,7 @@ from drone_mesh.communication.keys import Keys
 from drone_mesh.errors import ConfigurationError
 
 TAG_BYTES = 6
+ACK_TAG_BYTES = 3  # all that is left of a packet
 _KEY_BYTES = 16
 _BLOCK_BYTES = 16
 
@@ -50,6 +51,15 @@ class MessageSeal:
         tag = sealed[-TAG_BYTES:]
         payload = self._encrypted(key, context + tag, sealed[:-TAG_BYTES])
         return payload if hmac.compare_digest(_tag(key, context, payload), tag) else None
+
+    def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
+        """Over the body of an ACK that `creator` sends to `to`."""
+        key = self._keys.pair(creator, to)
+        assert key is not None, "a node has its own keys"
+        made = bytes((creator, to)) + body
+        return hashlib.blake2s(
+            made, key=key, digest_size=ACK_TAG_BYTES, person=b"received"
+        ).digest()
 
     def _key(self, creator: int, to: int) -> bytes | None:
         """The key of the pair; for messages to all, that of the network."""

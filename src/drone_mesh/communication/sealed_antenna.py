@@ -29,6 +29,7 @@ from drone_mesh.communication.timing import MeshTiming
 
 FRESH_PERIODS = 3.0  # our choice: a neighbour speaks once per check period
 FOREIGN_AFTER_S = 20.0  # our choice: two check periods; a restarted neighbour answers by then
+FOREIGN_FORGOTTEN_S = 60.0  # our choice: then the count starts again; tries come twice at times
 FOREIGN_PACKETS = 3
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
@@ -93,6 +94,9 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def open_message(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
         return self._message_seal.open(creator, to, place, sealed)
+
+    def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
+        return self._message_seal.acknowledgement_tag(creator, to, body)
 
     def may_be_gateway(self, node: int) -> bool:
         return self._end_to_end.is_gateway(node)
@@ -247,7 +251,9 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def _complain(self, payload: bytes, from_: int, now_s: float) -> None:
         """A restarted neighbour is normal; one that never answers a challenge is not."""
-        unopened = self._unopened.setdefault(from_, _Unopened(now_s))
+        unopened = self._unopened.get(from_)
+        if unopened is None or now_s - unopened.since_s > FOREIGN_FORGOTTEN_S:
+            unopened = self._unopened[from_] = _Unopened(now_s)
         unopened.count += 1
         if unopened.count < FOREIGN_PACKETS or now_s - unopened.since_s < FOREIGN_AFTER_S:
             return

@@ -143,6 +143,11 @@ def ack_of(body: bytes) -> Ack:
     return Ack(*_ACK.unpack_from(body))
 
 
+def untagged(body: bytes) -> bytes:
+    """The body of an ACK without the tag that follows it in a mesh with a key."""
+    return body[: _ACK.size]
+
+
 def poll_body(poll: Poll) -> bytes:
     """The body of a POLL."""
     return _POLL.pack(*poll)

@@ -8,6 +8,7 @@ per sender. Packets leave a few at a time, so that the mesh's own are handled in
 from __future__ import annotations
 
 import functools
+import hmac
 import math
 import random
 from collections import OrderedDict
@@ -177,7 +178,9 @@ class Transport:
                 self._fragment(payload, creator, kind - packets.FRAGMENTS.start, forward == TO_ALL)
             elif kind == packets.ACK:
                 lane = self._lanes.get(creator)
-                if lane is not None:
+                if not self._is_authentic(body, creator):
+                    self._complaints.dropped("an acknowledgement without proof", payload, now_s)
+                elif lane is not None:
                     lane.answered(packets.ack_of(body), now_s)
             elif kind == packets.POLL:
                 self._inbox(creator, to_all=False).poll(packets.poll_of(body), now_s)
@@ -348,6 +351,12 @@ class Transport:
         if self._tidy_s == math.inf and inbox.unfinished:
             self._tidy_s = now_s + TIDY_PERIOD_S
 
+    def _is_authentic(self, ack: bytes, creator: int) -> bool:
+        """Whether an ACK comes from its creator; a relay could claim that."""
+        body = packets.untagged(ack)
+        tag = self._parts.antenna.acknowledgement_tag(creator, self._parts.node_id, body)
+        return hmac.compare_digest(tag, ack[len(body) : len(body) + len(tag)])
+
     def _inbox(self, sender: int, to_all: bool) -> Inbox:
         key = (sender, to_all)
         inbox = self._inboxes.get(key)
@@ -356,7 +365,9 @@ class Transport:
                 self._inboxes.popitem(last=False)
 
             def acknowledge(ack: Ack) -> None:
-                self._send_packet(packets.ACK, sender, packets.ack_body(ack))
+                body = packets.ack_body(ack)
+                tag = self._parts.antenna.acknowledgement_tag(self._parts.node_id, sender, body)
+                self._send_packet(packets.ACK, sender, body + tag)
 
             receiver = TO_ALL if to_all else self._parts.node_id
             open_message = functools.partial(self._parts.antenna.open_message, sender, receiver)

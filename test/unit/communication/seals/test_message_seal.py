@@ -10,8 +10,11 @@ from cryptography.hazmat.primitives.ciphers.algorithms import AES
 from cryptography.hazmat.primitives.ciphers.modes import ECB
 from seal_rig import KEY, OTHER_KEY
 
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.message_seal import MessageSeal
 from drone_mesh.inprocess import Network
+from drone_mesh.lab.stranger import Hole, Tap
 
 TO_ALL = 254
 PLACE = b"\x34\x12\x07\x05\x00"
@@ -95,3 +98,33 @@ def test_a_listener_reads_a_message_only_without_a_key(key, to):
     network.run_for(2.0)
     assert network.received[0][-1].payload == b"secret"
     assert any(b"secret" in payload for payload in heard) == (key is None)
+
+
+def test_the_tag_of_an_acknowledgement_has_these_bytes():
+    made = hashlib.blake2s(b"\x00\x05body", key=KEY.pair(0, 5), digest_size=3, person=b"received")
+    tag = MessageSeal(KEY).acknowledgement_tag(0, 5, b"body")
+    assert tag == made.digest()
+    assert tag != MessageSeal(KEY).acknowledgement_tag(5, 0, b"body")
+    assert tag != MessageSeal(OTHER_KEY).acknowledgement_tag(0, 5, b"body")
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+def test_a_relay_cannot_acknowledge_the_message_that_it_drops(key):
+    network = Network(seed=1, key=key)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.add_router(2, 12.0, 0.0)
+    assert network.run_until(network.all_connected, 60.0)
+    record = []
+    relay = network.nodes[1]
+    relay.receiver = Hole(network, 1, [])
+    relay.receiver = Tap(network, 1, record)
+    ticket = network.send(2, 0, b"x")
+    network.run_for(0.1)
+    first = next(r.payload for r in record if r.payload[2] == packets.FRAGMENTS[0])
+    session = int.from_bytes(first[6:8], "little")
+    body = packets.ack_body(packets.Ack(session, 0, first[5], packets.COMPLETE, first[5], 1))
+    forged = bytes((0, 1, packets.ACK, 2, 2)) + body
+    network.nodes[2].component.on_msg(forged.ljust(32, b"\0"), network.now_s())
+    is_believed = ticket.state is TicketState.DELIVERED
+    assert is_believed == (key is None)

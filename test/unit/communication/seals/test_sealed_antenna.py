@@ -9,6 +9,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.inprocess import Network
+from drone_mesh.lab.stranger import Tap
 
 
 def line(nodes, key=KEY, radio="disc", **options):
@@ -200,3 +201,20 @@ def test_a_radio_that_acknowledges_a_challenge_and_does_not_answer_it_becomes_no
     node.receiver.on_delivered(0, 1, network.now_s())  # it poses as the gateway
     assert node.component.get_direction_to(0) == 1
     assert 0 not in node.component.get_neighbours()
+
+
+def test_a_packet_that_comes_twice_now_and_then_is_not_reported_as_replayed(caplog):
+    network = line(2)
+    record = []
+    node = network.nodes[1]
+    node.receiver, sealed = Tap(network, 1, record), node.receiver
+    network.run_for(30.0)
+    node.receiver = sealed
+    for _ in range(6):
+        network.inject(1, record[-1].payload)
+        network.run_for(45.0)
+    assert "replayed or forged" not in caplog.text
+    for _ in range(6):
+        network.inject(1, record[-1].payload)
+        network.run_for(10.0)
+    assert "node 0 did not send now: replayed or forged" in caplog.text
