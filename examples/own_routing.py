@@ -71,6 +71,14 @@ def main() -> None:
     parser.add_argument("--gridsize", type=int, default=10, help="drones in a row; default: 10")
     parser.add_argument("--page", type=Path, help="write a page about the last run to this file")
     options = parser.parse_args()
+    if options.runs < 1 or options.gridsize < 2:
+        parser.error("--runs must be 1 or more, --gridsize 2 or more")
+    if options.page:
+        try:  # here, because only pages need them; now, because a comparison takes minutes
+            from drone_mesh.report.page import render_page
+            from drone_mesh.report.story import tell_story
+        except ImportError as error:
+            parser.error(f"--page needs matplotlib and jinja2: {error}")
     print("technique                   connected   healed after   packets   most by one router")
     for technique in TECHNIQUES:
         found = []
@@ -80,10 +88,6 @@ def main() -> None:
         share, healed_s, packets, busiest = map(statistics.median, zip(*found))
         print(f"{technique:26} {share:10.1%} {healed_s:12.0f} s {packets:9.0f} {busiest:20.0f}")
     if options.page:
-        # Here, because only pages need matplotlib and jinja2.
-        from drone_mesh.report.page import render_page
-        from drone_mesh.report.story import tell_story
-
         story = tell_story(states, network.event_records())
         options.page.write_text(render_page(story, technique), encoding="utf-8")
         print(f"wrote {options.page}")

@@ -1,5 +1,6 @@
 """The examples do what the documents say they do."""
 
+import importlib
 import os
 import socket
 import subprocess
@@ -53,6 +54,27 @@ def test_two_routing_techniques_are_compared_and_one_run_is_drawn(run_example, t
     assert [row[0] for row in rows] == ["child_table_tree", "__main__:SteadyTree"]
     assert all(row[1] == "100.0%" for row in rows)
     assert "</html>" in (tmp_path / "run.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["--runs", "0"], "--runs must be 1 or more"),
+        (["--page", "run.html"], "--page needs matplotlib"),
+    ],
+)
+def test_a_comparison_that_cannot_end_well_is_refused_at_once(monkeypatch, capsys, arguments, why):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
+    for name in [name for name in sys.modules if name.startswith("drone_mesh.report")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+    monkeypatch.setattr(sys, "argv", ["own_routing.py", *arguments])
+    example = importlib.import_module("own_routing")
+    monkeypatch.setattr(example, "run", lambda *_: pytest.fail("it computes"))
+    with pytest.raises(SystemExit) as refused:
+        example.main()
+    assert refused.value.code == 2
+    assert why in capsys.readouterr().err
 
 
 def test_an_engine_of_ones_own_is_chosen_by_name_and_flies(monkeypatch):

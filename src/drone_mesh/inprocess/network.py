@@ -159,6 +159,7 @@ class Network:
         `key`: the key of the mesh, which every node then has, or a function that says what each
         node has; None: that node, or every node, seals nothing.
         """
+        _check_numbers(max_distance_m, loss, delay_s, jitter_s)
         self._seed = seed
         self._rng = random.Random(seed)
         self._timing = timing or MeshTiming()
@@ -285,7 +286,9 @@ class Network:
         node.start()
 
     def power(self, node_id: int, on: bool) -> None:
-        """Switch a node's antenna."""
+        """Switch a node's antenna. Raises TypeError: the text "false" would switch it on."""
+        if not isinstance(on, bool):
+            raise TypeError(f"invalid on {on!r}: must be True or False")
         node = self.nodes[node_id]
         if node.antenna.powered != on:
             node.antenna.switch_power(on)
@@ -422,3 +425,14 @@ class Network:
 
     def _observe(self, event: MeshEvent) -> None:
         self.events.append(event)
+
+
+def _check_numbers(max_distance_m: float, loss: float, delay_s: float, jitter_s: float) -> None:
+    """Raises ConfigurationError; also for NaN, which is neither below nor above a bound."""
+    if not max_distance_m > 0:
+        raise ConfigurationError(f"invalid max_distance_m {max_distance_m}: must be above 0")
+    if not 0 <= loss <= 1:
+        raise ConfigurationError(f"invalid loss {loss}: must be a share, 0..1")
+    for name, value in (("delay_s", delay_s), ("jitter_s", jitter_s)):
+        if not 0 <= value < math.inf:
+            raise ConfigurationError(f"invalid {name} {value}: must be 0 or more")

@@ -45,6 +45,7 @@ class InProcessAir:
         self._delay_s = delay_s
         self._jitter_s = jitter_s
         self._antennas: dict[int, InProcessAntenna] = {}
+        self._ids: set[int] = set()  # of all antennas, also before they start and after they stop
         self._cut: set[frozenset[int]] = set()
         # Whether two places within range hear each other: obstacles say so before the nodes start.
         self.sees: Callable[[Location, Location], bool] | None = None
@@ -56,6 +57,10 @@ class InProcessAir:
         self._standing: dict[int, Location] = {}  # their positions
         self._flying: set[int] = set()
         self.delivered = 0
+
+    def expect(self, node_id: int) -> None:
+        """A node with this id has an antenna, which may start later."""
+        self._ids.add(node_id)
 
     def add(self, antenna: InProcessAntenna) -> None:
         """Add an antenna."""
@@ -77,7 +82,9 @@ class InProcessAir:
             self._link(node)
 
     def cut(self, one: int, other: int, off: bool = True) -> None:
-        """Cut the link between two nodes, or mend it."""
+        """Cut the link between two nodes, or mend it. Raises ValueError for an unknown pair."""
+        if one == other or not {one, other} <= self._ids:
+            raise ValueError(f"no link between {one} and {other}: name two different nodes")
         (self._cut.add if off else self._cut.discard)(frozenset((one, other)))
         self._unlink(one)
         self._link(one)
@@ -174,6 +181,7 @@ class InProcessAntenna(IWirelessCommunication):
         self._air = air
         self._deliver = deliver
         self._started = False
+        air.expect(node_id)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Become reachable."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from air_watch import AirWatch
 from scenarios import (
@@ -18,6 +20,7 @@ from scenarios import (
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.interfaces import Location
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.radio import InProcessAntenna
@@ -204,6 +207,30 @@ def test_an_id_is_given_once():
     network = line(1)
     with pytest.raises(ValueError, match="node 1 already exists"):
         network.add_router(1, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"loss": 3}, "invalid loss 3: must be a share, 0..1"),
+        ({"loss": math.nan}, "invalid loss nan"),
+        ({"max_distance_m": -1}, "invalid max_distance_m -1: must be above 0"),
+        ({"delay_s": -1.0}, "invalid delay_s -1.0"),
+        ({"jitter_s": math.inf}, "invalid jitter_s inf"),
+    ],
+)
+def test_numbers_that_no_radio_has_are_refused(options, why):
+    with pytest.raises(ConfigurationError, match=why):
+        Network(**options)
+
+
+def test_faults_of_links_and_switches_that_do_not_exist_are_refused():
+    network = line(2)
+    for one, other in ((1, 99), (2, 2)):
+        with pytest.raises(ValueError, match=f"no link between {one} and {other}"):
+            network.air.cut(one, other)
+    with pytest.raises(TypeError, match="invalid on 'false': must be True or False"):
+        network.power(2, on="false")
 
 
 @pytest.mark.parametrize("case", [101, 102, 201, 202])
