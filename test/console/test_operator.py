@@ -43,6 +43,10 @@ def test_a_drag_can_be_sent_at_once(page):
     page.answer_held("#held-now")
     drag(page, 17, 27.0, 9.0)
     page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
+    order = page.page.locator("#node-facts div:has(dt:text-is('Latest order')) dd")
+    page.wait_for("the order is followed", lambda: "under way" in order.inner_text())
+    page.page.select_option("#speed", "5")
+    page.wait_for("its end", lambda: "arrived" in order.inner_text(), 20.0)
 
 
 def test_a_layout_can_be_undone_before_it_leaves_or_be_sent_at_once(page):

@@ -274,7 +274,7 @@ def test_at_phone_width_nothing_sticks_out_and_each_view_is_one_tap_away(start_c
     assert legend is not None
     assert legend["x"] >= 0
     assert legend["x"] + legend["width"] <= 390
-    for entry in ("known link", "flight path", "heartbeat"):
+    for entry in ("flying", "silent", "known link", "flight path", "heartbeat"):
         assert page.page.locator(f".legend li:has-text('{entry}')").is_visible()
     page.wait_for(
         "no drone is below the legend",
@@ -350,7 +350,14 @@ def test_a_crowd_of_events_and_ids_is_a_handful_of_tab_stops(page):
 def test_the_clock_is_not_announced_and_every_button_has_a_name_in_words(page):
     assert page.page.get_attribute("#clock", "role") == "timer"
     assert page.page.locator("output").count() == 0
-    for name in ("Zoom in", "Zoom out", "Light or dark theme", "List of keys", "Close"):
+    for name in (
+        "Zoom in",
+        "Zoom out",
+        "Light or dark theme",
+        "List of keys",
+        "Close",
+        "Send drones to layout",
+    ):
         assert page.page.get_by_label(name, exact=True).count() == 1, name
 
 
@@ -423,6 +430,9 @@ def test_on_a_phone_the_selected_node_its_switch_and_its_close_button_stay_on_th
         lambda: page.page.inner_text("#node-condition") == "not connected to a gateway",
         within_s=20.0,
     )
+    assert page.page.locator("#node-facts dt:text-is('Last gateway')").is_visible()
+    fallback = page.page.locator("#node-facts div:has(dt:text-is('Fallback position')) dd")
+    assert re.fullmatch(r"node \d+’s", fallback.inner_text())
     for selector in ("#node-close", "#power", "#fly-form [type=submit]", "#remove"):
         box = page.page.locator(selector).bounding_box()
         assert box is not None
@@ -457,6 +467,17 @@ def test_drones_at_one_position_are_fanned_out_and_each_can_be_selected(start_co
         angle = math.pi / 2 - 2 * math.pi * number / 4
         page.page.mouse.click(x + distance * math.cos(angle), y - distance * math.sin(angle))
         assert page.page.inner_text("#node-name") == f"Router {node}"
+
+
+DRAWING_ORDER = """async () => {
+  const { drawingOrder } = await import("/static/draw.js");
+  const nodes = new Map([[0, 1], [1, 0], [2, 0], [3, 0]].map(([id, role]) => [id, { id, role }]));
+  return drawingOrder({ nodes, selected: 2 }).map((node) => node.id);
+}"""
+
+
+def test_gateways_are_drawn_above_routers_and_the_selected_node_above_all(page):
+    assert page.page.evaluate(DRAWING_ORDER) == [1, 3, 0, 2]
 
 
 def test_ids_of_three_digits_fit_into_their_dots(page):

@@ -24,6 +24,7 @@ class BadArgumentsTest(unittest.TestCase):
             text=True,
         )
         self.assertIn(f"/DroneFactory: {line}", launch.stdout)
+        self.assertIn("exit code 1", launch.stdout)  # roslaunch's own is 0 whatever happens
         self.assertNotIn("Traceback", launch.stdout)
 
     def test_a_number_that_is_out_of_bounds(self) -> None:

@@ -121,6 +121,13 @@ class ToolsTest(unittest.TestCase):
             self.assertIn("no ROS master at http://127.0.0.1:9", finished.stderr)
             self.assertNotIn("Traceback", finished.stderr)
 
+    def test_2_without_a_screen_there_is_one_line_that_says_so(self) -> None:
+        finished = run("rviz_window", DISPLAY="")
+        self.assertEqual(finished.returncode, 2)
+        line = "rviz_window: rviz: no screen (DISPLAY is not set); use rviz:=false"
+        self.assertIn(line, finished.stderr)
+        self.assertNotIn("Traceback", finished.stderr)
+
     def test_2_a_recording_of_an_older_definition_is_read(self) -> None:
         bag = self.folder / "older.bag"
         record_in_an_older_definition(bag)

@@ -148,7 +148,7 @@ def test_it_can_be_stopped_before_it_is_there(screen):
 
 @needs_screen
 def test_a_screen_that_answers_is_enough(screen):
-    require_screen()
+    require_screen("gui")
 
 
 @pytest.mark.parametrize(

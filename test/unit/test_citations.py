@@ -86,6 +86,13 @@ def test_each_link_of_the_docs_leads_somewhere():
     assert broken == []
 
 
+def test_each_picture_is_shown_in_a_document():
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
+    for picture in (ROOT / "docs" / "pictures").iterdir():
+        assert f"pictures/{picture.name})" in text, picture.name
+
+
 def test_a_citation_of_a_section_that_is_not_there_is_found():
     assert wrong_citations('# docs/protocol.md, "Flight" and\n# "Landing gear"') == [
         'docs/protocol.md, "Landing gear"'

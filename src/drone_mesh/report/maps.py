@@ -29,8 +29,8 @@ def maps_figure(story: RunStory) -> str:
     figure, (before, after) = figure_with_columns(min(height_in, TALLEST_IN), 2)
     before.set_xlim(west, east)
     before.set_ylim(south, north)
-    _draw_map(before, story.before, f"before, at {story.before.stamp_s:.0f} s")
-    _draw_map(after, story.after, f"after, at {story.after.stamp_s:.0f} s")
+    draw_map(before, story.before, f"before, at {story.before.stamp_s:.0f} s")
+    draw_map(after, story.after, f"after, at {story.after.stamp_s:.0f} s")
     for track in story.tracks.values():
         after.plot([p[0] for p in track], [p[1] for p in track], color=LIGHT.path, lw=1.2, ls=":")
     return svg_of(figure)
@@ -50,7 +50,8 @@ def _limits(story: RunStory, axis: int) -> tuple[float, float]:
     return low - room_m, high + room_m
 
 
-def _draw_map(axes: Axes, mesh: MeshStatus, title: str) -> None:
+def draw_map(axes: Axes, mesh: MeshStatus, title: str) -> None:
+    """All nodes whose position is known, with their links."""
     placed = {node.id: node for node in mesh.nodes if position_is_known(node)}
     for use, links in links_by_use(list(placed.values())).items():
         for low, high in shortest(links, list(placed.values()), MOST_LINKS):

@@ -34,6 +34,19 @@ def fan_offset(slot: Slot, radius: float) -> tuple[float, float]:
     return (distance * math.cos(angle), distance * math.sin(angle))
 
 
+def fanned_positions(
+    nodes: Sequence[NodeStatus], radius_m: float
+) -> dict[int, tuple[float, float, float]]:
+    """Where to draw each node, in metres, if it fills a circle of this radius from above."""
+    slots = fan_out(nodes)
+    positions = {}
+    for node in nodes:
+        x, y, z = node.position
+        right, up = fan_offset(slots[node.id], radius_m) if node.id in slots else (0.0, 0.0)
+        positions[node.id] = (x + right, y + up, z)
+    return positions
+
+
 def _group_near(
     groups: dict[tuple[int, int], list[NodeStatus]], node: NodeStatus
 ) -> list[NodeStatus]:

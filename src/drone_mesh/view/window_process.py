@@ -23,23 +23,24 @@ END_TIMEOUT_S = 3.0  # wall; between the end of the pipe and the end of the proc
 _log = logging.getLogger(__name__)
 
 
-def require_screen() -> None:
+def require_screen(argument: str) -> None:
     """Raise ConfigurationError unless an X server accepts a connection.
 
-    pybullet would end the whole process without a message.
+    pybullet would end the whole process without a message, and Qt with a list of its plugins.
+    `argument` is the launch argument that asks for a window.
     """
     display = os.environ.get("DISPLAY", "")
-    hint = "use gui:=false, or set DISPLAY to a screen"
+    hint = f"use {argument}:=false, or set DISPLAY to a screen"
     if not display:
-        raise ConfigurationError(f"gui: no screen (DISPLAY is not set); {hint}")
+        raise ConfigurationError(f"{argument}: no screen (DISPLAY is not set); {hint}")
     try:
         x11 = ctypes.CDLL("libX11.so.6")
     except OSError as error:
-        raise ConfigurationError(f"gui: libX11 is not installed; {hint}") from error
+        raise ConfigurationError(f"{argument}: libX11 is not installed; {hint}") from error
     x11.XOpenDisplay.restype = ctypes.c_void_p
     connection = x11.XOpenDisplay(None)
     if not connection:
-        raise ConfigurationError(f"gui: the screen {display} does not answer; {hint}")
+        raise ConfigurationError(f"{argument}: the screen {display} does not answer; {hint}")
     x11.XCloseDisplay(ctypes.c_void_p(connection))
 
 
@@ -51,7 +52,7 @@ class WindowProcess:
 
     def __init__(self, look: Callable[[], Scene]) -> None:
         """Raises ConfigurationError if there is no screen."""
-        require_screen()
+        require_screen("gui")
         self._look = look
         self._stopped = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None

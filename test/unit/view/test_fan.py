@@ -7,7 +7,7 @@ import math
 import pytest
 
 from drone_mesh.state.model import NodeStatus
-from drone_mesh.view.fan import COINCIDENT_M, fan_offset, fan_out
+from drone_mesh.view.fan import COINCIDENT_M, fan_offset, fan_out, fanned_positions
 
 
 def at(*positions: tuple[float, float]) -> list[NodeStatus]:
@@ -37,3 +37,11 @@ def test_the_discs_of_a_group_do_not_touch(size: int):
     centres = [fan_offset((number, size), radius=1.0) for number in range(size)]
     gaps = [math.dist(a, b) for i, a in enumerate(centres) for b in centres[:i]]
     assert min(gaps) > 2.0
+
+
+def test_drones_at_one_position_are_drawn_apart_at_their_height_and_others_where_they_are():
+    drawn = fanned_positions(at((3.0, 3.0), (3.0, 3.0), (3.0, 3.0), (9.0, 9.0)), radius_m=0.5)
+    gaps = [math.dist(drawn[a], drawn[b]) for a, b in ((0, 1), (1, 2), (0, 2))]
+    assert min(gaps) > 1.0
+    assert {z for _x, _y, z in drawn.values()} == {0.0}
+    assert drawn[3] == (9.0, 9.0, 0.0)

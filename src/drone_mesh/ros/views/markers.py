@@ -16,7 +16,7 @@ from drone_mesh.ros.views.marker_legend import legend_rows
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use, shortest
 from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known
-from drone_mesh.view.fan import fan_offset, fan_out
+from drone_mesh.view.fan import fanned_positions
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
 from drone_mesh.view.picture import Shape, shape_named
 from drone_mesh.view.quadrocopter import (
@@ -55,7 +55,7 @@ class MarkerMaker:
     def markers(self, state: MeshState, wall_s: float) -> MarkerArray:
         """The markers that changed since the last call."""
         nodes = [node for node in state.nodes if position_is_known(node)]
-        positions = _fanned_positions(nodes)
+        positions = fanned_positions(nodes, BOX_RADIUS_M)
         lost = self._lost.update(known_links(nodes), wall_s)
         array = MarkerArray()
         self._add_obstacles(array, state.obstacles)
@@ -211,17 +211,6 @@ class MarkerMaker:
             marker.action = Marker.DELETE
             return None
         return marker
-
-
-def _fanned_positions(nodes: Sequence[NodeStatus]) -> _Positions:
-    """Where to draw each node: nodes at one position are fanned out around it."""
-    slots = fan_out(nodes)
-    positions = {}
-    for node in nodes:
-        x, y, z = node.position
-        right, up = fan_offset(slots[node.id], BOX_RADIUS_M) if node.id in slots else (0.0, 0.0)
-        positions[node.id] = (x + right, y + up, z)
-    return positions
 
 
 def _path_lines(

@@ -43,7 +43,7 @@ class FactoryParameters:
         if obstacles is not None:
             check_starts(fleet, obstacles)
         if configuration.gui:
-            require_screen()
+            require_screen("gui")
         # With a bad layout file the manager would be restarted for ever; this ends the launch.
         manager_layouts()
         hosts = str(rospy.get_param("~hosts", "") or 1)

@@ -1,0 +1,30 @@
+"""rosrun drone_mesh rviz_window: rviz, if there is a screen; used by rviz.launch."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+import rospy
+
+from drone_mesh.ros.graph.command_line import run_tool
+from drone_mesh.view.window_process import require_screen
+
+
+def main() -> None:
+    """Entry point of nodes/rviz_window."""
+    parser = argparse.ArgumentParser(
+        prog="rosrun drone_mesh rviz_window",
+        description="Start rviz. Without a screen, say so in one line.",
+        epilog="Exit code: 2 no screen, otherwise that of rviz.",
+    )
+    parser.add_argument("-d", dest="config", metavar="FILE", help="configuration file of rviz")
+    parser.parse_args(rospy.myargv()[1:])
+    run_tool("rviz_window", _run)
+
+
+def _run() -> int:
+    require_screen("rviz")
+    sys.stdout.flush()
+    os.execvp("rosrun", ["rosrun", "rviz", "rviz", *sys.argv[1:]])
