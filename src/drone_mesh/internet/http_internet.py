@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, Callable, Iterable
+from typing import Any, Callable
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk, Submit
-from drone_mesh.internet.status import MOST_CONNECTIONS, ReadStatus
+from drone_mesh.internet.http_server import HttpServer
+from drone_mesh.internet.http_settings import HttpSettings
+from drone_mesh.internet.status import ReadStatus
 from drone_mesh.users.desk import UsersDesk
-from drone_mesh.web.access import access_for, own_names
-from drone_mesh.web.server_thread import ServerThread
-from drone_mesh.web.tls import Certificate
 
 ANSWER_WITHIN_S = 2.0  # our choice: over ten times the duration of an order to a lost node
 
@@ -30,36 +28,23 @@ class HttpInternet(IInternetConnection):
     def __init__(
         self,
         submit: Submit,
-        bind_address: str = DEFAULT_ADDRESS,
-        port: int = DEFAULT_PORT,
-        token: str = "",
+        http: HttpSettings = HttpSettings(),  # noqa: B008 (frozen)
         answer_within_s: float = ANSWER_WITHIN_S,
-        certificate: Certificate | None = None,
-        names: Iterable[str] = (),
         origin: Origin | None = None,
         status: ReadStatus | None = None,
         mesh: Callable[[int], dict[str, Any]] | None = None,
         users: UsersDesk | None = None,
     ) -> None:
-        """Open the port (0: any free one).
+        """Open the port.
 
-        `submit` runs a function on the thread that owns the gateway. Without a token only this
-        machine may send requests; with one, `names` are the host names of this machine that clients
-        may use. With an `origin`, goals may be given in degrees; the node's `users` desk sends and
-        receives messages. Raises ConfigurationError for an address that is not available, or that
-        other machines can reach without a token.
+        `submit` runs a function on the thread that owns the gateway. With an `origin`, goals may be
+        given in degrees; the node's `users` desk sends and receives messages. Raises
+        ConfigurationError for an address that is not available, or that other machines can reach
+        without a token.
         """
-        access = access_for(bind_address, token, own_names(*names) if token else ())
         self._desk = GatewayDesk(submit, answer_within_s)
-        self._server = ServerThread(
-            make_api(self._desk, access, origin, status, mesh, users),
-            bind_address,
-            port,
-            name="http",
-            certificate=certificate,
-            ws="none",
-            limit_concurrency=MOST_CONNECTIONS,
-        )
+        api = make_api(self._desk, http.access(), origin, status, mesh, users)
+        self._server = HttpServer(api, http)
         self.port = self._server.port
 
     @property

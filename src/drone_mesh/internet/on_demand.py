@@ -6,23 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 
 if TYPE_CHECKING:
     from drone_mesh.internet.asking import Submit
+    from drone_mesh.internet.http_settings import HttpSettings
     from drone_mesh.internet.mqtt_internet import MqttInternet
     from drone_mesh.internet.mqtt_topics import Broker
     from drone_mesh.internet.status import ReadStatus, StatusServer
     from drone_mesh.users.desk import UsersDesk
 
 
-def http_internet(
-    submit: Submit,
-    address: str = DEFAULT_ADDRESS,
-    port: int = DEFAULT_PORT,
-    token: str = "",
-    **settings: Any,
-) -> IInternetConnection:
+def http_internet(submit: Submit, http: HttpSettings, **settings: Any) -> IInternetConnection:
     """Create an HttpInternet. Also raises ConfigurationError if its libraries are missing."""
     try:  # they take a second to load
         from drone_mesh.internet.http_internet import HttpInternet
@@ -30,7 +24,7 @@ def http_internet(
         raise ConfigurationError(
             f"orders over HTTP need the Python package {error.name}: pip install 'drone_mesh[http]'"
         ) from error
-    return HttpInternet(submit, address, port, token, **settings)
+    return HttpInternet(submit, http, **settings)
 
 
 def mqtt_internet(
@@ -46,7 +40,7 @@ def mqtt_internet(
     return MqttInternet(submit, users, broker, **settings)
 
 
-def status_server(status: ReadStatus, *settings: Any) -> StatusServer:
+def status_server(status: ReadStatus, http: HttpSettings) -> StatusServer:
     """Create a StatusServer. Also raises ConfigurationError if its libraries are missing."""
     try:
         from drone_mesh.internet.status import StatusServer
@@ -54,4 +48,4 @@ def status_server(status: ReadStatus, *settings: Any) -> StatusServer:
         raise ConfigurationError(
             f"--http needs the Python package {error.name}: pip install 'drone_mesh[http]'"
         ) from error
-    return StatusServer(status, *settings)
+    return StatusServer(status, http)

@@ -4,17 +4,14 @@ No `from __future__ import annotations` here: FastAPI reads the annotations at r
 Python 3.8.
 """
 
-from typing import Any, Callable, Dict, Iterable, Optional, Sequence
+from typing import Any, Callable, Dict, Sequence
 
 from fastapi import FastAPI
 from fastapi.params import Depends as Guard
 
 from drone_mesh.internet.guarded_app import REFUSALS, guarded_app
-from drone_mesh.web.access import access_for, own_names
-from drone_mesh.web.server_thread import ServerThread
-from drone_mesh.web.tls import Certificate
-
-MOST_CONNECTIONS = 64  # our choice; further ones get 503
+from drone_mesh.internet.http_server import HttpServer
+from drone_mesh.internet.http_settings import HttpSettings
 
 ReadStatus = Callable[[], Dict[str, Any]]
 """Returns a node's status; any thread may call it."""
@@ -30,28 +27,12 @@ def add_status_request(app: FastAPI, guards: Sequence[Guard], status: ReadStatus
         return status()
 
 
-class StatusServer(ServerThread):
+class StatusServer(HttpServer):
     """The HTTP side of a router: `GET /status`."""
 
-    def __init__(
-        self,
-        status: ReadStatus,
-        bind_address: str,
-        port: int,
-        token: str = "",
-        certificate: Optional[Certificate] = None,
-        names: Iterable[str] = (),
-    ) -> None:
-        """Open the port (0: any free one). Raises ConfigurationError as HttpInternet does."""
-        access = access_for(bind_address, token, own_names(*names) if token else ())
-        app, guards = guarded_app("drone_mesh router", "Reports the status of this node.", access)
+    def __init__(self, status: ReadStatus, http: HttpSettings) -> None:
+        """Open the port. Raises ConfigurationError as HttpInternet does."""
+        about = "Reports the status of this node."
+        app, guards = guarded_app("drone_mesh router", about, http.access())
         add_status_request(app, guards, status)
-        super().__init__(
-            app,
-            bind_address,
-            port,
-            name="http",
-            certificate=certificate,
-            ws="none",
-            limit_concurrency=MOST_CONNECTIONS,
-        )
+        super().__init__(app, http)

@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Mapping
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.raspberry.wiring_options import whole
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
 from drone_mesh.web.tls import Certificate
 
 TOKEN_VARIABLE = "DRONE_MESH_TOKEN"
-
-
-@dataclass(frozen=True)
-class HttpOptions:
-    """The address on which a node answers, and its access rules."""
-
-    address: str
-    port: int
-    token: str  # empty: none
-    names: tuple[str, ...] = ()  # of this machine, besides its host name
-    certificate: Certificate | None = None  # None: plain HTTP
 
 
 def add_http_options(http: argparse._ArgumentGroup) -> None:
@@ -62,7 +51,7 @@ def add_http_options(http: argparse._ArgumentGroup) -> None:
     )
 
 
-def http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> HttpOptions:
+def http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> HttpSettings:
     """The parsed options. Raises ConfigurationError."""
     token = environment.get(TOKEN_VARIABLE, "")
     if parsed.token_file is not None:
@@ -81,4 +70,4 @@ def http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> 
     if (parsed.cert is None) != (parsed.key is None):
         raise ConfigurationError("--cert and --key are needed together")
     certificate = None if parsed.cert is None else Certificate(parsed.cert, parsed.key)
-    return HttpOptions(parsed.bind, parsed.port, token, tuple(parsed.name), certificate)
+    return HttpSettings(parsed.bind, parsed.port, token, tuple(parsed.name), certificate)

@@ -22,12 +22,13 @@ from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
 from drone_mesh.nrf24.spi import SPI_HZ
 from drone_mesh.raspberry.air_options import AirOptions, add_air_options, air_options
 from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
-from drone_mesh.raspberry.http_options import HttpOptions, add_http_options, http_options
+from drone_mesh.raspberry.http_options import add_http_options, http_options
 from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
 from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
 
@@ -69,7 +70,7 @@ class Options:
     trace: Path | None  # file for the frames on the emulated air
     log_level: str
     gateway: bool
-    http: HttpOptions | None  # a router has it only if asked for
+    http: HttpSettings | None  # a router has it only if asked for
     keys: MeshKey | NodeKeys | None = None  # None: nothing is sealed
     mqtt: MqttOptions | None = None
 

@@ -16,6 +16,7 @@ from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConne
 from drone_mesh.drone.engines import create_engine
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import MeshError
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
 from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.nrf24.gpio import GpiodCe, GpiodIrq
@@ -25,7 +26,6 @@ from drone_mesh.nrf24.spi import open_spi
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
 from drone_mesh.raspberry.event_history import EventHistory
-from drone_mesh.raspberry.http_options import HttpOptions
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.node_status import one_line
 from drone_mesh.raspberry.options import Hardware, Options
@@ -212,14 +212,10 @@ def _internet(options: Options) -> MakeInternet:
     return make
 
 
-def _http(node: RadioNode, http: HttpOptions, origin: Origin | None) -> IInternetConnection:
+def _http(node: RadioNode, http: HttpSettings, origin: Origin | None) -> IInternetConnection:
     return http_internet(
         node.submit,
-        http.address,
-        http.port,
-        http.token,
-        certificate=http.certificate,
-        names=http.names,
+        http,
         origin=origin,
         status=node.status,
         mesh=node.mesh,
@@ -227,10 +223,8 @@ def _http(node: RadioNode, http: HttpOptions, origin: Origin | None) -> IInterne
     )
 
 
-def _status_server(node: RadioNode, http: HttpOptions) -> StatusServer:
-    server = status_server(
-        node.status, http.address, http.port, http.token, http.certificate, http.names
-    )
+def _status_server(node: RadioNode, http: HttpSettings) -> StatusServer:
+    server = status_server(node.status, http)
     _log.info("node %d: its status over HTTP at %s/status", node.radio.node_id, server.url)
     return server
 

@@ -11,6 +11,8 @@ from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
 from drone_mesh.internet.http_internet import HttpInternet
+from drone_mesh.internet.http_settings import HttpSettings
+from drone_mesh.web.tls import Certificate
 
 TOKEN = "0123456789abcdef0123"
 
@@ -26,6 +28,8 @@ class MeshWithHttp:
         token: str = "",
         answer_within_s: float = 10.0,
         before: Callable[[Network], None] = lambda network: None,
+        names: tuple[str, ...] = (),
+        certificate: Certificate | None = None,
         **settings: Any,
     ) -> None:
         self.network = Network(seed=1)
@@ -39,8 +43,9 @@ class MeshWithHttp:
         assert isinstance(gateway, MeshnetworkGateway)
         self.gateway = gateway
         self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_is_poked=True)
+        http = HttpSettings(port=0, token=token, names=names, certificate=certificate)
         self.internet = HttpInternet(
-            self.executor.submit, port=0, token=token, answer_within_s=answer_within_s, **settings
+            self.executor.submit, http, answer_within_s=answer_within_s, **settings
         )
         self.executor.start()
         self.internet.connect(gateway)

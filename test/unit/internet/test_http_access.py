@@ -9,6 +9,7 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.internet.http_internet import HttpInternet
+from drone_mesh.internet.http_settings import HttpSettings
 
 ORDER = "/DroneMovement/1/2/3/4"
 
@@ -55,17 +56,17 @@ def test_with_the_token_everything_is_answered(guarded_mesh):
 @pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.0.2.1", "gateway.example"])
 def test_an_address_that_others_can_reach_is_refused_without_a_token(address):
     with pytest.raises(ConfigurationError, match=f"{address}: other machines can reach it.*token"):
-        HttpInternet(never, address, port=0)
+        HttpInternet(never, HttpSettings(address, port=0))
 
 
 def test_a_token_that_can_be_guessed_is_refused():
     with pytest.raises(ConfigurationError, match="token: must have at least 16 characters"):
-        HttpInternet(never, "0.0.0.0", port=0, token="secret")
+        HttpInternet(never, HttpSettings("0.0.0.0", port=0, token="secret"))
 
 
 def test_a_port_in_use_is_refused_with_what_to_do(mesh):
     with pytest.raises(ConfigurationError, match=f"port {mesh.internet.port} .*another port"):
-        HttpInternet(never, port=mesh.internet.port)
+        HttpInternet(never, HttpSettings(port=mesh.internet.port))
 
 
 @pytest.mark.parametrize(
@@ -79,7 +80,7 @@ def test_a_port_in_use_is_refused_with_what_to_do(mesh):
 )
 def test_an_address_that_is_not_available_is_refused_with_the_reason(address, port, reason):
     with pytest.raises(ConfigurationError, match=reason):
-        HttpInternet(never, address, port, token="0123456789abcdef")
+        HttpInternet(never, HttpSettings(address, port, token="0123456789abcdef"))
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "192.0.2.1", "["])

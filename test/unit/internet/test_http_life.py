@@ -16,6 +16,7 @@ import pytest
 
 from drone_mesh.communication.interfaces import IGatewayCommands
 from drone_mesh.internet.http_internet import HttpInternet
+from drone_mesh.internet.http_settings import HttpSettings
 
 pytestmark = pytest.mark.slow
 
@@ -45,7 +46,9 @@ def slow():
     """A slow gateway whose thread is that of a pool, and its HTTP side."""
     gateway = SlowGateway()
     pool = ThreadPoolExecutor(max_workers=1)
-    internet = HttpInternet(lambda work: pool.submit(work, 0.0), port=0, answer_within_s=0.2)
+    internet = HttpInternet(
+        lambda work: pool.submit(work, 0.0), HttpSettings(port=0), answer_within_s=0.2
+    )
     internet.connect(gateway)
     with httpx.Client(base_url=internet.url, timeout=PATIENCE_S, verify=False) as client:
         yield gateway, client
@@ -125,13 +128,13 @@ def test_disconnecting_twice_changes_nothing_and_gives_the_port_back(make_mesh):
     mesh.internet.disconnect()
     mesh.internet.disconnect()
     assert len(http_threads()) == before - 1
-    HttpInternet(mesh.executor.submit, port=mesh.internet.port).disconnect()
+    HttpInternet(mesh.executor.submit, HttpSettings(port=mesh.internet.port)).disconnect()
 
 
 def test_disconnecting_right_after_connecting_ends(make_mesh):
     mesh = make_mesh()
     before = len(http_threads())
-    internet = HttpInternet(mesh.executor.submit, port=0)
+    internet = HttpInternet(mesh.executor.submit, HttpSettings(port=0))
     internet.connect(mesh.gateway)
     internet.disconnect()
     assert len(http_threads()) == before

@@ -14,10 +14,10 @@ from drone_mesh.drone import Location
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings, TxPower
 from drone_mesh.raspberry.air_options import AirAddress, AirOptions
 from drone_mesh.raspberry.emulated_fleet import FleetOptions
-from drone_mesh.raspberry.http_options import HttpOptions
 from drone_mesh.raspberry.options import (
     Hardware,
     Options,
@@ -51,7 +51,7 @@ def test_a_router_needs_only_its_id_and_has_the_documented_settings():
 
 def test_a_router_answers_over_http_only_if_it_is_asked_to():
     asked = parse_router(["--id", "3", "--http", "--port", "9081"], {})
-    assert (asked.gateway, asked.http) == (False, HttpOptions("127.0.0.1", 9081, ""))
+    assert (asked.gateway, asked.http) == (False, HttpSettings("127.0.0.1", 9081, ""))
     assert parse_gateway([], {}).gateway
 
 
@@ -155,7 +155,7 @@ def test_each_option_reaches_what_it_is_for():
 def test_a_gateway_is_node_0_and_serves_this_machine_alone():
     options = parse_gateway([], {})
     assert options.node_id == 0
-    assert options.http == HttpOptions("127.0.0.1", 9080, token="")
+    assert options.http == HttpSettings("127.0.0.1", 9080, token="")
 
 
 def test_the_token_comes_from_the_environment_or_from_a_file_which_wins(tmp_path):

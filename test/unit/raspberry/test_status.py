@@ -15,6 +15,7 @@ import httpx
 import pytest
 
 from drone_mesh.drone.ground import GroundEngine
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.raspberry.emulated_air import EmulatedAir
@@ -88,7 +89,9 @@ def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
     port = free_port()
 
     def internet(node):
-        return http_internet(node.submit, port=port, status=node.status, mesh=node.mesh)
+        return http_internet(
+            node.submit, HttpSettings(port=port), status=node.status, mesh=node.mesh
+        )
 
     with field(3, make_internet=internet) as mesh:
         wait_for(

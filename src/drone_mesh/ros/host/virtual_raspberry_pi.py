@@ -12,6 +12,7 @@ from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
+from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet
 from drone_mesh.internet.several import SeveralInternets
 from drone_mesh.ros.host.engine_connector import RosDroneEngineConnector
@@ -112,5 +113,7 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
             mqtt = mqtt_internet(self.slot.submit, self.users, broker, sends=sends)
             self._observers.append(mqtt.observe)
             return SeveralInternets(mock, mqtt)
-        http = http_internet(self.slot.submit, port=DEFAULT_PORT + self.node_id, users=self.users)
+        http = http_internet(
+            self.slot.submit, HttpSettings(port=DEFAULT_PORT + self.node_id), users=self.users
+        )
         return SeveralInternets(mock, http)
