@@ -78,27 +78,29 @@ def one_line(status: dict[str, Any]) -> str:
 
 
 def table(status: dict[str, Any]) -> str:
-    """The complete status, one value per line."""
-    rows: list[tuple[str, Any]] = []
+    """The complete status: one value per line, then one row per neighbour."""
+    lines: list[str] = []
     for key, value in status.items():
         if isinstance(value, dict):
-            rows.extend((f"{key}.{name}", inner) for name, inner in value.items())
-        elif isinstance(value, list):
-            words = ", ".join(_link(one) for one in value)
-            rows.append((key, words or "none"))
-        else:
-            rows.append((key, value))
-    return "\n".join(f"{key:24} {'-' if value is None else value}" for key, value in rows)
+            lines.extend(_line(f"{key}: {name}", inner) for name, inner in value.items())
+        elif key != "neighbours":
+            lines.append(_line(key, value))
+    lines.append(f"{'neighbour':11}{'heard':>12}{'tries':>8}{'delivered':>11}")
+    lines.extend(_neighbour(one) for one in status.get("neighbours", ()))
+    return "\n".join(lines)
 
 
-def _link(neighbour: dict[str, Any]) -> str:
-    """A neighbour as text: when it was heard, and how well packets reach it."""
-    words = f"{neighbour['heard_s_ago']:g} s ago"
-    if neighbour.get("tries_per_packet") is not None:
-        words += (
-            f", {neighbour['tries_per_packet']:g} tries, {neighbour['delivered']:.0%} delivered"
-        )
-    return f"{neighbour['id']} ({words})"
+def _line(name: str, value: object) -> str:
+    words = {True: "yes", False: "no"}.get(value, value) if isinstance(value, bool) else value
+    return f"{name.replace('_', ' '):35}{'-' if words in (None, '') else words}"
+
+
+def _neighbour(neighbour: dict[str, Any]) -> str:
+    """When it was heard, and how well packets reach it; "-" if no packet was sent to it."""
+    tries, delivered = neighbour["tries_per_packet"], neighbour["delivered"]
+    quality = ("-", "-") if tries is None else (f"{tries:.2f}", f"{delivered:.0%}")
+    heard = f"{neighbour['heard_s_ago']:g} s ago"
+    return f"{neighbour['id']!s:11}{heard:>12}{quality[0]:>8}{quality[1]:>11}"
 
 
 def _flight(engine: IDroneEngine) -> dict[str, Any]:

@@ -39,9 +39,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with urllib.request.urlopen(request, timeout=ANSWER_WITHIN_S) as answer:
             print(table(json.load(answer)))
     except urllib.error.HTTPError as error:
-        print(f"raspberry_status: {url}: {json.load(error)['detail']}", file=sys.stderr)
+        print(f"raspberry_status: {url}: {_reason(error)}", file=sys.stderr)
+        return 1
+    except (AttributeError, KeyError, TypeError):
+        print(f"raspberry_status: {url}: this is no node of the mesh", file=sys.stderr)
         return 1
     except (OSError, ValueError) as error:
         print(f"raspberry_status: {url}: {error}", file=sys.stderr)
         return 1
     return 0
+
+
+def _reason(error: urllib.error.HTTPError) -> str:
+    try:
+        with error:
+            return str(json.load(error)["detail"])
+    except (ValueError, KeyError, TypeError):
+        return str(error)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import http.server
 import json
 import random
 import re
 import socket
+import threading
 import time
 from pathlib import Path
 from typing import Iterator
@@ -124,22 +126,45 @@ def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
     for neighbour in status["neighbours"]:
         assert neighbour["tries_per_packet"] >= 1.0
         assert 0.0 <= neighbour["delivered"] <= 1.0
-    assert re.search(r"neighbours +1 \(.* s ago, .* tries, \d+% delivered\), 2", table(status))
+    assert re.search(r"\n1 +[\d.]+ s ago +[\d.]+ +\d+%\n2 ", table(status))
     assert status["flight"]["why_not"] == "it stands on the ground"
     assert status["flight"]["latitude_longitude_height"] == [0.0, 0.0, 0.0]
     assert status["radio"]["received"] > 0
     assert status["radio"]["tries_per_packet"] >= 1.0
-    assert "radio.received" in capsys.readouterr().out
+    assert "radio: received" in capsys.readouterr().out
     line = one_line(status)
     assert line.startswith("gateway 0, 0 hops; neighbours 1 2; sent ")
     assert line.endswith("drone: it stands on the ground")
-    assert "flight.why_not           it stands on the ground" in table(status)
+    assert re.search(r"flight: why not +it stands on the ground\n", table(status))
     json.dumps(status)  # nothing but JSON values
 
 
 def test_a_status_that_cannot_be_had_is_one_line_and_a_failure(capsys):
     assert main([f"http://127.0.0.1:{free_port()}"]) == 1
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("code", "page", "said"),
+    [
+        (404, b"<html>", "HTTP Error 404"),
+        (200, b"[1]", "no node of the mesh"),
+        (200, b"<", "line 1"),
+    ],
+)
+def test_another_server_than_a_node_is_named_in_one_line(code, page, said, capsys):
+    class Other(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(code)
+            self.end_headers()
+            self.wfile.write(page)
+
+    with http.server.HTTPServer(("127.0.0.1", 0), Other) as server:
+        answering = threading.Thread(target=server.handle_request)
+        answering.start()
+        assert main([f"http://127.0.0.1:{server.server_port}"]) == 1
+        answering.join()
+    assert said in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_node_whose_thread_hangs_is_not_alive(monkeypatch):
