@@ -34,7 +34,7 @@ def node_status(
     ]
     return {
         "node": component.get_node_id(),
-        "version": _version(),
+        "version": version(),
         "uptime_s": round(uptime_s, 1),
         "on": on,
         "connected": component.get_connected_to_gateway(),
@@ -121,7 +121,8 @@ def _known(number: int) -> int | None:
     return None if number == NO_ROUTE else number
 
 
-def _version() -> str:
+def version() -> str:
+    """The version of this package, as installed."""
     try:
         return metadata.version("drone_mesh")
     except metadata.PackageNotFoundError:

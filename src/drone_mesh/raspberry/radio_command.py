@@ -22,6 +22,7 @@ from drone_mesh.nrf24.spi import SpiDevice, open_spi
 from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.bench_radio import BenchRadio
 from drone_mesh.raspberry.emulated_bench import PARTNER_ID, EmulatedPartner
+from drone_mesh.raspberry.node_status import version
 from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
 
 REPORT_ROUNDS = 20
@@ -57,7 +58,7 @@ def _tool(options: argparse.Namespace, radio: BenchRadio, irq: IrqPin | None) ->
     if options.tool == "listen":
         until_s = time.monotonic() + options.seconds
         return _listen(radio, lambda: time.monotonic() >= until_s, options.pcapng)
-    return _report(radio, irq, options.file)
+    return _report(radio, irq, options)
 
 
 def _listen(radio: BenchRadio, ended: Callable[[], bool], file: Path | None) -> Iterator[str]:
@@ -75,11 +76,14 @@ def _listen(radio: BenchRadio, ended: Callable[[], bool], file: Path | None) -> 
         )
 
 
-def _report(radio: BenchRadio, irq: IrqPin | None, file: Path) -> Iterator[str]:
+def _report(radio: BenchRadio, irq: IrqPin | None, options: argparse.Namespace) -> Iterator[str]:
     """Check and scan, and what this machine is, into one file."""
+    file: Path = options.file
     lines = [
+        f"drone_mesh {version()}",
         f"time {time.strftime('%Y-%m-%d %H:%M:%S %z')}",
         f"machine {_model()}, {platform.platform()}, Python {platform.python_version()}",
+        f"radio {_radio_in_words(options)}",
         f"settings {radio.settings}",
     ]
     for part, made in (
@@ -101,6 +105,14 @@ def _report(radio: BenchRadio, irq: IrqPin | None, file: Path) -> Iterator[str]:
     except OSError as error:
         raise ConfigurationError(f"{file}: {error.strerror or error}") from error
     yield f"report written to {file}"
+
+
+def _radio_in_words(options: argparse.Namespace) -> str:
+    if options.emulated:
+        return "emulated: nothing here is about a real chip"
+    bus, device = options.spi
+    irq = "not connected" if options.irq is None else f"GPIO{options.irq}"
+    return f"on SPI {bus}.{device} at {options.spi_hz} Hz, CE GPIO{options.ce}, IRQ {irq}"
 
 
 def _model() -> str:
