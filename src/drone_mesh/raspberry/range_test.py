@@ -16,7 +16,7 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.emulator.measured import measured_losses
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.settings import DataRate, RadioSettings, TxPower
-from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.bench_radio import SWITCH_S, BenchRadio
 
 Lines = Iterator[str]
 
@@ -24,7 +24,7 @@ USERS_DATA = 255  # a type that no node processes
 RETRANSMITS = 15
 CONFIRM_WITHIN_S = 0.3  # our choice: a confirmation takes at most 0.09 s on the air
 CHANGE_WITHIN_S = 0.5  # our choice: writing the registers takes 6 ms, on a busy machine longer
-JOIN_WITHIN_S = 3.0  # our choice: ten announcements
+JOIN_WITHIN_S = 3.0  # our choice: seven announcements
 FAILED_PACKET_S = 0.06  # 16 frames at 250 kbit/s take 48 ms
 LONGEST_HOLD_S = 600  # our choice
 
@@ -118,12 +118,11 @@ class _Partner:
         heard = False
         while True:
             radio.use(self._base)
-            if self._send(_FOLLOW, rate):
-                heard = True
-                if self._confirms(rate):
-                    self._may_be_away = True
-                    return
-                self.send_back(rate)  # it may have gone there, and the confirmation was lost
+            heard |= self._send(_FOLLOW, rate)
+            if self._confirms(rate):  # also without an acknowledgement: that may have been lost
+                self._may_be_away = True
+                return
+            self.send_back(rate)  # it may have gone there, and the confirmation was lost
             if runtime.now_s() >= until_s:
                 break
         raise RadioError(self._complaint(heard, rate))
@@ -184,6 +183,7 @@ def answer(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
         request = _request_in(payload, radio.node_id)
         if request is None:
             continue
+        runtime.sleep(SWITCH_S)  # or its acknowledgement would be cut off
         if request.what == _RETURN and radio.settings is not base:
             silent_at_s = float("inf")
             radio.use(base)
