@@ -1,4 +1,4 @@
-"""The order of the unit tests, and what hypothesis may make of a busy machine."""
+"""The order and time limits of the unit tests, and what hypothesis may make of a busy machine."""
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -9,7 +9,17 @@ settings.register_profile(
 )
 settings.load_profile("busy machine")
 
+# Seconds until a slow test counts as hung. One that computes for 25 s on an idle core takes several
+# times as long beside other work.
+SLOW_HANGS_AFTER_S = 600
+
 
 def pytest_collection_modifyitems(items: "list[pytest.Item]") -> None:
-    """Begin with what takes long on its own, or at the end one worker waits for the other."""
+    """Begin with what takes long on its own, or at the end one worker waits for the other.
+
+    Slow tests get a time limit of their own.
+    """
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    for item in items:
+        if item.get_closest_marker("slow") is not None:
+            item.add_marker(pytest.mark.timeout(SLOW_HANGS_AFTER_S))
