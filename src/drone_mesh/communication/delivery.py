@@ -160,7 +160,7 @@ class Delivery:
 
     def _sent(self, to: int, transmissions: int) -> None:
         self.total_sent += 1
-        self._strangers.took_packet(to)
+        self._strangers.known.add(to)
         self._routing.sent(to, True, transmissions)
 
     # Lost nodes ------------------------------------------------------------------------------

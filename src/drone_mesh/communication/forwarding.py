@@ -29,6 +29,7 @@ class Forwarding:
     ) -> None:
         self._node_id = node_id
         self._routing = routing
+        self._floods = routing.FLOODS
         self._delivery = delivery
         self._complaints = complaints
         self._report = report
@@ -42,7 +43,7 @@ class Forwarding:
         `creator`, `from_`, `kind` and `forward` are those of its header.
         """
         routing = self._routing
-        if routing.FLOODS:
+        if self._floods:
             if creator == self._node_id:
                 return
             self._flood(payload, routing.directions(forward, from_, creator), now_s)
@@ -57,7 +58,7 @@ class Forwarding:
             self._drop_circulating(payload, went_to, now_s)
             return
         lost = NO_ROUTE
-        for _attempt in range(2):
+        for _attempt in (1, 2):
             directions = routing.directions(forward, from_, creator)
             to = directions[0] if directions else NO_ROUTE
             if to in (NO_ROUTE, from_):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Callable
-
 LIMIT_PERIOD_S = 10.0  # our choice: one check period
 STRANGERS = 16  # our choice: losses per period of nodes that never took a packet
 REPEATS = 64  # our choice: announcements of one missing node per period; lossy links need many
@@ -36,9 +34,11 @@ class Strangers:
 
     def __init__(self) -> None:
         self.known: set[int] = set()  # have taken one; read for each packet
-        # Called for each packet, hence not a function of Python: `took_packet(node)`, it exists.
-        self.took_packet: Callable[[int], None] = self.known.add
         self._losses = RateLimit(STRANGERS)
+
+    def took_packet(self, node: int) -> None:
+        """It exists."""
+        self.known.add(node)
 
     def gave_up(self, node: int, now_s: float) -> None:
         """It took no packet."""

@@ -87,7 +87,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """Like MeshnetworkComponent."""
-        MeshnetworkComponent.on_msg(self, payload, now_s)  # super() costs more: once per packet
+        self._receive(payload, now_s)
         if self._states.nothing_to_repair:  # most packets
             self._repair_status = NOTHING_TO_REPAIR
         else:

@@ -14,6 +14,7 @@ from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.data.echo import OnEchoAnswer
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
+from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import (
     NO_ROUTE,
@@ -71,9 +72,11 @@ class Node:
         node_id: int,
         start: Location,
         rng: random.Random,
+        is_gateway: bool,
         why_not_fly: str = "",
     ) -> None:
         """`rng` is the antenna's."""
+        self.is_gateway = is_gateway
         self._clock = clock
         self.drone = InProcessDrone(
             clock, start, functools.partial(air.flight, node_id), why_not_fly
@@ -84,13 +87,9 @@ class Node:
         else:
             self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
         self.component: MeshnetworkComponent
+        self.deadlines: Deadlines  # of the component
         self.receiver: IMeshNetwork  # receives the packets: the component or its sealed antenna
         self._planned_s = math.inf
-
-    @property
-    def is_gateway(self) -> bool:
-        """Whether it is a gateway."""
-        return isinstance(self.component, MeshnetworkGateway)
 
     def start(self) -> None:
         """Start the mesh software."""
@@ -100,7 +99,7 @@ class Node:
     def hear(self, payload: bytes) -> None:
         """A packet has arrived."""
         self.receiver.on_msg(payload, self._clock.now_s)
-        if self.component.next_tick_s != self._planned_s:
+        if self.deadlines.next_s != self._planned_s:
             self.plan()
 
     def submit(self, work: Callable[[float], None]) -> None:
@@ -236,12 +235,13 @@ class Network:
         if node_id in self.nodes:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
-        node = Node(self.clock, self.air, node_id, Location(y, x, 0.0), radio_rng, why_not_fly)
-        self._install(node, node_id, gateway)
+        place = Location(y, x, 0.0)
+        node = Node(self.clock, self.air, node_id, place, radio_rng, gateway, why_not_fly)
+        self._install(node, node_id)
         self.nodes[node_id] = node
         self.clock.call_at(start_s, Node.start, node)
 
-    def _install(self, node: Node, node_id: int, gateway: bool) -> None:
+    def _install(self, node: Node, node_id: int) -> None:
         """The mesh software of one node."""
         antenna: InProcessAntenna | SharedAntenna | SealedAntenna = node.antenna
         keys = self._key(node_id) if callable(self._key) else self._key
@@ -252,7 +252,7 @@ class Network:
             antenna,
             node.drone,
             random.Random(self._rng.random()),
-            internet=NoInternet() if gateway else None,
+            internet=NoInternet() if node.is_gateway else None,
             routing=self._technique(node_id),
             timing=self._timing,
             observer=self._observe,
@@ -260,6 +260,7 @@ class Network:
             repair_options=self._repair_options,
         )
         node.component.data.on_received(functools.partial(self._receive, node_id))
+        node.deadlines = node.component.deadlines
         node.receiver = antenna if isinstance(antenna, SealedAntenna) else node.component
 
     def _sealed(self, antenna: IWirelessCommunication, node_id: int, keys: Keys) -> SealedAntenna:
@@ -282,7 +283,7 @@ class Network:
         """Restart the mesh software of a node, which loses its state."""
         node = self.nodes[node_id]
         node.component.stop()
-        self._install(node, node_id, node.is_gateway)
+        self._install(node, node_id)
         node.start()
 
     def power(self, node_id: int, on: bool) -> None:
