@@ -202,6 +202,8 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         if self._trying is not None:
             self._ce_rose_s = now_s + LOAD_S
             self._answered = False
+            self._retransmits, delay = self.access.train_retransmits()
+            self._ard_s = ard_s(delay)
             self._clock.call_at(self._ce_rose_s + SETTLING_S, self._send_frame, self._trying)
         elif self.powered and self._mesh is not None:
             self.listening_since_s = now_s + SETTLING_S

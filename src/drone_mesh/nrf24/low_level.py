@@ -163,6 +163,8 @@ class NRF24LowLevelInterface:
                     if more is None:
                         break
                     chip.load(address, more)
+                    retransmits, delay = self.access.train_retransmits()
+                    chip.set_retries(delay, retransmits)
                     done = chip.transmit() is not None
                 chip.listen()
             except RadioError as error:

@@ -53,7 +53,9 @@ class AccessRules:
     longest_pause_s: float  # mean pause, at most
     gap_s: float  # mean distance between two packets of one node
     train: int  # users' packets without a gap between them, at most
+    train_retransmits: int  # by the chip, of a packet that follows another one in a train
     train_pause_s: float  # a train that was not heard for so long is over
+    train_gap_s: float  # least distance between two trains of one node: an answer fits in
     train_hold_s: float  # if its end is announced: it was interrupted, and goes on within that time
     most_yield_s: float  # wait for the end of trains at most so long
     most_hold_s: float  # and if their end is announced
@@ -76,10 +78,12 @@ class AccessRules:
             first_pause_s=5 * cycle_s,
             longest_pause_s=400 * cycle_s,
             gap_s=2 * cycle_s,
-            train=64,
+            train=110,
+            train_retransmits=3,
             train_pause_s=1.1 * cycle_s,
+            train_gap_s=1.9 * cycle_s,
             train_hold_s=30 * cycle_s,
-            most_yield_s=60 * cycle_s,
+            most_yield_s=100 * cycle_s,
             most_hold_s=200 * cycle_s,
             broadcast_jitter_s=60 * cycle_s,
             answer_jitter_s=60 * cycle_s,
@@ -279,7 +283,9 @@ class MediumAccess:
         gap_s = rules.gap_s / (1.0 - self.contention)
         self._free_s = now_s + 2.0 * self._rng.random() * gap_s
         if packet.priority is Priority.DATA and receiver != ALL_NODES:
-            self._free_s = now_s + rules.train_pause_s + self._rng.random() * gap_s
+            # After a success the receiver may answer, and after a failure no answer waits.
+            pause_s = rules.train_gap_s if acknowledged else rules.train_pause_s
+            self._free_s = now_s + pause_s + self._rng.random() * gap_s
         counts = self._counts
         if receiver == ALL_NODES:
             counts["broadcasts"] += acknowledged
@@ -318,6 +324,14 @@ class MediumAccess:
         """How often the chip repeats a frame by itself, and its ARD setting, for one try."""
         low, high = self.rules.retransmit_delays
         return self.rules.retransmits, self._rng.randint(low, high)
+
+    def train_retransmits(self) -> tuple[int, int]:
+        """The same for a packet that follows another one in a train.
+
+        The receiver heard the one before, and its neighbours wait: damage is likelier than a
+        collision, and a pause would only end the train.
+        """
+        return self.rules.train_retransmits, self.rules.retransmit_delays[0]
 
     def clear(self) -> list[Outgoing]:
         """Give up all that waits."""

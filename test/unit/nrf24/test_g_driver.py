@@ -242,3 +242,20 @@ def test_a_payload_of_another_length_is_refused(lab):
 def test_settings_that_no_chip_has_are_refused_with_a_reason(wrong, why):
     with pytest.raises(ConfigurationError, match=why):
         RadioSettings(**wrong)
+
+
+def test_two_damaged_frames_do_not_end_a_train(lab):
+    sender, receiver = lab.driver(1), lab.driver(2, x_m=5.0)
+    payloads = [bytes((number,)) * 32 for number in range(3)]
+    frames = []
+
+    def loses(hop):
+        if hop.packet is None:
+            return False  # an acknowledgement
+        frames.append(hop)
+        return len(frames) in (2, 3)  # the second payload, twice
+
+    lab.loses = loses
+    waiting = iter(payloads[1:])
+    assert sender.try_once(2, payloads[0], False, 1, 2, lambda: next(waiting, None))
+    assert [received.payload for received in receiver.receive(0.01)] == payloads

@@ -295,7 +295,7 @@ def test_after_a_train_there_is_time_for_an_answer():
     node = loaded(3)
     train(node, 1.0)
     node.offer(5, packet(99), 1.0)
-    assert node.next_try_s >= 1.0 + RULES.train_pause_s
+    assert node.next_try_s >= 1.0 + RULES.train_gap_s > 1.0 + RULES.train_pause_s
 
 
 def test_who_hears_a_train_waits_for_its_end_but_not_for_ever():
