@@ -17,6 +17,7 @@ from drone_mesh.view.picture import DronePicture, Shape
 LINE_HEIGHT = 22  # pixels
 TEXT_DEPTH_M = 1.0  # distance of the text from the camera
 ID_ABOVE = 1.6  # heights of a drone, above its underside
+TURNED_AT_ONCE = 8  # our choice, drones per scene: each costs the window as much as two moves
 TEXT_SIZE = 1.2  # in units of pybullet
 INK = rgb(LIGHT.ink)
 
@@ -35,6 +36,7 @@ class WindowItems:
         self._shape = Shape.QUADROCOPTER
         self._bodies = Bodies(client, self._shape)
         self._drones: dict[int, tuple[int, DronePicture]] = {}
+        self._turned = 0  # counts on, over the drones in flight
         self._ids: dict[int, _Item] = {}
         self._obstacles: list[tuple[int, ObstacleStatus]] = []
         self._lines: dict[Line, _Item] = {}
@@ -97,7 +99,6 @@ class WindowItems:
         )
 
     def _show_drones(self, drones: Sequence[DronePicture], scale: float, rescaled: bool) -> None:
-        now_s = time.monotonic()  # while simulated time stands still, no scene comes to be shown
         shown = {drone.node_id: drone for drone in drones}
         for node_id, (body, before) in list(self._drones.items()):
             now = shown.get(node_id)
@@ -115,8 +116,20 @@ class WindowItems:
                     self._bodies.move_drone(body, drone, scale)
                 if before.colour != drone.colour:
                     self._bodies.colour_drone(body, drone)
-                self._bodies.turn_rotors(body, drone, now_s)
             self._drones[drone.node_id] = (body, drone)
+        self._turn_rotors()
+
+    def _turn_rotors(self) -> None:
+        """Turn the rotors of the next few drones in flight.
+
+        While simulated time stands still, no new scene comes, and nothing turns.
+        """
+        flying = [shown for _, shown in sorted(self._drones.items()) if shown[1].is_flying]
+        now_s = time.monotonic()
+        for number in range(min(TURNED_AT_ONCE, len(flying))):
+            body, drone = flying[(self._turned + number) % len(flying)]
+            self._bodies.turn_rotors(body, drone, now_s)
+        self._turned += TURNED_AT_ONCE
 
     def _show_ids(self, scale: float, with_ids: bool) -> None:
         for node_id, (body, drone) in self._drones.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Iterator
 
 import pybullet
@@ -66,6 +67,27 @@ def test_the_window_turns_them_with_each_scene(client: int, monkeypatch) -> None
     items.show([FLYING, STANDING], set(), 1.0, False, False)
     assert len(before) == len(MOTORS)
     assert rotors_of(client, 0) != before
+
+
+def test_of_many_drones_a_few_turn_with_each_scene_and_each_has_its_turn(
+    client: int, monkeypatch
+) -> None:
+    now_s = 100.0
+    monkeypatch.setattr(window_items.time, "monotonic", lambda: now_s)
+    items = WindowItems(client)
+    fleet = [replace(FLYING, node_id=number) for number in range(20)]
+    items.show(fleet, set(), 1.0, False, False)
+    still = [rotors_of(client, body) for body in range(20)]
+    turned: set[int] = set()
+    for scene in range(1, 4):
+        now_s = 100.0 + 0.05 * scene
+        before = [rotors_of(client, body) for body in range(20)]
+        items.show(fleet, set(), 1.0, False, False)
+        moved = {body for body in range(20) if rotors_of(client, body) != before[body]}
+        assert len(moved) == window_items.TURNED_AT_ONCE
+        turned |= moved
+    assert turned == set(range(20))
+    assert all(rotors_of(client, body) != still[body] for body in range(20))
 
 
 def test_neighbouring_rotors_turn_against_each_other_and_angles_stay_small() -> None:
