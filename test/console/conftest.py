@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -17,7 +17,6 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-START_LIMIT_S = 60.0  # a fleet of 254 has some seconds of its life simulated first
 CHROMIUM_FLAGS = [
     "--headless",
     "--no-sandbox",
@@ -30,55 +29,78 @@ CHROMIUM_FLAGS = [
 ]
 
 
+class Nursery:
+    """Where consoles come from: a process that forks one for each test."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, str(HERE / "console_nursery.py")],
+            env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def ask(self, **order: object) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(order) + "\n")
+        self._process.stdin.flush()
+
+    def answer(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline().rstrip()
+
+    def close(self) -> None:
+        with self._process:
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+
+
 class ConsoleProcess:
     """A console in a process of its own, which can be stopped and started again on its port."""
 
-    def __init__(self, *arguments: str) -> None:
-        self._arguments = arguments
+    def __init__(self, nursery: Nursery, *arguments: str) -> None:
+        self._nursery, self._arguments = nursery, arguments
         self.port = 0
-        self._process: subprocess.Popen[str] | None = None
+        self._pid: int | None = None
 
     @property
     def url(self) -> str:
         return f"http://127.0.0.1:{self.port}/"
 
     def start(self) -> None:
-        command = [sys.executable, str(HERE / "console_process.py"), "--port", str(self.port)]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
-        self._process = subprocess.Popen(
-            [*command, *self._arguments], env=environment, stdout=subprocess.PIPE, text=True
-        )
-        assert self._process.stdout is not None
-        said = self._process.stdout.readline()
-        match = re.fullmatch(r"serving on port (\d+)\n", said)
+        self._nursery.ask(start=["--port", str(self.port), *self._arguments])
+        self._pid = int(self._nursery.answer())
+        said = self._nursery.answer()
+        match = re.fullmatch(r"serving on port (\d+)", said)
         assert match, f"the console did not start, it said {said!r}"
         self.port = int(match[1])
 
     def stop(self) -> int:
         """Ask it to end; returns its exit code."""
-        if self._process is None:
+        if self._pid is None:
             return 0
-        process, self._process = self._process, None
-        process.send_signal(signal.SIGINT)
-        try:
-            return process.wait(timeout=10.0)
-        finally:
-            process.kill()
+        pid, self._pid = self._pid, None
+        self._nursery.ask(end=pid)
+        code = self._nursery.answer()
+        assert code != "null", "the console did not end"
+        return int(code)
 
-    def cpu_seconds(self) -> float:
-        """Processor time that it has used so far."""
-        assert self._process is not None
-        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+@pytest.fixture(scope="session")
+def nursery() -> Iterator[Nursery]:
+    nursery = Nursery()
+    yield nursery
+    nursery.close()
 
 
 @pytest.fixture
-def start_console() -> Iterator[Callable[..., ConsoleProcess]]:
+def start_console(nursery: Nursery) -> Iterator[Callable[..., ConsoleProcess]]:
     """Starts consoles with these arguments of console_process.py, and stops them in the end."""
     started: list[ConsoleProcess] = []
 
     def start(*arguments: str) -> ConsoleProcess:
-        console = ConsoleProcess(*arguments)
+        console = ConsoleProcess(nursery, *arguments)
         started.append(console)
         console.start()
         return console

@@ -53,7 +53,7 @@ def recorded(options: argparse.Namespace) -> History:
     return history
 
 
-def main() -> None:
+def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, default=8181)
     parser.add_argument("--address", default="127.0.0.1")
@@ -74,7 +74,7 @@ def main() -> None:
         "--recorded", type=float, default=0.0, help="simulated seconds of a recording; 2 a second"
     )
     parser.add_argument("--real", action="store_true", help="offer what a real gateway can do")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.INFO)
     mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
     whole = recorded(options) if options.recorded else None

@@ -204,6 +204,33 @@ def test_the_keyboard_is_enough_to_switch_a_node_off(page):
     assert page.page.locator("#help").is_visible()
 
 
+def test_the_tab_key_reaches_every_control_and_arrows_and_enter_do_the_rest(page):
+    keyboard = page.page.keyboard
+    page.wait_for("a time line", lambda: page.page.is_visible("#time"))
+    reached: dict[str, int] = {}
+    for presses in range(60):
+        keyboard.press("Tab")
+        reached.setdefault(page.page.evaluate("document.activeElement.id"), presses)
+    controls = "pause speed layout theme files-button help-button map zoom-in fit demonstrate add "
+    controls += "show-known show-ranges show-packets follow find only-selected events time"
+    assert set(controls.split()) <= set(reached)
+    page.page.focus("#nodes tbody tr[data-id='3']")
+    keyboard.press("Enter")
+    keyboard.press("Shift+ArrowDown")
+    assert page.page.inner_text("#group-count") == "2 drones: 3, 4"
+    page.page.focus("#time")
+    keyboard.press("Home")
+    page.wait_for("the past", lambda: page.page.is_visible("#past"))
+    page.page.focus("#time-live")
+    keyboard.press("Enter")
+    page.wait_for("the present", lambda: not page.page.is_visible("#past"))
+    page.page.focus("#demonstrate")
+    keyboard.press("Enter")
+    page.wait_for("a story", lambda: page.page.is_visible("#story-card"))
+    keyboard.press("Enter")
+    page.wait_for("its end", lambda: page.page.inner_text("#demonstrate") == "Show a repair")
+
+
 def test_the_map_moves_and_zooms_by_keyboard(page):
     before = on_screen(page, 0.0, 0.0)
     page.page.focus("#map")

@@ -173,7 +173,8 @@ export class NodeTable {
     if (event.key === "Enter") this.#choose(event);
     else if (to) {
       event.preventDefault();
-      this.mesh.select(Number(to.dataset.id));
+      if (event.shiftKey) this.mesh.toggle(Number(to.dataset.id));
+      else this.mesh.select(Number(to.dataset.id));
       to.focus();
     }
   }
