@@ -27,7 +27,7 @@ Work = Callable[[float], None]
 """A function of the time at which it runs."""
 
 
-class Inbox:
+class PacketInbox:
     """Packets that wait for one node. When too many do, new ones are dropped, as on the air.
 
     Any thread may call `put`; the function runs where `submit` runs it.

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from drone_mesh.execution import Inbox, MeshExecutor
+from drone_mesh.execution import MeshExecutor, PacketInbox
 
 PATIENCE_S = 5.0  # for threads; nothing here takes a hundredth of it
 
@@ -218,7 +218,7 @@ def test_a_clock_that_runs_by_itself_needs_no_poke():
 
 def test_an_inbox_holds_a_bounded_number_of_packets():
     waiting, handled = [], []
-    inbox = Inbox(waiting.append, most=3)
+    inbox = PacketInbox(waiting.append, most=3)
     for packet in range(5):
         inbox.put(lambda now_s, packet=packet: handled.append((packet, now_s)))
     assert len(waiting) == 3

@@ -184,7 +184,7 @@ class TimeLine(_Request):
     live: bool = False  # back to the present
 
 
-class Recorded:
+class RecordingControls:
     """The MeshControls of a recording: nothing can be ordered."""
 
     def power(self, node: int, on: bool) -> str:

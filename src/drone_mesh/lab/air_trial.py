@@ -62,7 +62,7 @@ class AirMesh(Protocol):
 
 
 @dataclass(frozen=True)
-class Figures:
+class TrialFigures:
     """The result of one trial."""
 
     connected_s: float  # when all were connected for the first time; infinity: never
@@ -154,7 +154,7 @@ def make_mesh(trial: AirTrial, kind: str) -> ChipMesh | ModelMesh:
     return ChipMesh(trial) if kind == CHIPS else ModelMesh(trial, shared=kind == MODEL)
 
 
-def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> Figures:
+def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> TrialFigures:
     """Wait at most `within_s` until all are connected, then observe them for `after_s`."""
     cpu_s = time.process_time()
     mesh = make_mesh(trial, kind)
@@ -165,7 +165,7 @@ def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> Figure
     figures = mesh.figures()
     simulated_s = mesh.now_s()
     mesh.stop()
-    return Figures(
+    return TrialFigures(
         connected_s,
         share,
         int(figures["frames"]),

@@ -11,7 +11,7 @@ import sys
 from dataclasses import dataclass
 from typing import Sequence
 
-from drone_mesh.lab.air_trial import CHIPS, MODEL, AirTrial, Figures, watch, with_seed
+from drone_mesh.lab.air_trial import CHIPS, MODEL, AirTrial, TrialFigures, watch, with_seed
 
 SIZES = (17, 26, 50, 101)
 RATES = ("250k", "1M", "2M")
@@ -40,7 +40,7 @@ class Means:
     simulated_per_core_s: float
 
     @classmethod
-    def of(cls, runs: Sequence[Figures]) -> Means:
+    def of(cls, runs: Sequence[TrialFigures]) -> Means:
         """The means of these runs."""
         count = len(runs)
         return cls(
@@ -125,7 +125,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _row(trial: AirTrial, seeds: int, seconds: float) -> bool:
-    runs: dict[str, list[Figures]] = {CHIPS: [], MODEL: []}
+    runs: dict[str, list[TrialFigures]] = {CHIPS: [], MODEL: []}
     for seed in range(1, seeds + 1):
         print(f"{trial.nodes} nodes, {trial.rate}, {trial.links}: seed {seed}", file=sys.stderr)
         for kind in runs:

@@ -13,14 +13,14 @@ _PATTERN = re.compile(
 )
 
 
-class Condition(NamedTuple):
+class StartCondition(NamedTuple):
     """A delay after the first occurrence of an event."""
 
     event: str  # one of EVENTS
     delay_s: float
 
 
-def parse_condition(text: str) -> Condition:
+def parse_condition(text: str) -> StartCondition:
     """Raises ValueError, with what is allowed, for an invalid condition."""
     match = _PATTERN.fullmatch(text)
     event = " ".join(match.group("event").lower().split()) if match else ""
@@ -28,4 +28,4 @@ def parse_condition(text: str) -> Condition:
         close = difflib.get_close_matches(event, EVENTS, n=1)
         hint = f"did you mean {close[0]!r}?" if close else f"events: {', '.join(EVENTS)}"
         raise ValueError(f"expected 'when EVENT' or 'N s after EVENT'; {hint}")
-    return Condition(event, float(match.group("delay") or 0.0))
+    return StartCondition(event, float(match.group("delay") or 0.0))

@@ -25,7 +25,7 @@ IDEAL: dict[str, Callable[..., Flown]] = {
 }
 
 
-class Figures(NamedTuple):
+class FlightMeans(NamedTuple):
     """Means over all deaths; distances in units of the range."""
 
     total: float
@@ -33,7 +33,7 @@ class Figures(NamedTuple):
     moved: float  # drones
 
     @classmethod
-    def of(cls, flown: Sequence[Flown]) -> Figures:
+    def of(cls, flown: Sequence[Flown]) -> FlightMeans:
         """The means."""
         count = max(1, len(flown))
         return cls(
@@ -96,10 +96,10 @@ def _row(drones: int, deaths: Sequence[tuple[Sequence[Point], int]], repair: str
         is_healed, flown = _run(points, vertex, repair, number)
         healed += is_healed
         runs.append(flown)
-    ideal, measured = Figures.of(behind), Figures.of(runs)
+    ideal, measured = FlightMeans.of(behind), FlightMeans.of(runs)
     ratio = measured.total / ideal.total if ideal.total else math.nan
     return (
-        f"| {drones} | {len(deaths)} | {repair} | {Figures.of(everywhere).in_words()} "
+        f"| {drones} | {len(deaths)} | {repair} | {FlightMeans.of(everywhere).in_words()} "
         f"| {ideal.in_words()} | {measured.in_words()} | {healed} of {len(deaths)} | {ratio:.2f} |"
     )
 

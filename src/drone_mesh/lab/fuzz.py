@@ -10,7 +10,7 @@ from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.keys import Keys
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.network import Network
-from drone_mesh.lab.stranger import Recorded, Tap
+from drone_mesh.lab.stranger import RecordedPacket, Tap
 
 NODES = 6
 SPACING_M = 6.0
@@ -49,7 +49,7 @@ def fuzz(
     network = Network(seed, key=key)
     network.add_fleet(1, NODES - 1, 3, SPACING_M)
     network.run_until(network.all_connected, within_s=60.0)
-    record: list[Recorded] = []
+    record: list[RecordedPacket] = []
     taps = {node: Tap(network, node, record) for node in network.nodes}
     for node, tap in taps.items():
         network.nodes[node].receiver = tap

@@ -17,7 +17,7 @@ Place = Tuple[float, float, float]  # x, y, z in metres
 HOLD_S = 5.0  # our choice: least uninterrupted service that counts as healed
 
 
-class Scene(NamedTuple):
+class Topology(NamedTuple):
     """The network's topology at one moment."""
 
     graph: Graph  # of all nodes with power
@@ -44,10 +44,10 @@ class RunRecord:
 
     scenario: Scenario
     gateways: frozenset[int]
-    start: Scene
-    before: Scene | None  # right before the first fault that must be healed
+    start: Topology
+    before: Topology | None  # right before the first fault that must be healed
     after_fault: Graph | None  # right after it
-    end: Scene
+    end: Topology
     fault_s: float | None  # when it was
     looks: Sequence[Look]
     happened: Sequence[Happened]

@@ -7,7 +7,7 @@ from typing import Sequence
 
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
-from drone_mesh.console.orders import Recorded
+from drone_mesh.console.orders import RecordingControls
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.state.model import EventRecord, MeshStatus
@@ -23,7 +23,7 @@ def serve_replay(
     """Serve until Ctrl-C. Raises ConfigurationError if the port is not available."""
     whole = History.of(states, events)
     server = ConsoleServer(
-        FrameStore(), Recorded(), Access(), recording=title, whole=whole, is_played=False
+        FrameStore(), RecordingControls(), Access(), recording=title, whole=whole, is_played=False
     )
     runner = ConsoleRunner(server, LOOPBACK, port)
     runner.start()

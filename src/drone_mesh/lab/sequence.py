@@ -26,7 +26,7 @@ ROUNDING_M = 1e-6
 
 
 @dataclass
-class Outcome:
+class SequenceOutcome:
     """The outcome of a sequence; counts are of nodes unless noted otherwise."""
 
     seed: int
@@ -46,7 +46,7 @@ class Outcome:
     took_s: float = 0.0  # simulated seconds
 
 
-FIELDS = tuple(asdict(Outcome(0, 0, "")))
+FIELDS = tuple(asdict(SequenceOutcome(0, 0, "")))
 
 
 @dataclass
@@ -97,7 +97,9 @@ class Mesh:
                 self.healed += now_s - since_s <= HEALED_WITHIN_S
 
 
-def run_sequence(seed: int, repair: str = DEFAULT_REPAIR, largest: int = LARGEST) -> Outcome:
+def run_sequence(
+    seed: int, repair: str = DEFAULT_REPAIR, largest: int = LARGEST
+) -> SequenceOutcome:
     """Run the sequence with this seed and repair, in a mesh of 8..`largest` nodes.
 
     The same arguments give the same outcome.
@@ -232,9 +234,9 @@ def _is_able(mesh: Mesh, node: int) -> bool:
     return believed.distance_m(mesh.network.location(0)) < MAX_DISTANCE_M - BESIDE_M
 
 
-def _outcome(mesh: Mesh, seed: int, incidents: str) -> Outcome:
+def _outcome(mesh: Mesh, seed: int, incidents: str) -> SequenceOutcome:
     network = mesh.network
-    outcome = Outcome(seed, len(network.nodes), incidents)
+    outcome = SequenceOutcome(seed, len(network.nodes), incidents)
     resting = {
         node: network.location(node)
         for node in [0, *mesh.alive()]

@@ -13,7 +13,7 @@ from typing import Any, Iterable, Iterator
 
 from drone_mesh.communication.repair_options import DEFAULT_REPAIR
 from drone_mesh.lab.quiet import quiet_nodes
-from drone_mesh.lab.sequence import FIELDS, Outcome, run_sequence
+from drone_mesh.lab.sequence import FIELDS, SequenceOutcome, run_sequence
 
 PROGRESS_S = 5.0  # wall
 
@@ -36,14 +36,14 @@ def main(argv: list[str] | None = None) -> int:
     return int(any(harm(row) for row in rows))
 
 
-def harm(row: Outcome) -> bool:
+def harm(row: SequenceOutcome) -> bool:
     """Whether a sequence contains something that a repair must never do."""
     return bool(
         row.stacked or row.flew_connected or row.flew_grounded or row.unexplained or row.endless
     )
 
 
-def summary(rows: list[Outcome], repair: str) -> str:
+def summary(rows: list[SequenceOutcome], repair: str) -> str:
     """A summary of a table of outcomes, as lines of text."""
     if not rows:
         return "no sequence was run"
@@ -97,7 +97,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _run(seeds: list[int], arguments: argparse.Namespace) -> Iterator[Outcome]:
+def _run(seeds: list[int], arguments: argparse.Namespace) -> Iterator[SequenceOutcome]:
     jobs = [(seed, arguments.repair) for seed in seeds]
     if arguments.workers <= 1:
         yield from _with_progress((run_sequence(*job) for job in jobs), len(jobs))
@@ -106,11 +106,11 @@ def _run(seeds: list[int], arguments: argparse.Namespace) -> Iterator[Outcome]:
         yield from _with_progress(pool.imap_unordered(_run_job, jobs), len(jobs))
 
 
-def _run_job(job: tuple[int, str]) -> Outcome:
+def _run_job(job: tuple[int, str]) -> SequenceOutcome:
     return run_sequence(*job)
 
 
-def _with_progress(outcomes: Iterable[Outcome], total: int) -> Iterator[Outcome]:
+def _with_progress(outcomes: Iterable[SequenceOutcome], total: int) -> Iterator[SequenceOutcome]:
     begun_s = shown_s = time.monotonic()
     harmed = 0
     for number, outcome in enumerate(outcomes, start=1):
@@ -126,20 +126,20 @@ def _with_progress(outcomes: Iterable[Outcome], total: int) -> Iterator[Outcome]
         yield outcome
 
 
-def _read(path: Path, seeds: range) -> list[Outcome]:
+def _read(path: Path, seeds: range) -> list[SequenceOutcome]:
     if not path.exists():
         return []
-    kinds: dict[str, Any] = {field.name: type(field.default) for field in fields(Outcome)}
+    kinds: dict[str, Any] = {field.name: type(field.default) for field in fields(SequenceOutcome)}
     kinds.update(seed=int, nodes=int, incidents=str)
     with path.open(newline="", encoding="utf-8") as table:
         rows = [
-            Outcome(**{name: kinds[name](text) for name, text in row.items()})
+            SequenceOutcome(**{name: kinds[name](text) for name, text in row.items()})
             for row in csv.DictReader(table)
         ]
     return [row for row in rows if row.seed in seeds]
 
 
-def _append(path: Path, outcome: Outcome) -> None:
+def _append(path: Path, outcome: SequenceOutcome) -> None:
     is_new = not path.exists()
     with path.open("a", newline="", encoding="utf-8") as table:
         writer = csv.DictWriter(table, FIELDS)

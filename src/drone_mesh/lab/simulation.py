@@ -19,7 +19,7 @@ from drone_mesh.lab.medium import Medium
 from drone_mesh.lab.metrics import STACKED_M
 from drone_mesh.lab.places import StartPlace, draw_places
 from drone_mesh.lab.propagation import obstacles_of, put_obstacles
-from drone_mesh.lab.record import RunRecord, Scene
+from drone_mesh.lab.record import RunRecord, Topology
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.timeline import Timeline
@@ -44,8 +44,8 @@ class Simulation:
         self.timeline = Timeline(scenario, self.network, self.medium, self.flights, streams, self)
         self._looks: list[Look] = []
         self._start_places = self._places()
-        self._start: Scene | None = None
-        self._before: Scene | None = None
+        self._start: Topology | None = None
+        self._before: Topology | None = None
         self._after_fault: Graph | None = None
         self._pairs: set[tuple[int, int]] = set()
         self._min_distance_m = math.inf
@@ -137,9 +137,9 @@ class Simulation:
             for node_id, place in ((n, self.network.location(n)) for n in self.network.nodes)
         }
 
-    def _scene(self, look: Look | None) -> Scene:
+    def _scene(self, look: Look | None) -> Topology:
         hops = {} if look is None else route_hops(self.network, look.served)
-        return Scene(physical_graph(self.network), hops, self._places())
+        return Topology(physical_graph(self.network), hops, self._places())
 
     def _watch_distances(self) -> None:
         nodes = self.network.nodes

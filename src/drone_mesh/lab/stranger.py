@@ -20,7 +20,7 @@ from drone_mesh.inprocess.shared_antenna import SharedAntenna
 BESIDE = 201  # a router of the stranger, without a key
 
 
-class Recorded(NamedTuple):
+class RecordedPacket(NamedTuple):
     """A packet as recorded on the air."""
 
     at_s: float
@@ -31,14 +31,14 @@ class Recorded(NamedTuple):
 class Tap(IMeshNetwork):
     """Records what a node hears, without changing it."""
 
-    def __init__(self, network: Network, node_id: int, record: list[Recorded]) -> None:
+    def __init__(self, network: Network, node_id: int, record: list[RecordedPacket]) -> None:
         self._network = network
         self._node_id = node_id
         self._record = record
         self.tapped = network.nodes[node_id].receiver
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
-        self._record.append(Recorded(now_s, self._node_id, payload))
+        self._record.append(RecordedPacket(now_s, self._node_id, payload))
         self.tapped.on_msg(payload, now_s)
 
     def get_node_id(self) -> int:
@@ -75,7 +75,7 @@ class Stranger(IMeshNetwork):
         self._x, self._y = x, y
         self.network = network
         self.mute = False  # True: it does nothing
-        self.record: list[Recorded] = []
+        self.record: list[RecordedPacket] = []
         self.heard: list[bytes] = []  # on its own address
         self.swallows: set[int] = set()  # nodes that drop what they should forward
         self.on_packet: Callable[[bytes], None] = self.heard.append

@@ -10,7 +10,7 @@ from typing import Callable, Iterator, NamedTuple, Protocol
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.conditions import Condition, parse_condition
+from drone_mesh.lab.conditions import StartCondition, parse_condition
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.look import Look, gateways_of
 from drone_mesh.lab.medium import Jamming, Medium
@@ -68,7 +68,7 @@ class Timeline:
         self._network, self._medium, self._flights = network, medium, flights
         self._scenario, self._streams = scenario, streams
         self._witness = witness
-        self._waiting: list[tuple[Condition, int]] = []
+        self._waiting: list[tuple[StartCondition, int]] = []
         self._seen: dict[str, float] = {}  # when a condition's event was first true
         self._events_read = 0
         for index, fault in enumerate(scenario.faults):

@@ -17,7 +17,7 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import is_data, readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.execution import Inbox
+from drone_mesh.execution import PacketInbox
 from drone_mesh.nrf24.link_quality import LinkQuality, Quality
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.medium_access import ALL_NODES, Priority
@@ -58,7 +58,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         """`on_payload` is shown each payload as the mesh gets it, in the receiving thread."""
         self._radio = radio
         self._submit = submit
-        self._inbox = Inbox(submit)
+        self._inbox = PacketInbox(submit)
         self._runtime = runtime or SystemRuntime()
         self._sender = Sender(radio, self._runtime, self._delivered, self._given_up)
         self._medium = medium_of(radio.settings)

@@ -8,7 +8,7 @@ import numpy as np
 
 from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.metrics.registry import NAN, metric
-from drone_mesh.lab.record import RunRecord, Scene
+from drone_mesh.lab.record import RunRecord, Topology
 
 STACKED_M = 0.3  # two drones closer than this are stacked
 
@@ -93,7 +93,7 @@ def stacked(run: RunRecord) -> float:
     return float(len(_stacked(run.end, run.end.graph) - _stacked(run.start, run.end.graph)))
 
 
-def _stacked(scene: Scene, alive: Graph) -> set[int]:
+def _stacked(scene: Topology, alive: Graph) -> set[int]:
     nodes = sorted(alive.near)
     points = np.array([scene.places[node] for node in nodes])
     if len(nodes) < 2:

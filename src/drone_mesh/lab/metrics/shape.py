@@ -7,7 +7,7 @@ from typing import Sequence
 import numpy as np
 
 from drone_mesh.lab.metrics.registry import NAN, metric
-from drone_mesh.lab.record import RunRecord, Scene
+from drone_mesh.lab.record import RunRecord, Topology
 
 
 @metric("parts", "connected parts right before the fault (or at the start)")
@@ -79,7 +79,7 @@ def covered(points: Sequence[Sequence[float]], range_m: float) -> int:
     return len(set(numbers[inside].tolist()))  # cheaper than sorting them
 
 
-def _before(run: RunRecord) -> Scene:
+def _before(run: RunRecord) -> Topology:
     return run.start if run.before is None else run.before
 
 

@@ -40,7 +40,7 @@ class Antenna(Protocol):
         """The chip's own frame has ended."""
 
 
-class Flight:
+class Transmission:
     """One frame on the air."""
 
     __slots__ = (
@@ -62,11 +62,11 @@ class Flight:
         self.start_ns, self.end_ns = span_ns
         self.packet = packet  # see links.Hop
         self.aborted = False
-        self.others: list[Flight] = []  # overlapping frames on the channel
+        self.others: list[Transmission] = []  # overlapping frames on the channel
         self.listeners: Sequence[Antenna] = ()
 
 
-FlightObserver = Callable[[Flight], None]
+TransmissionObserver = Callable[[Transmission], None]
 
 
 class Air:
@@ -77,14 +77,14 @@ class Air:
         self._links = links
         self._rng = rng  # decides which bits of a damaged frame are wrong
         self._listening: dict[tuple[int, int], dict[Antenna, None]] = {}
-        self._on_channel: dict[int, list[Flight]] = {}
+        self._on_channel: dict[int, list[Transmission]] = {}
         self._distances: dict[tuple[Antenna, Antenna], float] = {}
-        self._observers: list[FlightObserver] = []
+        self._observers: list[TransmissionObserver] = []
         self.frames = 0  # frames sent so far
         self.airtime_s = 0.0  # of all frames together
         self.collisions = 0  # frames that a receiver lost because of another frame
 
-    def observe(self, observer: FlightObserver) -> None:
+    def observe(self, observer: TransmissionObserver) -> None:
         """Call `observer` with each frame at its end."""
         self._observers.append(observer)
 
@@ -109,34 +109,35 @@ class Air:
 
     def transmit(
         self, sender: Antenna, frame: Frame, radio: tuple[int, int, float], packet: object
-    ) -> Flight:
+    ) -> Transmission:
         """Start sending a frame now; `radio`: channel, bits per second, dBm."""
         start_ns = self.clock.now_ns
         end_ns = start_ns + frame.bit_count * 1_000_000_000 // radio[1]
-        flight = Flight(sender, frame, radio, (start_ns, end_ns), packet)
-        active = self._on_channel.setdefault(flight.channel, [])
+        transmission = Transmission(sender, frame, radio, (start_ns, end_ns), packet)
+        active = self._on_channel.setdefault(transmission.channel, [])
         for other in active:
-            other.others.append(flight)
-            flight.others.append(other)
-        active.append(flight)
-        flight.listeners = tuple(self._listening.get(radio[:2], ()))
-        self.clock.call_at(end_ns, self._end, flight)
-        return flight
+            other.others.append(transmission)
+            transmission.others.append(other)
+        active.append(transmission)
+        transmission.listeners = tuple(self._listening.get(radio[:2], ()))
+        self.clock.call_at(end_ns, self._end, transmission)
+        return transmission
 
-    def abort(self, flight: Flight) -> None:
+    def abort(self, transmission: Transmission) -> None:
         """The sender lost power during the frame, so no receiver can decode it."""
-        flight.aborted = True
-        flight.end_ns = self.clock.now_ns
-        self._on_channel[flight.channel].remove(flight)
+        transmission.aborted = True
+        transmission.end_ns = self.clock.now_ns
+        self._on_channel[transmission.channel].remove(transmission)
 
     def energy_dbm(self, antenna: Antenna, channel: int, since_ns: int) -> float:
         """Power of the strongest frame on the channel that lasted long enough to be detected."""
         enough_ns = self.clock.now_ns - RPD_NS
         return max(
             (
-                self._power_dbm(flight, antenna)
-                for flight in self._on_channel.get(channel, ())
-                if flight.sender is not antenna and max(flight.start_ns, since_ns) <= enough_ns
+                self._power_dbm(transmission, antenna)
+                for transmission in self._on_channel.get(channel, ())
+                if transmission.sender is not antenna
+                and max(transmission.start_ns, since_ns) <= enough_ns
             ),
             default=-math.inf,
         )
@@ -144,68 +145,72 @@ class Air:
     def recognised_until_ns(self, antenna: Antenna, channel: int, address_bits: int) -> int | None:
         """End of a frame that the antenna has recognised, whose address has passed; else None."""
         since_ns = antenna.listening_since_ns
-        for flight in self._on_channel.get(channel, ()):
-            passed_ns = flight.start_ns + address_bits * 1_000_000_000 // flight.bits_per_s
+        for transmission in self._on_channel.get(channel, ()):
+            passed_ns = (
+                transmission.start_ns + address_bits * 1_000_000_000 // transmission.bits_per_s
+            )
             if (
                 since_ns is not None
-                and antenna in flight.listeners
-                and since_ns <= flight.start_ns
+                and antenna in transmission.listeners
+                and since_ns <= transmission.start_ns
                 and passed_ns <= self.clock.now_ns
-                and antenna.recognises(flight.frame)
+                and antenna.recognises(transmission.frame)
             ):
-                return flight.end_ns
+                return transmission.end_ns
         return None
 
-    def _end(self, flight: Flight) -> None:
+    def _end(self, transmission: Transmission) -> None:
         for observer in self._observers:
-            observer(flight)
-        if flight.aborted:
+            observer(transmission)
+        if transmission.aborted:
             return
         self.frames += 1
-        self.airtime_s += (flight.end_ns - flight.start_ns) / NS_PER_S
-        self._on_channel[flight.channel].remove(flight)
+        self.airtime_s += (transmission.end_ns - transmission.start_ns) / NS_PER_S
+        self._on_channel[transmission.channel].remove(transmission)
         # The sender first: it must be listening when the answer to its frame starts.
-        flight.sender.frame_left()
-        for antenna in flight.listeners:
+        transmission.sender.frame_left()
+        for antenna in transmission.listeners:
             since_ns = antenna.listening_since_ns
-            if since_ns is None or since_ns > flight.start_ns:
+            if since_ns is None or since_ns > transmission.start_ns:
                 continue
-            if antenna.recognises(flight.frame):
-                self._arrive(flight, antenna)
+            if antenna.recognises(transmission.frame):
+                self._arrive(transmission, antenna)
 
-    def _arrive(self, flight: Flight, antenna: Antenna) -> None:
-        power_dbm = self._power_dbm(flight, antenna)
-        bit_count = flight.frame.bit_count
+    def _arrive(self, transmission: Transmission, antenna: Antenna) -> None:
+        power_dbm = self._power_dbm(transmission, antenna)
+        bit_count = transmission.frame.bit_count
         errors = self._links.bit_errors(
             Hop(
-                flight.sender.name,
+                transmission.sender.name,
                 antenna.name,
-                self._distance_m(flight.sender, antenna),
+                self._distance_m(transmission.sender, antenna),
                 power_dbm,
-                flight.bits_per_s,
+                transmission.bits_per_s,
                 bit_count,
-                flight.packet,
-                flight.start_ns,
+                transmission.packet,
+                transmission.start_ns,
             )
         )
         if errors is None:
             return
-        needed_dbm = power_dbm - CAPTURE_DB[flight.bits_per_s]
-        if any(self._power_dbm(other, antenna) > needed_dbm for other in flight.others):
+        needed_dbm = power_dbm - CAPTURE_DB[transmission.bits_per_s]
+        if any(self._power_dbm(other, antenna) > needed_dbm for other in transmission.others):
             self.collisions += 1
             return
-        frame = flight.frame
+        frame = transmission.frame
         if errors:
             frame = frame.with_errors(*self._rng.sample(range(bit_count), min(errors, bit_count)))
             if not antenna.recognises(frame):
                 return
         antenna.frame_arrived(frame, power_dbm)
 
-    def _power_dbm(self, flight: Flight, antenna: Antenna) -> float:
-        if flight.sender is antenna:
+    def _power_dbm(self, transmission: Transmission, antenna: Antenna) -> float:
+        if transmission.sender is antenna:
             return -math.inf  # its own frame, during which it did not listen
-        distance_m = self._distance_m(flight.sender, antenna)
-        return self._links.received_dbm(distance_m, flight.tx_dbm, 2400 + flight.channel)
+        distance_m = self._distance_m(transmission.sender, antenna)
+        return self._links.received_dbm(
+            distance_m, transmission.tx_dbm, 2400 + transmission.channel
+        )
 
     def _distance_m(self, one: Antenna, other: Antenna) -> float:
         distance_m = self._distances.get((one, other))

@@ -139,7 +139,7 @@ class EmulatedChip(ChipCore):
             self.latch_rpd(power_dbm > RPD_DBM)
 
     def frame_left(self) -> None:
-        self.flight = None
+        self.transmission = None
         if self.state is State.ANSWER:
             self.settle()
         else:

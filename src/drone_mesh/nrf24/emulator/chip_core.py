@@ -10,7 +10,7 @@ import abc
 from typing import Callable
 
 from drone_mesh.nrf24.airtime import PREAMBLE_BITS, SETTLING_NS
-from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Flight, Position
+from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Position, Transmission
 from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.pins import EmulatedCe, EmulatedIrq
@@ -39,7 +39,7 @@ class ChipCore(abc.ABC):
         self.state = State.POWER_DOWN
         self.listening_since_ns: int | None = None
         self._listening_to = (0, 0)  # channel and rate
-        self.flight: Flight | None = None  # its own frame on the air
+        self.transmission: Transmission | None = None  # its own frame on the air
         self.ce_rose_ns = -SETTLING_NS
         self._epoch = 0  # timers of an earlier epoch are void
         self._rpd_latched: bool | None = False  # None: the current state of the channel
@@ -162,9 +162,9 @@ class ChipCore(abc.ABC):
         registers = self.registers
         power_dbm = -300.0 if self.faults.dead_transmitter else float(registers.tx_dbm)
         radio = (registers.channel, registers.bits_per_s, power_dbm)
-        self.flight = self.air.transmit(self, frame, radio, packet)
+        self.transmission = self.air.transmit(self, frame, radio, packet)
         if self.faults.dead_transmitter:
-            self.flight.listeners = ()
+            self.transmission.listeners = ()
 
     def recognises(self, frame: Frame) -> bool:
         registers = self.registers
@@ -179,9 +179,9 @@ class ChipCore(abc.ABC):
         """Stop all activity, including a frame on the air."""
         self.overtake()
         self.stop_listening()
-        if self.flight is not None:
-            self.air.abort(self.flight)
-            self.flight = None
+        if self.transmission is not None:
+            self.air.abort(self.transmission)
+            self.transmission = None
 
     def latch_rpd(self, strong: bool) -> None:
         """A valid packet arrived: RPD shows its power, even if a stronger one came before."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from drone_mesh.nrf24.airtime import PREAMBLE_BITS
-from drone_mesh.nrf24.emulator.air import Flight
+from drone_mesh.nrf24.emulator.air import Transmission
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.pcapng import CapturedPacket, write_pcapng
 
@@ -41,19 +41,19 @@ class FrameTrace:
     def __init__(self, limit: int = 100_000) -> None:
         self._frames: deque[TracedFrame] = deque(maxlen=limit)
 
-    def see(self, flight: Flight) -> None:
+    def see(self, transmission: Transmission) -> None:
         """Record a frame that has ended."""
         self._frames.append(
             TracedFrame(
-                flight.start_ns,
-                flight.end_ns,
-                flight.sender.name,
-                flight.channel,
-                flight.bits_per_s,
-                flight.packet is None,
-                flight.aborted,
-                tuple(antenna.name for antenna in flight.listeners),
-                flight.frame,
+                transmission.start_ns,
+                transmission.end_ns,
+                transmission.sender.name,
+                transmission.channel,
+                transmission.bits_per_s,
+                transmission.packet is None,
+                transmission.aborted,
+                tuple(antenna.name for antenna in transmission.listeners),
+                transmission.frame,
             )
         )
 

@@ -12,7 +12,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import antenna_info
 
 
-class Antenna(Protocol):
+class AnnouncedAntenna(Protocol):
     """An antenna as the simulator sees it."""
 
     node_id: int
@@ -41,14 +41,14 @@ class Announcements:
         self._lock = threading.Lock()
         self._announcing = threading.Lock()
         self._rota: deque[int] = deque()  # ids of all antennas, least recently announced first
-        self._antennas: dict[int, Antenna] = {}
+        self._antennas: dict[int, AnnouncedAntenna] = {}
         self._on_registered: dict[int, Callable[[], None]] = {}
         self._unregistered: set[int] = set()
 
     def __len__(self) -> int:
         return len(self._antennas)
 
-    def add(self, antenna: Antenna, on_registered: Callable[[], None]) -> None:
+    def add(self, antenna: AnnouncedAntenna, on_registered: Callable[[], None]) -> None:
         """Announce this antenna; call `on_registered` each time a simulator registers it."""
         with self._lock:
             self._antennas[antenna.node_id] = antenna
@@ -57,7 +57,7 @@ class Announcements:
             self._rota.append(antenna.node_id)
         self.announce(antenna)
 
-    def remove(self, antenna: Antenna) -> None:
+    def remove(self, antenna: AnnouncedAntenna) -> None:
         """Forget this antenna; an unknown one is ignored."""
         with self._lock:
             self._antennas.pop(antenna.node_id, None)
@@ -66,7 +66,7 @@ class Announcements:
             if antenna.node_id in self._rota:
                 self._rota.remove(antenna.node_id)
 
-    def announce(self, antenna: Antenna) -> None:
+    def announce(self, antenna: AnnouncedAntenna) -> None:
         """Publish where this antenna listens, and whether it has power."""
         topic = names.node_topic(antenna.node_id)
         with self._announcing:
@@ -91,7 +91,7 @@ class Announcements:
         for antenna in antennas:
             self.announce(antenna)
 
-    def unregistered(self) -> list[Antenna]:
+    def unregistered(self) -> list[AnnouncedAntenna]:
         """Antennas whose probe has not returned from the current simulator."""
         with self._lock:
             return [self._antennas[node_id] for node_id in self._unregistered]

@@ -12,7 +12,7 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
     IWirelessCommunication,
 )
-from drone_mesh.execution import ExecutorSlot, Inbox
+from drone_mesh.execution import ExecutorSlot, PacketInbox
 from drone_mesh.msg import NRF24
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.host.announcements import probe_of
@@ -39,7 +39,7 @@ class VirtualNRF24(IWirelessCommunication):
         self._probe = probe_of(node_id)
         self._link = link
         self._slot = slot
-        self._inbox = Inbox(slot.submit)
+        self._inbox = PacketInbox(slot.submit)
         self._dropped = 0  # packets that the inbox dropped, as far as the worker knows
         self._on = False
         self._switching = threading.Lock()

@@ -16,7 +16,7 @@ import rospy
 from drone_mesh.console.dots import make_dots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
-from drone_mesh.console.orders import LayoutOffer, MeshControls, Recorded, places_of
+from drone_mesh.console.orders import LayoutOffer, MeshControls, RecordingControls, places_of
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import ConfigurationError
@@ -161,7 +161,7 @@ def _run() -> int:
     store = FrameStore(History() if whole is None else None)
     layouts = layout_offers(manager_layouts())
     access = access_for(address, token)
-    controls: MeshControls = Recorded() if recording else RosControls()
+    controls: MeshControls = RecordingControls() if recording else RosControls()
     server = ConsoleServer(
         store,
         controls,

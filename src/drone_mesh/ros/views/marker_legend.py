@@ -20,7 +20,7 @@ COLUMN_WIDTH = 11.0  # in heights of the text
 GAP_M = 1.0  # between mesh and legend
 
 
-class LegendRow(NamedTuple):
+class PlacedLegendRow(NamedTuple):
     """One colour, its meaning, and where to draw them."""
 
     text: str
@@ -31,7 +31,7 @@ class LegendRow(NamedTuple):
     text_place: Vector  # the middle of the text
 
 
-def legend_rows(positions: Iterable[Vector]) -> list[LegendRow]:
+def legend_rows(positions: Iterable[Vector]) -> list[PlacedLegendRow]:
     """The rows to draw beside drones at these positions, of which there is at least one."""
     xs, ys, _zs = zip(*positions)
     west, east, south, north = (
@@ -52,7 +52,9 @@ def legend_rows(positions: Iterable[Vector]) -> list[LegendRow]:
         for number, (text, colour, thickness) in enumerate(meanings, start=1):
             y = south - GAP_M - number * LINE_SPACING * height_m
             text_x = x + height_m * (1 + len(text) * CHARACTER_WIDTH / 2)
-            rows.append(LegendRow(text, colour, thickness, height_m, (x, y, 0), (text_x, y, 0)))
+            rows.append(
+                PlacedLegendRow(text, colour, thickness, height_m, (x, y, 0), (text_x, y, 0))
+            )
     return rows
 
 
