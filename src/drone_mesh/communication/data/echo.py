@@ -1,4 +1,4 @@
-"""Echoes: how long a packet to a node and back takes, and which nodes it passes."""
+"""Echoes: the round-trip time of a packet to a node, and the nodes that it passes."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from drone_mesh.communication.data import packets
 
 MOST_AWAITED = 64  # answers; the oldest is given up
 SendPacket = Callable[[int, int, bytes], bool]
-"""Sends a packet of a type with a body to a node; False: it could not be sent."""
+"""Sends a packet with a type and a body to a node; False: it could not be sent."""
 
 
 class EchoAnswer(NamedTuple):
     """The answer to an echo."""
 
-    node: int  # that answered
+    node: int  # the node that answered
     token: int  # of the echo
     round_trip_s: float
     route: tuple[int, ...]  # the nodes that forwarded the echo, in order
@@ -26,7 +26,7 @@ class EchoAnswer(NamedTuple):
 
 
 OnEchoAnswer = Callable[[EchoAnswer], None]
-"""Runs in the component's thread, and must not call back into the component."""
+"""Called in the component's thread; must not call back into the component."""
 
 
 class Echoes:
@@ -40,7 +40,7 @@ class Echoes:
         self._awaited: dict[int, tuple[int, float, OnEchoAnswer]] = {}
 
     def send(self, to: int, on_answer: OnEchoAnswer, now_s: float) -> int | None:
-        """Send an echo to a node; its token, or None if there is no route."""
+        """Send an echo to a node; returns its token, or None if there is no route."""
         token = self._token = (self._token + 1) & 0xFFFF
         while len(self._awaited) >= MOST_AWAITED:
             del self._awaited[next(iter(self._awaited))]
@@ -51,12 +51,12 @@ class Echoes:
         return None
 
     def asked(self, creator: int, body: bytes) -> None:
-        """An echo arrived."""
+        """Answer an echo that arrived."""
         token, route = packets.echo_of(body)
         self._send(packets.ECHO_ANSWER, creator, packets.echo_body(token, route, self._room))
 
     def answered(self, creator: int, body: bytes, now_s: float) -> None:
-        """An answer arrived; one that is not awaited is ignored."""
+        """Process an answer; an unexpected one is ignored."""
         token, route = packets.echo_of(body)
         to, sent_s, on_answer = self._awaited.get(token, (-1, 0.0, None))
         if to == creator and on_answer is not None:

@@ -1,4 +1,4 @@
-"""SeenFloods: which fragments for all nodes went past here already."""
+"""SeenFloods: the fragments to all nodes that this node has already forwarded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class SeenFloods:
         self._seen: OrderedDict[tuple[int, int], tuple[int, float]] = OrderedDict()
 
     def is_new(self, sender: int, number: int, index: int, now_s: float) -> bool:
-        """Whether this fragment is here for the first time; from now on it is not."""
+        """Whether this fragment is new; records it."""
         key = (sender, number)
         indices, first_s = self._seen.get(key, (0, now_s))
         if now_s - first_s >= REMEMBERED_S:  # the number is that of another message by now

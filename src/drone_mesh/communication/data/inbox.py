@@ -1,4 +1,4 @@
-"""Inbox: the messages that come from one sender."""
+"""Inbox: the messages from one sender."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
 from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole, open_plain
 
-ACK_DELAY_S = 0.02  # our choice: after a pause of this time, what is complete is acknowledged
-ACK_LATEST_S = 0.2  # our choice: and after this time without a pause
+ACK_DELAY_S = 0.02  # our choice: complete messages are acknowledged after a pause of this time
+ACK_LATEST_S = 0.2  # our choice: or after this time without a pause
 ACK_AT = 96  # our choice: fragments of complete messages that make an ACK leave at once
-REPEAT_S = 0.3  # our choice: an ACK that nothing asked for is not repeated sooner
+REPEAT_S = 0.3  # our choice: least time between unsolicited repetitions of an ACK
 MOST_PORTS = 64  # whose order is kept per sender, the ones used last
-FORMER_SESSION_S = 30.0  # our choice: longer than a packet can wait on its way
+FORMER_SESSION_S = 30.0  # our choice: longer than a packet can be under way
 
 
 class Inbox:
-    """Puts together what one sender sends, and says when to acknowledge what."""
+    """Reassembles the messages of one sender, and decides what to acknowledge and when."""
 
     def __init__(
         self, room: int, acknowledge: Callable[[Ack], None], open_message: Open = open_plain
@@ -39,7 +39,7 @@ class Inbox:
         self.ack_due_s = self._ack_latest_s = math.inf
 
     def fragment(self, index: int, body: bytes, now_s: float) -> list[Whole]:
-        """A fragment arrived: what can be delivered now. Raises PacketError for a damaged one."""
+        """Process a fragment; returns deliverable messages. Raises PacketError if damaged."""
         if index == 0 and not self._is_current(packets.head_of(body).session, now_s):
             return []
         if self.ack_due_s < math.inf:
@@ -64,7 +64,7 @@ class Inbox:
         return len(self._reassembly) > 0 or any(order.holds for order in self._ports.values())
 
     def poll(self, poll: Poll, now_s: float) -> None:
-        """The sender asks what is here."""
+        """Answer the sender's POLL."""
         if poll.nonce == packets.NO_ANSWER:
             return
         if poll.session == self._session:
@@ -72,7 +72,7 @@ class Inbox:
         self._acknowledge(self._ack(poll.number, poll.nonce, poll.session))
 
     def on_time(self, now_s: float) -> list[Whole]:
-        """An ACK may be due; returns messages that have waited for earlier ones for too long."""
+        """Send a due ACK; returns messages that have waited for earlier ones for too long."""
         if now_s >= self.ack_due_s:
             self._acknowledge_now()
         self._reassembly.expire(now_s)
@@ -83,7 +83,7 @@ class Inbox:
         return overdue
 
     def _is_current(self, session: int, now_s: float) -> bool:
-        """Whether a message belongs to the sender's present session; a new one starts afresh."""
+        """Whether a message belongs to the sender's current session; a new session starts over."""
         if session == self._session:
             return True
         former, ended_s = self._former

@@ -1,10 +1,10 @@
 """Lane: the messages from this node to one destination.
 
-A message is cut into fragments. For a reliable one the receiver says which fragments it has, in an
-ACK: when the message is complete, when its last fragment came and others are missing, and when it
-is asked with a POLL. What is missing then is sent again. A POLL follows when no ACK comes in time,
-and when as many fragments are on their way as the window allows; behind relays on a shared channel
-the train takes the place of the window (see Train), also for messages that are not reliable.
+A message is cut into fragments. The receiver of a reliable one reports the fragments that it has in
+an ACK: when the message is complete, when its last fragment arrived but others are missing, and in
+answer to a POLL. Missing fragments are then sent again. The sender sends a POLL when no ACK arrives
+in time, and when the window is full; behind relays on a shared channel the train takes the place of
+the window (see Train), also for messages that are not reliable.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
 NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
 
 Seal = Callable[[bytes, bytes], bytes]
-"""From the place and the payload of a message to what travels."""
+"""From the place and the payload of a message to the bytes to send."""
 
 
 def leave_plain(_place: bytes, payload: bytes) -> bytes:
-    """For a mesh without a key."""
+    """For a mesh without a key: the payload itself."""
     return payload
 
 
 class Lane:
-    """The messages of one node to one destination, in the order in which they were handed in."""
+    """The messages from one node to one destination, in the order of submission."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Lane:
         self._nonce = 0
         self._train: Train | None = None  # while relays share the channel with this node
         self._latest: Outgoing | None = None  # message whose fragment left last
-        self.not_before_s = -math.inf  # there was no route; look again then
+        self.not_before_s = -math.inf  # no route: time of the next attempt
 
     def __len__(self) -> int:
         return len(self._waiting) + len(self._open)
@@ -83,18 +83,18 @@ class Lane:
         return not len(self) and (self._train is None or not self._train.is_open)
 
     def add(self, message: Outgoing) -> None:
-        """A message for this destination."""
+        """Add a message for this destination."""
         self._waiting.append(message)
 
     def relayed(self, relayed: bool) -> None:
-        """Whether relays on the same channel are between this node and the destination."""
+        """Set whether there are relays on the same channel on the way to the destination."""
         if not relayed:
             self._train = None
         elif self._train is None:
             self._train = Train()
 
     def next_packet(self, now_s: float) -> DataPacket | None:
-        """What to send now; `left` follows if it could be sent."""
+        """The next packet to send; call `left` once it was sent."""
         train = self._train
         if train is None:
             return self._timely_poll(now_s) or self._fragment(now_s)
@@ -112,7 +112,7 @@ class Lane:
         return self._fragment(now_s) or self._mark_of_end(train)
 
     def _timely_poll(self, now_s: float) -> DataPacket | None:
-        """A POLL for a message of which no ACK came in time."""
+        """A POLL for a message whose ACK is late."""
         for message in self._open.values():
             if message.asks and now_s >= message.asked_s + self._timeout_s(message):
                 return self._poll(message)
@@ -141,7 +141,7 @@ class Lane:
         return sum(message.in_flight for message in self._open.values())
 
     def left(self, packet: DataPacket, now_s: float) -> None:
-        """The packet is on its way."""
+        """The packet was sent."""
         message = packet.message
         if packet.ends_train:
             assert self._train is not None
@@ -173,7 +173,7 @@ class Lane:
             self._close(message, TicketState.SENT)
 
     def answered(self, ack: Ack, now_s: float) -> None:
-        """The receiver says what it has."""
+        """Process an ACK of the receiver."""
         if ack.session != self._session:
             return
         complete = {
@@ -211,7 +211,7 @@ class Lane:
             train.over(arrived)
 
     def due_s(self, now_s: float) -> float:
-        """When to look after this lane next; infinity while nothing waits in it."""
+        """When to check this lane next; infinity while nothing waits in it."""
         due_s = math.inf
         if self.is_idle:
             return due_s
@@ -228,7 +228,7 @@ class Lane:
         return self.not_before_s if now_s < self.not_before_s else due_s
 
     def expire(self, now_s: float, has_route: bool) -> None:
-        """Give up what waited for too long."""
+        """Give up messages that waited for too long."""
         for message in list(self):
             if now_s >= message.expires_s:
                 what = "no route to" if not has_route else "no acknowledgement from"
@@ -236,7 +236,7 @@ class Lane:
                 self.give_up(message, f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}")
 
     def give_up(self, message: Outgoing, reason: str) -> None:
-        """The message will not be sent any more."""
+        """Stop sending this message."""
         self._close(message, TicketState.GIVEN_UP, reason)
 
     def hindered(self, reason: str) -> None:
@@ -250,7 +250,7 @@ class Lane:
                 self.give_up(message, reason)
 
     def take(self, to: int) -> list[Outgoing]:
-        """The messages that were addressed to `to`, as they were before anything was sent."""
+        """Remove the messages addressed to `to`, and return them as if nothing had been sent."""
         messages = [message for message in self if message.ticket.to == to]
         for message in messages:
             self._remove(message)

@@ -1,10 +1,10 @@
-"""Ordering: each message of a sender once, and per port in the order in which it was sent."""
+"""Ordering: delivers each message of a sender once, in the order of sending per port."""
 
 from __future__ import annotations
 
 from drone_mesh.communication.data.reassembly import Whole
 
-HOLD_S = 300.0  # our choice: longer than a sender tries (LIFETIME_S of outgoing.py)
+HOLD_S = 300.0  # our choice: longer than a sender retries (LIFETIME_S of outgoing.py)
 _HALF = 1 << 15
 
 
@@ -14,9 +14,9 @@ def ahead(order: int, of: int) -> int:
 
 
 class PortOrder:
-    """The messages of one sender to one port, of one kind of delivery.
+    """The messages of one sender to one port, with one kind of delivery.
 
-    Memory: as many messages as a sender has on their way, MOST_BEHIND + 1.
+    Memory: as many messages as a sender may have under way, MOST_BEHIND + 1.
     """
 
     def __init__(self) -> None:
@@ -24,7 +24,7 @@ class PortOrder:
         self._held: dict[int, tuple[Whole, float]] = {}  # complete, but earlier ones are missing
 
     def take(self, whole: Whole, now_s: float) -> list[Whole]:
-        """A complete message: all that can be delivered now, in order. A duplicate adds nothing."""
+        """Add a complete message; returns what can be delivered now. Ignores duplicates."""
         order = whole.head.order
         if not whole.head.reliable:
             if self._next is not None and ahead(order, self._next) < 0:
@@ -40,7 +40,7 @@ class PortOrder:
         return self._ready_up_to(oldest)
 
     def overdue(self, now_s: float) -> list[Whole]:
-        """Messages that waited for so long that no earlier one can come any more."""
+        """Messages that have waited for so long that no earlier one can arrive."""
         waited = [order for order, (_, since_s) in self._held.items() if now_s - since_s >= HOLD_S]
         if not waited or self._next is None:
             return []

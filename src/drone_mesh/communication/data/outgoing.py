@@ -1,4 +1,4 @@
-"""Outgoing: one message of a lane, and what is known of its fragments."""
+"""Outgoing: one message of a lane, and the state of its fragments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LIFETIME_S = 240.0  # our choice: a loss is repaired within two minutes and a fl
 
 
 class DataPacket(NamedTuple):
-    """A packet to be sent, but for its header."""
+    """A packet to send, without its header."""
 
     kind: int
     body: bytes
@@ -22,7 +22,7 @@ class DataPacket(NamedTuple):
 
 
 class Outgoing:
-    """One message on its way."""
+    """One message under way."""
 
     __slots__ = (
         "asked_s", "asks", "expires_s", "head", "known", "nonce", "payload", "sealed", "sent",
@@ -32,9 +32,9 @@ class Outgoing:
     def __init__(self, ticket: Ticket, payload: bytes, now_s: float) -> None:
         self.ticket = ticket
         self.payload = payload
-        self.sealed = b""  # what travels, once it is on its way
+        self.sealed = b""  # the bytes to send, once it is under way
         self.expires_s = now_s + LIFETIME_S
-        self.head: Head | None = None  # once it is on its way
+        self.head: Head | None = None  # once it is under way
         self.to_send: deque[int] = deque()  # indices of fragments
         self.whole = False  # whether each fragment has left at least once
         self.sent = 0  # fragments that left, as bits
@@ -44,7 +44,7 @@ class Outgoing:
         self.nonce = 0  # of the latest POLL; 0: none
 
     def begin_again(self) -> None:
-        """Nothing of it was sent."""
+        """Reset: nothing of it was sent."""
         self.head = None
         self.whole = False
         self.to_send.clear()
@@ -53,5 +53,5 @@ class Outgoing:
 
     @property
     def in_flight(self) -> int:
-        """Fragments that left and of which nothing is known."""
+        """Fragments that were sent, with unknown outcome."""
         return bin(self.sent & ~self.known).count("1")

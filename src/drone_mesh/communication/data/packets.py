@@ -1,4 +1,4 @@
-"""The packets of users' data: their types and bodies (docs/protocol.md, "Data").
+"""The packets of users' data: types and bodies (docs/protocol.md, "Data").
 
 No other module knows an offset in them. A message is cut into fragments. The type of a packet says
 which fragment it carries, so that one byte of the body, the message's id, is all the header that
@@ -38,7 +38,7 @@ _TOKEN = struct.Struct("<H")
 
 
 def check_size(payload: bytes) -> None:
-    """Raises MessageRefused if a user's message is too large."""
+    """Raise MessageRefused if a user's message is too large."""
     if len(payload) > MAX_MESSAGE_BYTES:
         raise MessageRefused(
             f"the message is too large: {len(payload)} bytes, "
@@ -47,10 +47,10 @@ def check_size(payload: bytes) -> None:
 
 
 class Head(NamedTuple):
-    """What the first fragment says of its message."""
+    """The header of a message, in its first fragment."""
 
-    number: int  # 0..255: of this message among those for the same destination
-    session: int  # 0..65535: another one after a restart of the sender
+    number: int  # 0..255: number of this message among those for the same destination
+    session: int  # 0..65535: changes with each restart of the sender
     port: int  # 0..255
     length: int  # bytes of the whole payload
     reliable: bool
@@ -60,12 +60,12 @@ class Head(NamedTuple):
 
     @property
     def fingerprint(self) -> tuple[int, ...]:
-        """What is the same in each transmission of the same message."""
+        """The parts that are equal in each transmission of the same message."""
         return (*self[:5], *self[6:])
 
 
 class Ack(NamedTuple):
-    """What a receiver has."""
+    """The fragments and messages that a receiver has."""
 
     session: int  # of the sender whose messages these are
     nonce: int  # that of the POLL that it answers; 0: none
@@ -76,7 +76,7 @@ class Ack(NamedTuple):
 
 
 class Poll(NamedTuple):
-    """Asks what the receiver has of a message."""
+    """Requests an ACK for a message."""
 
     session: int
     nonce: int  # another one each time, 1..255: no two have the same bytes; or NO_ANSWER
@@ -88,7 +88,7 @@ DONE_BITS = 32  # of Ack.done
 
 
 def place_of(session: int, port: int, order: int) -> bytes:
-    """What distinguishes a message from the others of its sender."""
+    """Identifies a message among the others of its sender."""
     return _PLACE.pack(session, port, order)
 
 
@@ -117,7 +117,7 @@ def further_body(number: int, index: int, payload: bytes, room: int) -> bytes:
 
 
 def head_of(body: bytes) -> Head:
-    """What the body of fragment 0 says. Raises PacketError for an impossible length."""
+    """The header in the body of fragment 0. Raises PacketError for an impossible length."""
     number, session, port, meta, order, check = _HEAD.unpack_from(body)
     length = meta & (1 << _LENGTH_BITS) - 1
     if length > MAX_MESSAGE_BYTES + SEAL_BYTES:
@@ -128,7 +128,7 @@ def head_of(body: bytes) -> Head:
 
 
 def joined(bodies: list[bytes], length: int, room: int) -> bytes:
-    """The payload in the bodies of all fragments, in their order."""
+    """The payload from the bodies of all fragments, in order."""
     chunks = [bodies[0][_HEAD.size : room], *(body[1:room] for body in bodies[1:])]
     return b"".join(chunks)[:length]
 
@@ -139,7 +139,7 @@ def ack_body(ack: Ack) -> bytes:
 
 
 def ack_of(body: bytes) -> Ack:
-    """What the body of an ACK says."""
+    """The content of the body of an ACK."""
     return Ack(*_ACK.unpack_from(body))
 
 
@@ -154,7 +154,7 @@ def poll_body(poll: Poll) -> bytes:
 
 
 def poll_of(body: bytes) -> Poll:
-    """What the body of a POLL says."""
+    """The content of the body of a POLL."""
     return Poll(*_POLL.unpack_from(body))
 
 
@@ -169,6 +169,6 @@ def echo_body(token: int, route: tuple[int, ...] = (), room: int = BODY_BYTES) -
 
 
 def echo_of(body: bytes) -> tuple[int, tuple[int, ...]]:
-    """Token, and the nodes that forwarded the ECHO, as far as there was room for them."""
+    """Token, and the nodes that forwarded the ECHO, as far as there was room."""
     (token,) = _TOKEN.unpack_from(body)
     return token, tuple(body[_ROUTE_AT + 1 : _ROUTE_AT + 1 + body[_ROUTE_AT]])

@@ -1,4 +1,4 @@
-"""Reassembly: the fragments of messages from one sender, until a message is complete."""
+"""Reassembly: collects the fragments of messages from one sender."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Callable, NamedTuple, Optional
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.packets import COMPLETE, Head
 
-EXPIRES_S = 60.0  # our choice: a message of which nothing more came for so long is dropped
-MOST_PARTIAL = 24  # messages of one sender in the making; it has at most 16 on their way
-_LIVE = 64  # numbers: an older message than this is not on its way any more
+EXPIRES_S = 60.0  # our choice: an incomplete message is dropped after this time without fragments
+MOST_PARTIAL = 24  # incomplete messages of one sender, which has at most 16 under way
+_LIVE = 64  # numbers: older messages are no longer under way
 
 
 Open = Callable[[bytes, bytes], Optional[bytes]]
-"""From the place and the bytes of a message to what its sender wrote; None: not authentic."""
+"""From the place and the bytes of a message to its content; None: not authentic."""
 
 
 def open_plain(_place: bytes, sealed: bytes) -> bytes:
-    """For a mesh without a key."""
+    """For a mesh without a key: the bytes themselves."""
     return sealed
 
 
@@ -40,7 +40,7 @@ class _Partial:
 
 
 class Reassembly:
-    """Puts the messages of one sender together. Memory: MOST_PARTIAL messages at most."""
+    """Reassembles the messages of one sender. Memory: MOST_PARTIAL messages at most."""
 
     def __init__(self, room: int, open_message: Open = open_plain) -> None:
         """`room`: bytes of a body."""
@@ -50,7 +50,7 @@ class Reassembly:
         self._done: OrderedDict[int, None] = OrderedDict()  # numbers of the latest complete ones
 
     def add(self, index: int, body: bytes, now_s: float) -> Whole | None:
-        """A fragment arrived; the message, if that completes it. A damaged one is dropped whole."""
+        """Add a fragment; returns the message if it is complete. Drops damaged messages."""
         number = body[0]
         partial = self._partial.get(number)
         if partial is None:
@@ -77,7 +77,7 @@ class Reassembly:
         return self._checked(head_now, payload)
 
     def _checked(self, head: Head, sealed: bytes) -> Whole | None:
-        """The message as it was written; None if it is damaged, or its sender did not make it."""
+        """The content of the message; None if it is damaged or not authentic."""
         if packets.checksum(head.session, head.port, head.order, sealed) != head.checksum:
             return None
         payload = self._open(packets.place_of(head.session, head.port, head.order), sealed)
@@ -86,15 +86,15 @@ class Reassembly:
         return Whole(head, payload)
 
     def __len__(self) -> int:
-        """Messages that are incomplete."""
+        """The number of incomplete messages."""
         return len(self._partial)
 
     def is_done(self, number: int) -> bool:
-        """Whether this message is complete: another fragment of it is a duplicate."""
+        """Whether this message is complete, so that further fragments are duplicates."""
         return number in self._done
 
     def done(self, number: int) -> None:
-        """The message is complete and taken; nothing older than the live numbers is kept."""
+        """The message is complete; forget messages older than the live numbers."""
         self._done.pop(number, None)
         self._done[number] = None
         while len(self._done) > _LIVE:
@@ -103,7 +103,7 @@ class Reassembly:
             del self._partial[other]
 
     def has(self, number: int) -> int:
-        """The fragments of a message that are here, as bits; COMPLETE for a complete one."""
+        """The fragments of a message that have arrived, as bits; COMPLETE for a complete one."""
         if number in self._done:
             return COMPLETE
         partial = self._partial.get(number)
@@ -117,7 +117,7 @@ class Reassembly:
         return index == packets.count_of(partial.head.length, self._room) - 1
 
     def newest_done(self) -> tuple[int, int]:
-        """Number of the latest complete message, and as bits the complete ones up to it."""
+        """Number of the latest complete message, and the complete ones up to it as bits."""
         if not self._done:
             return 0, 0
         newest = next(reversed(self._done))
@@ -129,7 +129,7 @@ class Reassembly:
         return newest, bits
 
     def expire(self, now_s: float) -> None:
-        """Drop the messages of which nothing came for long."""
+        """Drop messages without recent fragments."""
         for number, partial in list(self._partial.items()):
             if now_s - partial.touched_s >= EXPIRES_S:
                 del self._partial[number]

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 FIRST_TIMEOUT_S = 1.0  # RFC 6298, 2.1
 LEAST_TIMEOUT_S = 0.3  # our choice: above the half second of circulation after one doubling
-MOST_TIMEOUT_S = 4.0  # our choice: how long a route that works again may stay unused
+MOST_TIMEOUT_S = 4.0  # our choice: how long a restored route may stay unused
 
 
 class RoundTrip:
-    """The timeout for one destination, as its answers teach it."""
+    """The timeout for one destination, estimated from its answers."""
 
     def __init__(self) -> None:
         self._mean_s: float | None = None
         self._deviation_s = 0.0
 
     def measured(self, seconds: float) -> None:
-        """An answer came after so long, to a question that was asked only once."""
+        """An answer arrived after `seconds`, to a question that was sent only once."""
         if self._mean_s is None:
             self._mean_s, self._deviation_s = seconds, seconds / 2
             return
@@ -23,7 +23,7 @@ class RoundTrip:
         self._mean_s += (seconds - self._mean_s) / 8
 
     def timeout_s(self, unanswered: int) -> float:
-        """How long to wait for an answer after so many questions that remained without one."""
+        """How long to wait for an answer, given the number of unanswered questions."""
         timeout_s = FIRST_TIMEOUT_S
         if self._mean_s is not None:
             timeout_s = max(LEAST_TIMEOUT_S, self._mean_s + 4 * self._deviation_s)

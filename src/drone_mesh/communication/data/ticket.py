@@ -1,4 +1,4 @@
-"""Tickets: what becomes of a message that was handed in."""
+"""Tickets: the progress of submitted messages."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from typing import Callable
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 
 TO_ALL = BROADCAST  # destination: every node of the mesh, best effort
-TO_GATEWAY = NO_ROUTE  # destination: the sender's own gateway, whichever that is
+TO_GATEWAY = NO_ROUTE  # destination: the sender's current gateway
 
 
 class TicketState(enum.Enum):
-    """How far a message is."""
+    """The progress of a message."""
 
-    QUEUED = "queued"  # it waits, wholly or in part
-    SENT = "sent"  # all of it has left; final for a message that is not reliable
+    QUEUED = "queued"  # waiting, completely or in part
+    SENT = "sent"  # completely sent; final for an unreliable message
     DELIVERED = "delivered"  # its receiver has it; final
     GIVEN_UP = "given up"  # `reason` says why; final
 
 
 class Ticket:
-    """One message on its way. Any thread may read it; the component's thread changes it."""
+    """One message under way. Any thread may read it; the component's thread changes it."""
 
     __slots__ = ("changed", "number", "port", "reason", "reliable", "size", "state", "to")
 
     def __init__(self, number: int, to: int, port: int, size: int, reliable: bool) -> None:
         self.number = number  # counts the messages of this node, from 1
-        self.to = to  # as asked: a node, TO_ALL or TO_GATEWAY
+        self.to = to  # as requested: a node, TO_ALL or TO_GATEWAY
         self.port = port
         self.size = size  # bytes
         self.reliable = reliable
@@ -38,7 +38,7 @@ class Ticket:
         self.changed: Callable[[Ticket], None] | None = None
 
     def becomes(self, state: TicketState, reason: str = "") -> None:
-        """The state is another one now."""
+        """Change the state."""
         if state is not self.state:
             self.state, self.reason = state, reason
             if self.changed is not None:
@@ -46,7 +46,7 @@ class Ticket:
 
     @property
     def final(self) -> bool:
-        """Whether the state will not change any more."""
+        """Whether the state is final."""
         if self.state is TicketState.SENT:
             return not self.reliable
         return self.state in (TicketState.DELIVERED, TicketState.GIVEN_UP)
@@ -57,5 +57,5 @@ class Ticket:
 
 
 def destination_in_words(to: int) -> str:
-    """A destination in words."""
+    """A destination as text."""
     return {TO_ALL: "all nodes", TO_GATEWAY: "the gateway"}.get(to, f"node {to}")

@@ -1,4 +1,4 @@
-"""Train: what leaves for a node behind relays before that node has said what arrived."""
+"""Train: the packets sent to a node behind relays before that node has answered."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ MOST_LENGTH = 48  # our choice: a relay forwards it in one piece
 
 
 class Train:
-    """The packets of one lane since its receiver answered last, on a shared channel.
+    """The packets of one lane since its receiver's last answer, on a shared channel.
 
-    A relay cannot receive while it sends, and a sender hears no relay but the first: what follows
-    while earlier packets are still on their way collides with them. So packets leave in trains that
-    end with a POLL, and the next train follows the answer. Where a train loses packets or remains
+    A relay cannot receive while it sends, and a sender hears only the first relay, so packets sent
+    while earlier ones are under way collide with them. Therefore packets are sent in trains that
+    end with a POLL, and the next train follows the answer. If a train loses packets or remains
     without an answer, the next ones are shorter.
     """
 
@@ -28,7 +28,7 @@ class Train:
 
     @property
     def is_full(self) -> bool:
-        """Whether a POLL comes next."""
+        """Whether to send a POLL next."""
         return self.left >= self.length
 
     @property
@@ -37,12 +37,12 @@ class Train:
         return self.asks > 0
 
     def asked(self, nonce: int, now_s: float) -> None:
-        """Its POLL left."""
+        """Its POLL was sent."""
         self.nonce, self.asked_s = nonce, now_s
         self.asks += 1
 
     def over(self, arrived: bool) -> None:
-        """The next one may begin; `arrived`: nothing of this one is known to be missing."""
+        """The train is over; `arrived`: nothing of it is known to be missing."""
         if not arrived:
             self.length = max(LEAST_LENGTH, self.length // 2)
         elif self.is_full:

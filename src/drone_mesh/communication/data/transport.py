@@ -1,8 +1,8 @@
 """Transport: users' messages to and from one node (docs/protocol.md, "Data").
 
-The component hands in the packets of users' types and the time; it has no thread and no clock of
-its own. What to send is decided by lanes, one per destination; what arrives goes to inboxes, one
-per sender. Packets leave a few at a time, so that the mesh's own are handled in between.
+The component passes in packets of users' types and the time; this class has no thread and no clock.
+Lanes, one per destination, decide what to send; received packets go to inboxes, one per sender.
+Packets are sent a few at a time, so that the mesh's own are handled in between.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.errors import MessageRefused, PacketError, QueueFull
 
-MOST_QUEUED = 64  # our choice: messages that wait or are on their way, in all
-BURST = 8  # our choice: packets that leave before others get their turn
+MOST_QUEUED = 64  # our choice: messages waiting or under way, in total
+BURST = 8  # our choice: packets sent before others get their turn
 ROUTE_PERIOD_S = 0.5  # our choice: how often a lane without a route looks for one
 TIDY_PERIOD_S = 5.0  # our choice: how often old fragments are dropped
 MOST_INBOXES = 128  # senders whose messages are put together at once, the latest ones
@@ -55,19 +55,19 @@ class ReceivedMessage(NamedTuple):
 
 
 Receiver = Callable[[ReceivedMessage], None]
-"""Runs in the component's thread, and must not call back into the component."""
+"""Called in the component's thread; must not call back into the component."""
 
 
 class DataFigures(NamedTuple):
     """Counts since the start, and the times of the latest messages."""
 
-    messages_sent: int = 0  # handed in
+    messages_sent: int = 0  # submitted
     messages_delivered: int = 0  # acknowledged by their receivers
     messages_given_up: int = 0
     messages_received: int = 0
-    bytes_sent: int = 0  # of the payloads handed in
+    bytes_sent: int = 0  # of the submitted payloads
     bytes_received: int = 0
-    messages_queued: int = 0  # now: they wait or are on their way
+    messages_queued: int = 0  # currently waiting or under way
     sent_s: float = 0.0  # the core's clock; 0: none
     received_s: float = 0.0
 
@@ -83,7 +83,7 @@ class Transport:
         my_gateway: Callable[[], int],
         room: int = messages.BODY_BYTES,
     ) -> None:
-        """`room`: bytes of a packet's body that are free; `my_gateway`: its id, or NO_ROUTE."""
+        """`room`: free bytes in a packet's body; `my_gateway`: its id, or NO_ROUTE."""
         if not packets.LEAST_ROOM <= room <= messages.BODY_BYTES:
             raise ValueError(
                 f"invalid room {room}: must be {packets.LEAST_ROOM}..{messages.BODY_BYTES}"
@@ -138,11 +138,11 @@ class Transport:
         return ticket
 
     def on_received(self, receiver: Receiver) -> None:
-        """Have `receiver` called with each message that arrives."""
+        """Call `receiver` for each message that arrives."""
         self._receivers.append(receiver)
 
     def echo(self, to: int, on_answer: OnEchoAnswer, now_s: float) -> int | None:
-        """Send an echo to a node; its token, or None if there is no route to it."""
+        """Send an echo to a node; returns its token, or None if there is no route."""
         self._parts.deadlines.now_s = now_s
         if not 0 <= to <= MAX_NODE_ID or to == self._parts.node_id:
             raise MessageRefused(f"invalid node {to}: must be another node, 0..{MAX_NODE_ID}")
@@ -161,13 +161,13 @@ class Transport:
         return f"; {foreign}" if foreign else ""
 
     def figures(self) -> DataFigures:
-        """What was sent and received so far. Any thread."""
+        """Counts of sent and received messages. Any thread."""
         return self._figures
 
     # For the component -------------------------------------------------------------------------
 
     def on_packet(self, payload: bytes) -> None:
-        """A packet of a user's type, for this node or for all."""
+        """Process a packet of a user's type, for this node or for all."""
         creator, _from, kind, _to, forward = messages.header(payload)
         body = messages.body(payload)
         if creator == self._parts.node_id:
@@ -195,7 +195,7 @@ class Transport:
         self._work()
 
     def on_due(self) -> None:
-        """The time that was asked for with Due.DATA has come."""
+        """The time requested with Due.DATA has come."""
         now_s = self._parts.now_s
         for (sender, to_all), inbox in list(self._inboxes.items()):
             for whole in inbox.on_time(now_s):
@@ -208,7 +208,7 @@ class Transport:
     # Sending -----------------------------------------------------------------------------------
 
     def _work(self) -> None:
-        """Send what may leave now, and plan the next time."""
+        """Send what may be sent now, and schedule the next time."""
         self._send_now()
         queued = self._queued()
         if queued != self._figures.messages_queued:
@@ -240,7 +240,7 @@ class Transport:
         self._plan(again_s)
 
     def _send_one(self, lane: Lane, now_s: float) -> bool:
-        """One packet of a lane; False if it has none now."""
+        """Send one packet of a lane; False if it has none now."""
         if lane.is_idle or now_s < lane.not_before_s:
             return False
         if lane.to != TO_ALL and not self._may_reach(lane, now_s):
@@ -260,7 +260,7 @@ class Transport:
         return False
 
     def _may_reach(self, lane: Lane, now_s: float) -> bool:
-        """Whether there is a route. If not: later, and what is not reliable is given up."""
+        """Whether there is a route. If not, retry later and give up unreliable messages."""
         if self._parts.antenna.on() and self._direction(lane.to) != NO_ROUTE:
             return True
         lane.not_before_s = now_s + ROUTE_PERIOD_S
@@ -280,7 +280,7 @@ class Transport:
         return self._parts.delivery.send_own(packet)
 
     def _follow_gateway(self) -> None:
-        """Messages for the gateway go to the one that this node uses now."""
+        """Move messages for the gateway to the one that this node uses now."""
         gateway = self._my_gateway()
         if gateway == NO_ROUTE:
             self._give_up_without_gateway()
@@ -393,7 +393,7 @@ class Transport:
             receiver(message)
 
     def _plan(self, at_s: float) -> None:
-        """Have `on_due` called at `at_s`, or earlier for an ACK."""
+        """Schedule `on_due` at `at_s`, or earlier for an ACK."""
         for inbox in self._inboxes.values():
             at_s = min(at_s, inbox.ack_due_s)
         self._parts.deadlines.set(Due.DATA, min(at_s, self._tidy_s))
