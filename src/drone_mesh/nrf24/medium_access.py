@@ -22,6 +22,7 @@ air (`inprocess.shared_air`) both follow this one implementation.
    leaves time for that: so an answer gets through, and a relay takes its turn. For a relay the end
    is a packet (see trains.py), and a pause is none: the sender was interrupted, and if the relay
    sent on what it has, it would disturb the rest, which it cannot hear while it sends.
+   What waits in a back-off for the node that sent the train goes after it: that node listens then.
 6. Each receiver has a line of its own: waiting for one of them does not delay the others. A
    receiver that let a packet fail and was not heard since gets fewer tries for the next one.
 """
@@ -216,8 +217,12 @@ class MediumAccess:
         """A packet came in; `train`: what it says of the train that it belongs to."""
         self._silent.discard(sender)
         self._heard_s[sender] = now_s
-        if train is not InTrain.NO and not self._has_yielded:
-            self._yield_to(sender, now_s, train)
+        if train is not InTrain.NO:
+            line = self._lines.get(sender)
+            if line is not None:  # it will listen after its train: no reason to wait any longer
+                line[0].not_before_s = min(line[0].not_before_s, now_s)
+            if not self._has_yielded:
+                self._yield_to(sender, now_s, train)
         if broadcast:
             self._broadcast_heard_s = now_s
 

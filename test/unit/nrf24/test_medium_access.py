@@ -332,3 +332,14 @@ def test_a_relay_does_not_wait_for_ever_for_an_end_that_got_lost():
         assert now_s < 2.0 + 2 * RULES.most_hold_s, "it waits for ever"
         relay.heard(5, now_s, broadcast=False, train=InTrain.MORE)
         now_s += RULES.train_pause_s
+
+
+def test_what_waits_in_a_back_off_goes_when_its_receiver_has_been_heard():
+    node = loaded(1)
+    now_s = 1.0
+    while node.next_try_s < now_s + 20 * CYCLE_S:
+        now_s = max(now_s, node.next_try_s)
+        assert node.tried(node.due(now_s), False, now_s) is Fate.WAITS
+    now_s += 10 * CYCLE_S
+    node.heard(5, now_s, broadcast=False, train=InTrain.PERHAPS)
+    assert node.next_try_s <= now_s + RULES.train_pause_s
