@@ -158,13 +158,12 @@ def test_frames_come_at_most_at_the_frame_rate():
         await until("the first frame", lambda: page.of_type("frame"))
         started_s = asyncio.get_running_loop().time()
         before = len(page.of_type("frame"))
-        tick = 0
-        while asyncio.get_running_loop().time() - started_s < 0.5:
-            tick += 1
+        for tick in range(100):
             store.update_mesh(MeshStatus(2.0 + tick, [NodeStatus(1, hops=tick % 9)]), 0.0)
-            await asyncio.sleep(0.002)
-        assert tick > 20
-        assert 1 <= len(page.of_type("frame")) - before <= 4
+            await asyncio.sleep(0.005)
+        passed_s = asyncio.get_running_loop().time() - started_s  # more on a busy machine
+        frames = len(page.of_type("frame")) - before
+        assert 1 <= frames <= passed_s / server_module.FRAME_PERIOD_S + 1
 
     run(scenario)
 
