@@ -10,12 +10,18 @@ import unittest
 import rostest
 from rostest_support import WALL_LIMIT_S, free_port
 
+LAUNCH = (
+    "python3",
+    "-m",
+    "drone_mesh.ros.graph.launching",
+)  # as scripts/run; roslaunch exits with 0
+
 
 class BadArgumentsTest(unittest.TestCase):
     def launch_and_expect(self, argument: str, line: str) -> None:
         port = free_port()
         launch = subprocess.run(
-            ["roslaunch", "-p", str(port), "drone_mesh", "factory.launch", argument],
+            [*LAUNCH, "-p", str(port), "drone_mesh", "factory.launch", argument],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             env={**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"},
@@ -24,7 +30,8 @@ class BadArgumentsTest(unittest.TestCase):
             text=True,
         )
         self.assertIn(f"/DroneFactory: {line}", launch.stdout)
-        self.assertIn("exit code 1", launch.stdout)  # roslaunch's own is 0 whatever happens
+        self.assertIn("exit code 1", launch.stdout)
+        self.assertEqual(launch.returncode, 1)
         self.assertNotIn("Traceback", launch.stdout)
 
     def test_a_number_that_is_out_of_bounds(self) -> None:

@@ -1,0 +1,5 @@
+from roslaunch.pmon import ProcessMonitor
+
+class ROSLaunchParent:
+    pm: ProcessMonitor
+    def _start_infrastructure(self) -> None: ...
