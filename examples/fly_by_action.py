@@ -51,4 +51,7 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     rospy.init_node("fly_by_action", anonymous=True, disable_signals=True)  # Ctrl-C is ours
     numbers = [float(word) for word in words]
-    sys.exit(main(int(numbers[0]), numbers[1], numbers[2], int((numbers[3:] or [0])[0])))
+    try:
+        sys.exit(main(int(numbers[0]), numbers[1], numbers[2], int((numbers[3:] or [0])[0])))
+    except KeyboardInterrupt:  # before the drone had an order
+        sys.exit(130)

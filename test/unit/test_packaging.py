@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -30,6 +31,20 @@ def top_level_imports(source: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             names.add(node.module.split(".")[0])
     return names
+
+
+def test_the_console_extra_has_every_package_that_the_console_imports() -> None:
+    def packages(*names: str) -> set[str]:
+        lines = "".join((ROOT / "requirements" / f"{name}.txt").read_text() for name in names)
+        return set(re.findall(r"^[a-z][a-z0-9_-]*", lines, re.MULTILINE))
+
+    program = "import sys, drone_mesh.console.gateway_command; print(*sys.modules)"
+    command = [sys.executable, "-c", program]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    said = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    used = {name.partition(".")[0] for name in said.stdout.split()}
+    named = packages("console", "simulation", "lab", "report", "raspberry")
+    assert used & named - packages("console") == set()
 
 
 @pytest.mark.slow

@@ -157,7 +157,7 @@ class RadioNode:
             self._slot.submit(lambda _now_s: self.component.stop())
             self._executor.stop()
             counters = dataclasses.asdict(self._antenna.statistics())
-            text = ", ".join(f"{name} {count}" for name, count in counters.items())
+            text = ", ".join(f"{name} {round(count, 3)}" for name, count in counters.items())
             _log.info("node %d: packets: %s", self.radio.node_id, text)
         else:
             if self._internet is not None:

@@ -44,6 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (AttributeError, KeyError, TypeError):
         print(f"raspberry_status: {url}: this is no node of the mesh", file=sys.stderr)
         return 1
+    except urllib.error.URLError as error:  # its text wraps the reason in "<urlopen error ...>"
+        print(f"raspberry_status: {url}: {error.reason}", file=sys.stderr)
+        return 1
     except (OSError, ValueError) as error:
         print(f"raspberry_status: {url}: {error}", file=sys.stderr)
         return 1

@@ -57,7 +57,12 @@ def node_id(text: str) -> int:
 
 def destination(text: str) -> int:
     """A node id, "all" or "gateway", for argparse."""
-    return _DESTINATIONS[text] if text in _DESTINATIONS else node_id(text)
+    if text in _DESTINATIONS:
+        return _DESTINATIONS[text]
+    try:
+        return node_id(text)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{error}, gateway or all") from None
 
 
 def port(text: str) -> int:

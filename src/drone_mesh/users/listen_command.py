@@ -14,6 +14,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = command_line.parser_for("mesh_listen", "Prints the messages that a node receives.")
     parser.add_argument("--port", type=command_line.port, help="print only messages for this port")
     parser.add_argument(
+        "-c",
         "--count",
         type=command_line.count,
         help="number of messages to print (default: until Ctrl-C)",

@@ -129,6 +129,9 @@ def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c(tmp_path):
         assert seconds < END_WITHIN_S
         assert "Traceback" not in program.said
         assert program.said.count("packets: sent") == 5
+        airtimes = re.findall(r"airtime_s (\S+),", program.said)
+        assert len(airtimes) == 5
+        assert all(len(airtime) <= len("12.345") for airtime in airtimes)
         assert re.search(r"wrote \d+ frames to ", program.said)
         assert trace.read_bytes().startswith(bytes.fromhex("0a0d0d0a"))  # pcapng
 

@@ -95,7 +95,7 @@ def test_listen_prints_what_arrives_as_text_or_as_json(rig, capsys):
     lines = []
     for options in ([], ["--json"]):
         listening = threading.Thread(
-            target=listen_command.main, args=([*options, "--node", "0", "--count", "1"],)
+            target=listen_command.main, args=([*options, "--node", "0", "-c", "1"],)
         )
         listening.start()
         while not rig.desks[0]._receivers:
@@ -133,6 +133,12 @@ def test_a_ping_that_was_never_sent_is_not_counted(capsys):
 def test_a_message_far_too_large_is_named_as_that(rig, capsys):
     assert send_command.main(["--node", "2", "0", "x" * 9000]) == 1
     assert "too large: 9000 bytes" in capsys.readouterr().err
+
+
+def test_an_invalid_receiver_is_named_with_all_that_are_possible(capsys):
+    with pytest.raises(SystemExit):
+        send_command.main(["banana", "21.5"])
+    assert "invalid node 'banana': must be 0..253, gateway or all" in capsys.readouterr().err
 
 
 def test_a_node_in_the_environment_that_is_none_is_one_line(monkeypatch, capsys):
