@@ -18,7 +18,7 @@ from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess.drone import InProcessDrone
-from drone_mesh.inprocess.network import NoInternet
+from drone_mesh.inprocess.node import NoInternet
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import Air, Position
 from drone_mesh.nrf24.emulator.chip import EmulatedChip

@@ -10,17 +10,12 @@ from typing import Callable, Iterable
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.assembly import assemble_component
-from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.data.echo import OnEchoAnswer
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
-from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import (
     NO_ROUTE,
-    IGatewayCommands,
-    IInternetConnection,
-    IMeshNetwork,
     IWirelessCommunication,
 )
 from drone_mesh.communication.keys import Keys
@@ -37,7 +32,7 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.drone import InProcessDrone
+from drone_mesh.inprocess.node import Node, NoInternet
 from drone_mesh.inprocess.oracle import Oracle
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir
@@ -50,74 +45,6 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 
 ORACLE = "oracle"  # the repair strategy with global knowledge
 STEP_S = 0.1  # period at which run_until checks its condition
-
-
-class NoInternet(IInternetConnection):
-    """No connection: orders come from the owner of the network."""
-
-    def connect(self, commands: IGatewayCommands) -> None:
-        """Does nothing."""
-
-    def disconnect(self) -> None:
-        """Does nothing."""
-
-
-class Node:
-    """One drone of the network with its mesh software, driven by the virtual clock."""
-
-    def __init__(
-        self,
-        clock: VirtualClock,
-        air: InProcessAir | SharedAir,
-        node_id: int,
-        start: Location,
-        rng: random.Random,
-        is_gateway: bool,
-        why_not_fly: str = "",
-    ) -> None:
-        """`rng` is the antenna's."""
-        self.is_gateway = is_gateway
-        self._clock = clock
-        self.drone = InProcessDrone(
-            clock, start, functools.partial(air.flight, node_id), why_not_fly
-        )
-        self.antenna: InProcessAntenna | SharedAntenna
-        if isinstance(air, SharedAir):
-            self.antenna = SharedAntenna(air, node_id, self.drone, self.submit, rng)
-        else:
-            self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
-        self.component: MeshnetworkComponent
-        self.deadlines: Deadlines  # of the component
-        self.receiver: IMeshNetwork  # receives the packets: the component or its sealed antenna
-        self._planned_s = math.inf
-
-    def start(self) -> None:
-        """Start the mesh software."""
-        self.component.start(self._clock.now_s)
-        self.plan()
-
-    def hear(self, payload: bytes) -> None:
-        """A packet has arrived."""
-        self.receiver.on_msg(payload, self._clock.now_s)
-        if self.deadlines.next_s != self._planned_s:
-            self.plan()
-
-    def submit(self, work: Callable[[float], None]) -> None:
-        """Run this in the component."""
-        work(self._clock.now_s)
-        if self.component.next_tick_s != self._planned_s:
-            self.plan()
-
-    def plan(self) -> None:
-        """Schedule the component's next tick; to be called after every call into it."""
-        self._planned_s = self.component.next_tick_s
-        if self._planned_s < math.inf:
-            self._clock.call_at(self._planned_s, self._tick, self._planned_s)
-
-    def _tick(self, planned_s: float) -> None:
-        if planned_s == self._planned_s:  # otherwise it was rescheduled
-            self.component.tick(self._clock.now_s)
-            self.plan()
 
 
 class Network:

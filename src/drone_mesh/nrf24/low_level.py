@@ -8,16 +8,11 @@ from dataclasses import replace
 from typing import Callable
 
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.nrf24.access_rules import AccessRules
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch
-from drone_mesh.nrf24.medium_access import (
-    AccessRules,
-    Fate,
-    MediumAccess,
-    Outgoing,
-    Priority,
-)
+from drone_mesh.nrf24.medium_access import Fate, MediumAccess, Outgoing, Priority
 from drone_mesh.nrf24.pace import access_rules
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import RadioSettings

@@ -11,9 +11,9 @@ import random
 import pytest
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.nrf24.access_rules import AccessRules
 from drone_mesh.nrf24.medium_access import (
     ALL_NODES,
-    AccessRules,
     Fate,
     InTrain,
     MediumAccess,

@@ -26,7 +26,7 @@ from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 from drone_mesh.errors import LocationUnknown
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh, EmulatedNode
-from drone_mesh.inprocess.network import NoInternet
+from drone_mesh.inprocess.node import NoInternet
 from drone_mesh.layouts import Layouts
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.links import IdealDisc

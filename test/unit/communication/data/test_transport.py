@@ -6,7 +6,8 @@ from drone_mesh.communication.data.transport import MOST_QUEUED
 from drone_mesh.communication.messages import is_data
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.inprocess import Network
-from drone_mesh.nrf24.medium_access import AccessRules, MediumAccess, Priority
+from drone_mesh.nrf24.access_rules import AccessRules
+from drone_mesh.nrf24.medium_access import MediumAccess, Priority
 
 
 @pytest.fixture

@@ -1,0 +1,66 @@
+"""AccessRules: the numbers of the rules of medium access (medium_access.py has the rules)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drone_mesh.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class AccessRules:
+    """Numbers of the rules; `for_cycle` scales them to the time that one packet takes."""
+
+    tries: int  # of one packet
+    retransmits: int  # by the chip itself, in each try
+    retransmit_delays: tuple[int, int]  # settings of ARD, from..to; a random one for each try
+    tries_when_silent: int  # of one packet for a receiver that let the last one fail
+    first_pause_s: float  # mean pause after the first try; doubles with each further one
+    longest_pause_s: float  # mean pause, at most
+    gap_s: float  # mean distance between two packets of one node
+    train: int  # users' packets without a gap between them, at most
+    train_retransmits: int  # by the chip, of a packet that follows another one in a train
+    train_pause_s: float  # a train that was not heard for so long is over
+    train_gap_s: float  # least distance between two trains of one node: an answer fits in
+    train_hold_s: float  # if its end is announced: it was interrupted, and goes on within that time
+    most_yield_s: float  # wait for the end of trains at most so long
+    most_hold_s: float  # and if their end is announced
+    broadcast_jitter_s: float  # a broadcast waits for a random part of this
+    answer_jitter_s: float  # as does whatever is sent within that time after a broadcast was heard
+    lifetime_s: float  # a packet that waited for so long is of no use to anyone
+    queue_length: int  # packets that may wait, in all
+    data_queue_length: int  # of these: users' packets
+    most_patience: float  # check periods without probes on a busy channel
+    busy_at: float  # share of first tries that fail from which on a channel counts as busy
+
+    @classmethod
+    def for_cycle(cls, cycle_s: float) -> AccessRules:
+        """`cycle_s`: one packet and its acknowledgement, from the decision to listening again."""
+        return cls(
+            tries=9,
+            retransmits=1,
+            retransmit_delays=(2, 9),
+            tries_when_silent=3,
+            first_pause_s=5 * cycle_s,
+            longest_pause_s=400 * cycle_s,
+            gap_s=2 * cycle_s,
+            train=110,
+            train_retransmits=3,
+            train_pause_s=1.1 * cycle_s,
+            train_gap_s=1.9 * cycle_s,
+            train_hold_s=30 * cycle_s,
+            most_yield_s=100 * cycle_s,
+            most_hold_s=200 * cycle_s,
+            broadcast_jitter_s=60 * cycle_s,
+            answer_jitter_s=60 * cycle_s,
+            lifetime_s=10.0,
+            queue_length=300,
+            data_queue_length=120,
+            most_patience=2.5,
+            busy_at=0.3,
+        )
+
+    def __post_init__(self) -> None:
+        for name in ("tries", "tries_when_silent", "queue_length", "data_queue_length"):
+            if getattr(self, name) < 1:
+                raise ConfigurationError(f"medium access: {name} must be at least 1")
