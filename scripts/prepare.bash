@@ -16,7 +16,7 @@ if [ -e "$noetic" ]; then
     ros-noetic-{rosbash,rosgraph-msgs,roslaunch,rosmsg,rosnode,rosparam,rospy,rosservice,rostest}
     ros-noetic-{rostopic,std-msgs,tf2-msgs,visualization-msgs}
   )
-  screen_packages=(libgl1 mosquitto libxtst6 tshark xvfb)
+  screen_packages=(iproute2 libgl1 mosquitto libxtst6 tshark xvfb)
   rviz_package=ros-noetic-rviz
 else
   ros_packages=(
@@ -29,7 +29,7 @@ else
     python3-actionlib python3-diagnostic-updater
     python3-rospy python3-rostest
   )
-  screen_packages=(chromium libgl1 mosquitto libxtst6 tshark xvfb)
+  screen_packages=(chromium iproute2 libgl1 mosquitto libxtst6 tshark xvfb)
   rviz_package=rviz
 fi
 

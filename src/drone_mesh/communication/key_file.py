@@ -38,5 +38,9 @@ def write_key_file(path: Path, keys: MeshKey | NodeKeys) -> None:
     try:
         with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
             file.write(keys.to_text())
+    except FileExistsError as error:
+        raise ConfigurationError(
+            f"key file {path}: exists already and is not overwritten; choose another name"
+        ) from error
     except OSError as error:
         raise ConfigurationError(f"key file {path}: {error.strerror or error}") from error

@@ -19,6 +19,7 @@ from drone_mesh.lab.store import (
     read_rows,
 )
 
+CELLS_SHOWN = 4  # in an error
 DEFAULT_METRICS = ("healed", "t_total_s", "uptime", "distance_total_m", "packets")
 
 Row = Mapping[str, str]
@@ -73,8 +74,10 @@ class Results(NamedTuple):
             wanted[axis] = value
         fit = [i for i, cell in enumerate(self.loaded.cells) if _fits(cell, wanted)]
         if len(fit) != 1:
-            found = "; ".join(self.loaded.cells[i].label for i in fit[:4]) or "none"
-            raise ConfigurationError(f"cell {text}: {len(fit)} cells fit, expected one: {found}")
+            labels = [self.loaded.cells[i].label for i in fit or range(len(self.loaded.cells))]
+            shown = "; ".join(labels[:CELLS_SHOWN]) + ("; ..." if labels[CELLS_SHOWN:] else "")
+            what = f"{len(fit)} cells fit, expected one" if fit else "no cell fits; there are"
+            raise ConfigurationError(f"cell {text}: {what}: {shown}")
         return fit[0]
 
     def find_run(self, beginning: str) -> PlannedRun:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import threading
 from http.server import BaseHTTPRequestHandler, HTTPServer
 
@@ -168,3 +171,22 @@ def test_an_address_that_is_none_ends_the_program_with_a_reason(capsys):
     with pytest.raises(SystemExit):
         main(["--gateway", "pi:9080"], {})
     assert "must begin with http:// or https://" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_package_that_is_missing_is_named_in_one_line():
+    program = (
+        "import sys; sys.modules['uvicorn'] = None; "
+        "from drone_mesh.console.__main__ import main; sys.exit(main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr == (
+        "drone_mesh_console needs the Python package uvicorn: pip install 'drone_mesh[console]'\n"
+    )

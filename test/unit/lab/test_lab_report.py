@@ -110,6 +110,7 @@ def test_compare_prints_the_paired_difference(
     ("words", "message"),
     [
         (["layout.drones=5", "layout.drones=6"], "2 cells fit, expected one"),
+        (["layout.drones=7", "layout.drones=6"], "no cell fits; there are: "),
         (["layout.dron=5", "layout.drones=6"], "expected axis=value with one of"),
         (
             ["timing.connection_lost_after_s=5,layout.drones=5"] * 2 + ["--metric", "x"],

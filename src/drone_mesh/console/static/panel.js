@@ -41,6 +41,7 @@ export class NodePanel {
   }
 
   #facts(node) {
+    const neighbours = this.#neighbours(node);
     const facts = [
       ...(node.repair ? [["Repair", node.repair, { wide: true }]] : []),
       ...(node.order ? [["Latest order", node.order, { wide: true }]] : []),
@@ -61,7 +62,11 @@ export class NodePanel {
       ...(node.earth ? [["Latitude, longitude, altitude", this.#earth(node), { wide: true }]] : []),
       ...(node.drone ? [["Drone", node.drone, { wide: true }]] : []),
       ["Route", node.route.length ? node.route : "–", { glue: " › ", wide: true }],
-      ["Neighbours, seconds since last heard", this.#neighbours(node), { glue: ", ", wide: true }],
+      [
+        Number(neighbours) ? "Neighbours" : "Neighbours, seconds since last heard",
+        neighbours,
+        { glue: ", ", wide: true },
+      ],
     ];
     const list = byId("node-facts");
     const shown = JSON.stringify(facts);
