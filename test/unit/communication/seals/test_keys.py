@@ -62,9 +62,7 @@ def test_a_key_file_that_others_can_access_is_refused(tmp_path, mode):
 
 def test_a_key_is_never_overwritten(tmp_path):
     write_key_file(tmp_path / "key", KEY)
-    with pytest.raises(
-        ConfigurationError, match="exists already and is not overwritten"
-    ):
+    with pytest.raises(ConfigurationError, match="exists already and is not overwritten"):
         write_key_file(tmp_path / "key", MeshKey(bytes(16)))
 
 
