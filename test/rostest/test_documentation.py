@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,6 +22,12 @@ from fenced_blocks import ROOT, blocks  # noqa: E402
 
 COMMAND_LIMIT_S = 60.0
 CONNECTED_WITHIN_S = 60.0  # simulated
+
+
+# ros_comm 1.15.9 under Python 3.9 (Debian 11) ends each tool with this, its work done.
+OF_DEBIAN_11 = re.compile(
+    r"Error in atexit._run_exitfuncs:\nTraceback.*\n(?:  .*\n)+AttributeError: .* 'isAlive'\n"
+)
 
 
 def is_endless(command: str) -> bool:
@@ -49,7 +56,7 @@ class DocumentationTest(unittest.TestCase):
         self.assertNotEqual(
             process.returncode, -signal.SIGKILL, f"not done after {COMMAND_LIMIT_S:g} s: {command}"
         )
-        self.assertNotIn("Traceback", printed, command)
+        self.assertNotIn("Traceback", OF_DEBIAN_11.sub("", printed), command)
         if not is_endless(command):
             self.assertEqual(process.returncode, 0, f"{command}\n{printed}")
 
