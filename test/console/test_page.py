@@ -459,7 +459,10 @@ def test_on_a_phone_the_selected_node_its_switch_and_its_close_button_stay_on_th
     )
     assert page.page.locator("#node-facts dt:text-is('Last gateway')").is_visible()
     fallback = page.page.locator("#node-facts div:has(dt:text-is('Fallback position')) dd")
-    assert re.fullmatch(r"node \d+’s", fallback.inner_text())
+    page.wait_for(
+        "whose position, and how old",
+        lambda: bool(re.fullmatch(r"node \d+’s, reported \d+ s ago", fallback.inner_text())),
+    )
     for selector in ("#node-close", "#power", "#fly-form [type=submit]", "#remove"):
         box = page.page.locator(selector).bounding_box()
         assert box is not None

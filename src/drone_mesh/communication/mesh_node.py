@@ -124,6 +124,10 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         """Id of the node whose place this one would fly to, or NO_ROUTE."""
         return self.places.good_id
 
+    def get_last_good_known_location_seen_s(self) -> float:
+        """When that node was there, on the clock of the component; meaningless with NO_ROUTE."""
+        return self.places.good_seen_s
+
     def get_router_tech_table_size(self) -> int:
         """Known nodes; one that is known through two neighbours counts twice."""
         return self._routing.get_table_size()

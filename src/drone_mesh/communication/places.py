@@ -14,15 +14,16 @@ class KnownPlaces:
         self.gateway_seen_s = 0.0  # when the gateway was there
         self.good: Location | None = None  # the last good known location
         self.good_id = NO_ROUTE  # the node at that place
+        self.good_seen_s = 0.0  # when it was there
 
     def gateway_is_at(self, place: Location, seen_s: float) -> None:
         """The preferred gateway was at `place` at `seen_s`; older information is ignored."""
         if self.gateway is None or seen_s >= self.gateway_seen_s:
             self.gateway, self.gateway_seen_s = place, seen_s
 
-    def next_hop_is_at(self, node: int, place: Location) -> None:
-        """The next hop towards the gateway is `node`, at `place`."""
-        self.good, self.good_id = place, node
+    def next_hop_is_at(self, node: int, place: Location, seen_s: float) -> None:
+        """The next hop towards the gateway is `node`; it was at `place` at `seen_s`."""
+        self.good, self.good_id, self.good_seen_s = place, node, seen_s
 
     def forget_gateway(self) -> None:
         """The node prefers another gateway."""
@@ -30,5 +31,5 @@ class KnownPlaces:
 
     def left_own_place(self, gateway: int) -> None:
         """The node flies: the next step back leads to the place of `gateway`, if that is known."""
-        self.good = self.gateway
+        self.good, self.good_seen_s = self.gateway, self.gateway_seen_s
         self.good_id = NO_ROUTE if self.gateway is None else gateway

@@ -200,7 +200,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         elif gateway is not None:
             self._on_gateway_place(gateway)
         if node == connection.next_hop():
-            self.places.next_hop_is_at(node, location)
+            self.places.next_hop_is_at(node, location, now_s)
         self._repair.on_place(node, location)
 
     def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:

@@ -170,12 +170,20 @@ class FrameStore:
             self._cache[version] = json.dumps(self._build(version), separators=(",", ":"))
         return self._cache[version]
 
-    def neighbours_of(self, node_id: int) -> list[tuple[int, int]]:
-        """(neighbour, simulated seconds since it was last heard) of one node."""
+    def detail_of(self, node_id: int) -> dict[str, Any]:
+        """What pages show only of the selected node, since it changes all the time.
+
+        `neighbours`: (neighbour, simulated seconds since it was last heard); `fallback_age`:
+        simulated seconds since the fallback position was reported, None without one.
+        """
         for node in self._mesh.nodes if self._mesh else ():
             if node.id == node_id:
-                return list(zip(node.neighbours, node.neighbour_ages))
-        return []
+                age = node.fallback_age
+                return {
+                    "neighbours": list(zip(node.neighbours, node.neighbour_ages)),
+                    "fallback_age": round(age) if math.isfinite(age) else None,
+                }
+        return {"neighbours": [], "fallback_age": None}
 
     def _build(self, version: int) -> dict[str, Any]:
         if version < self._run_began_at:

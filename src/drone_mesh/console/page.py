@@ -80,8 +80,7 @@ class Page:
 
     def detail(self, node: int) -> str:
         """The neighbours of a node, as JSON text."""
-        neighbours = self.store.neighbours_of(node)
-        return json.dumps({"type": "detail", "node": node, "neighbours": neighbours})
+        return json.dumps({"type": "detail", "node": node, **self.store.detail_of(node)})
 
     def _play(self, player: Player, wall_s: float) -> None:
         if not self._history.times or self._history.times[-1] < player.now_s:

@@ -32,6 +32,7 @@ class NodeStatus:
     hops: int = NO_ROUTE
     next_hop: int = NO_ROUTE
     fallback: int = NO_ROUTE
+    fallback_age: float = math.nan  # simulated s; NaN: none
     known_nodes: int = 0
     total_messages: int = 0
     neighbours: bytes = b""

@@ -9,6 +9,7 @@ import numpy as np
 
 from drone_mesh.air.box import Box
 from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR
 from drone_mesh.communication.router_states import Repair
 from drone_mesh.drone.flight_path import FlightPath, Vector
@@ -32,6 +33,8 @@ def describe_component(
     status.hops = component.get_hops_from_gateway_away()
     status.next_hop = component.get_route_to_gateway()
     status.fallback = component.get_last_good_known_location_id()
+    fallback_age_s = now_s - component.get_last_good_known_location_seen_s()
+    status.fallback_age = math.nan if status.fallback == NO_ROUTE else fallback_age_s
     status.known_nodes = component.get_router_tech_table_size()
     status.total_messages = component.get_total_message_sent()
     use = component.get_channel_use()

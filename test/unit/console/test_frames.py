@@ -167,11 +167,14 @@ def test_silence_is_reported_and_ends_with_the_next_state():
     assert frame(store, known)["link"] == ""
 
 
-def test_neighbours_of_a_watched_node_come_with_their_ages():
+def test_the_selected_node_has_its_neighbours_and_the_age_of_its_fallback_position():
     store = FrameStore()
-    assert store.neighbours_of(1) == []
-    store.update_mesh(mesh(neighbours=b"\x00\x09", neighbour_ages=b"\x03\xff"), wall_s=0.0)
-    assert store.neighbours_of(1) == [(0, 3), (9, 255)]
+    assert store.detail_of(1) == {"neighbours": [], "fallback_age": None}
+    fields = {"neighbours": b"\x00\x09", "neighbour_ages": b"\x03\xff"}
+    store.update_mesh(mesh(**fields), wall_s=0.0)
+    assert store.detail_of(1) == {"neighbours": [(0, 3), (9, 255)], "fallback_age": None}
+    store.update_mesh(mesh(**fields, fallback_age=12.4), wall_s=0.5)
+    assert store.detail_of(1)["fallback_age"] == 12
 
 
 def test_a_frame_carries_the_condition_and_the_colour_of_each_node():

@@ -22,6 +22,7 @@ def test_a_router_two_hops_away_is_described_as_it_is():
     describe_component(status, network.nodes[2].component, True, network.clock.now_s)
     assert (status.on, status.connected, status.gateway, status.hops) == (True, True, 0, 2)
     assert (status.next_hop, status.fallback) == (1, 1)
+    assert 0.0 <= status.fallback_age <= 21.0
     assert status.neighbours == bytes([1])
     assert status.neighbour_ages[0] <= 10
     assert status.total_messages > 0
@@ -35,6 +36,7 @@ def test_an_age_beyond_a_byte_stays_at_its_end():
     status = NodeStatus(1)
     describe_component(status, network.nodes[1].component, True, network.clock.now_s + 1e6)
     assert status.neighbour_ages == bytes([255])
+    assert status.fallback_age == pytest.approx(1e6, abs=20.0)
 
 
 def test_a_drone_is_described_by_its_underside_and_the_rest_of_its_path():

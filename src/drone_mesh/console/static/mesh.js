@@ -37,7 +37,7 @@ export class Mesh extends EventTarget {
     this.hasPresent = false; // whether there is a present to return to
     this.selected = null;
     this.group = new Set(); // of several selected nodes
-    this.detail = null; // {node, neighbours: [[id, age]]} of the selected node
+    this.detail = null; // {node, neighbours: [[id, age]], fallback_age} of the selected node
   }
 
   apply(frame) {

@@ -50,7 +50,7 @@ export class NodePanel {
       [
         "Fallback position",
         node.fallback === 255 ? "–" : [node.fallback],
-        { before: "node ", after: "’s" },
+        { before: "node ", after: `’s${this.#fallbackAge(node)}` },
       ],
       ...((node.battery ?? null) === null ? [] : [["Battery", `${node.battery} %`]]),
       ...(node.why_not_fly ? [["Cannot fly", node.why_not_fly]] : []),
@@ -95,6 +95,11 @@ export class NodePanel {
     if (this.mesh.detail?.node !== node.id) return "…";
     const known = this.mesh.detail.neighbours;
     return known.length ? known : String(node.neighbours); // a real node reports their number
+  }
+
+  #fallbackAge(node) {
+    const { node: id, fallback_age: age } = this.mesh.detail ?? {};
+    return id === node.id && (age ?? null) !== null ? `, reported ${age} s ago` : "";
   }
 
   #earth({ earth: [latitude, longitude, altitude] }) {
