@@ -135,7 +135,7 @@ def test_the_rate_suggested_is_the_slowest_that_carries_so_many_nodes(nodes, rat
 @pytest.mark.slow
 def test_a_scan_ends_with_options_that_the_gateway_takes(capsys):
     assert main(["--emulated", "30", "scan", "--rounds", "1", "--nodes", "101"]) == 0
-    options = capsys.readouterr().out.splitlines()[-1].partition("alike: ")[2].split()
+    options = capsys.readouterr().out.splitlines()[-1].rpartition(": ")[2].split()
     radio = parse_gateway(options, {}).radio
     assert radio.data_rate is DataRate.MBPS_1
     assert 1 <= radio.channel <= 82
