@@ -210,6 +210,7 @@ class NodeState(Message, NodeStatus):
     hops: int
     next_hop: int
     fallback: int
+    fallback_age: float
     known_nodes: int
     total_messages: int
     neighbours: bytes
@@ -248,6 +249,7 @@ class NodeState(Message, NodeStatus):
         hops: int = ...,
         next_hop: int = ...,
         fallback: int = ...,
+        fallback_age: float = ...,
         known_nodes: int = ...,
         total_messages: int = ...,
         neighbours: bytes | Sequence[int] = ...,

@@ -33,6 +33,7 @@ def top_level_imports(source: Path) -> set[str]:
     return names
 
 
+@pytest.mark.slow
 def test_the_console_extra_has_every_package_that_the_console_imports() -> None:
     def packages(*names: str) -> set[str]:
         lines = "".join((ROOT / "requirements" / f"{name}.txt").read_text() for name in names)

@@ -28,7 +28,12 @@ def shown(player: Player) -> dict:
 def test_a_state_comes_back_as_it_was():
     history = History()
     given = MeshStatus(
-        3.0, [NodeStatus(4, position=(1.0, 2.0, 0.5), neighbours=b"\x01", battery=80.0)]
+        3.0,
+        [
+            NodeStatus(
+                4, position=(1.0, 2.0, 0.5), neighbours=b"\x01", battery=80.0, fallback_age=1.5
+            )
+        ],
     )
     history.add(given, wall_s=0.0)
     assert history.state(0) == given

@@ -223,8 +223,13 @@ def test_a_watched_node_comes_with_its_neighbours():
     async def scenario(server: ConsoleServer, store: FrameStore) -> None:
         page = FakePage(server).open()
         page.say(do="watch", node=1)
-        node = NodeStatus(1, neighbours=b"\x00\x07", neighbour_ages=b"\x01\x09")
-        wanted = {"type": "detail", "node": 1, "neighbours": [[0, 1], [7, 9]]}
+        node = NodeStatus(1, neighbours=b"\x00\x07", neighbour_ages=b"\x01\x09", fallback_age=12.0)
+        wanted = {
+            "type": "detail",
+            "node": 1,
+            "neighbours": [[0, 1], [7, 9]],
+            "fallback_age": 12,
+        }
         store.update_mesh(MeshStatus(2.0, [node]), 1.0)
         await until("the request is heard", lambda: page.heard_everything)
         store.update_mesh(MeshStatus(3.0, [node]), 2.0)

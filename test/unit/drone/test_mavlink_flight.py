@@ -118,6 +118,7 @@ def test_a_goal_outside_the_limits_is_refused(goal, why: str) -> None:
     assert bench.commands() == []
 
 
+@pytest.mark.slow
 @BOTH
 def test_no_target_of_a_flight_lies_outside_the_limits(autopilot: Autopilot) -> None:
     limits = FlightLimits(max_height_m=12.0, max_distance_m=50.0)

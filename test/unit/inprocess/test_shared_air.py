@@ -226,6 +226,7 @@ def test_a_mesh_lives_with_the_loss_of_every_tenth_frame():
     assert share_connected(network, 120.0) >= 0.98
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_of_101_nodes_30_die_and_all_that_have_a_path_are_back_within_40_s(seed):
     network = grid(101, "1M", seed=seed)

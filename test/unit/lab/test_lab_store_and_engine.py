@@ -112,6 +112,7 @@ def test_a_run_gives_one_tidy_row_per_run_in_the_order_of_the_plan(
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_second_run_does_only_what_is_missing(
     bench: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,6 +134,7 @@ def test_a_second_run_does_only_what_is_missing(
     assert len(done) == 8
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_bytes_with_and_without_interruption(
     bench: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -147,6 +149,7 @@ def test_rows_are_the_same_bytes_with_and_without_interruption(
     assert (out / "outages.csv").read_bytes() == (tmp_path / "whole/outages.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_shards_together_are_the_whole(bench: Callable[..., Path], tmp_path: Path) -> None:
     path = bench()
     run(path, tmp_path / "whole")
@@ -159,6 +162,7 @@ def test_shards_together_are_the_whole(bench: Callable[..., Path], tmp_path: Pat
     assert measured(tmp_path / "all") == measured(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_shards_of_different_experiments_are_not_merged(
     bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -186,6 +190,7 @@ def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_go
     assert run(bench(text=text), out, "--retry-failed") == 1
 
 
+@pytest.mark.slow
 def test_an_endless_run_is_a_timeout(bench: Callable[..., Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
     added = "metrics: ['own_lab_parts:endless']\ntimeout_s: 0.5\n"
@@ -200,6 +205,7 @@ def test_a_metric_of_the_users_is_a_column(bench: Callable[..., Path], tmp_path:
     assert {row["drones"] for row in read_rows(tmp_path / "out/runs.csv")} == {"3"}
 
 
+@pytest.mark.slow
 def test_seeds_are_added_until_the_interval_is_narrow(
     bench: Callable[..., Path], tmp_path: Path
 ) -> None:
