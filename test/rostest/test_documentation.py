@@ -26,7 +26,8 @@ CONNECTED_WITHIN_S = 60.0  # simulated
 
 # ros_comm 1.15.9 under Python 3.9 (Debian 11) ends each tool with this, its work done.
 OF_DEBIAN_11 = re.compile(
-    r"Error in atexit._run_exitfuncs:\nTraceback.*\n(?:  .*\n)+AttributeError: .* 'isAlive'\n"
+    r"(?:Error in atexit._run_exitfuncs:\n)?"
+    r"Traceback.*\n(?:  .*\n)+AttributeError: 'Thread' object has no attribute 'isAlive'\n"
 )
 
 
