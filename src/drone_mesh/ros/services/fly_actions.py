@@ -28,6 +28,7 @@ from drone_mesh.ros.graph.conversions import event_record, location_of, whole_me
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
+from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
 from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
 from drone_mesh.state.orders import OrderProgress
@@ -77,7 +78,6 @@ class FlyActions:
 
     def __init__(self) -> None:
         rospy.set_param("~actionlib_status_frequency", 0)  # for actionlib: no thread
-        # Not a SimpleQueue: its get() waits forever if a signal handler outlasts the time-out.
         self._work: queue.Queue[Callable[[], None]] = queue.Queue()
         self._servers: dict[int, actionlib.ActionServer] = {}
         self._flights: list[_Flight] = []
@@ -85,10 +85,10 @@ class FlyActions:
         self._nodes: dict[int, NodeState] = {}
         rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event_came)
 
-    def run(self) -> None:
-        """Serve until the node shuts down."""
+    def run(self, ended: Callable[[], bool]) -> None:
+        """Serve until `ended`."""
         looked_s = -math.inf
-        while not rospy.is_shutdown():
+        while not ended():
             if time.monotonic() - looked_s >= LOOK_PERIOD_S:
                 looked_s = time.monotonic()
                 self._look()
@@ -244,8 +244,11 @@ def _order(drone: int, goal: Location) -> None:
 def main() -> None:
     """Run the node."""
     prepare_node(FlyActions.__doc__)
-    rospy.init_node("fly_actions")
+    # Otherwise rospy would shut down inside its signal handler, on top of whatever this thread was
+    # doing then, and could wait for a thread that waits for this one.
+    rospy.init_node("fly_actions", disable_signals=True)
     show_library_logs_on_rosout()
-    actions = FlyActions()
-    MasterWatch().start()
-    actions.run()
+    with OrderlyStop() as stop:
+        actions = FlyActions()
+        MasterWatch().start()
+        actions.run(stop.requested)
