@@ -54,8 +54,8 @@ class Delivery:
         self._gave_up: set[int] = set()  # neighbours that took no packets, though heard
         self._strangers = Strangers()
         self._announced = RateLimit(REPEATS)
-        self._missing_to_tell: deque[tuple[int, int, int]] = deque()
-        self._telling = False
+        self._missing_to_report: deque[tuple[int, int, int]] = deque()
+        self._reporting = False
         self.total_sent = 0
 
     # Sending ---------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ class Delivery:
 
     def delivered(self, to: int, tries: int) -> None:
         """The antenna has delivered a packet that it had queued."""
-        self._strangers.took_packet(to)
+        self._strangers.known.add(to)
         self._routing.sent(to, True, tries)
 
     def undelivered(self, payload: bytes, tries: int) -> bool:
@@ -199,21 +199,21 @@ class Delivery:
             return
         if not self._announced.count(missing, self._deadlines.now_s):
             return
-        self._missing_to_tell.append((missing, first, reported_by))
-        if self._telling:
+        self._missing_to_report.append((missing, first, reported_by))
+        if self._reporting:
             return
-        self._telling = True
+        self._reporting = True
         me = self._node_id
         try:
-            while self._missing_to_tell:
-                missing, first, reported_by = self._missing_to_tell.popleft()
+            while self._missing_to_report:
+                missing, first, reported_by = self._missing_to_report.popleft()
                 packet = messages.MissingMessage(me, me, me, me, missing).to_payload()
                 neighbours = self._routing.get_set_of_children() - {missing, reported_by}
                 for neighbour in sorted(neighbours, key=lambda n: (n != first, n)):
                     if self._routing.get_direction_to_node(neighbour) == neighbour:
                         self.send_own(messages.addressed(packet, neighbour))
         finally:
-            self._telling = False
+            self._reporting = False
 
     def came_back(self, missing: int, neighbour: int) -> None:
         """`neighbour` sent a packet for `missing` that this node could only send straight back.

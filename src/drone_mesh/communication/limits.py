@@ -33,12 +33,8 @@ class Strangers:
     """Nodes that never acknowledged a packet. If too many of them are lost, they get no packets."""
 
     def __init__(self) -> None:
-        self.known: set[int] = set()  # have taken one; read for each packet
+        self.known: set[int] = set()  # acknowledged a packet; the owner adds to it
         self._losses = RateLimit(STRANGERS)
-
-    def took_packet(self, node: int) -> None:
-        """It exists."""
-        self.known.add(node)
 
     def gave_up(self, node: int, now_s: float) -> None:
         """It took no packet."""

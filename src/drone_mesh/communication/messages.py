@@ -273,7 +273,9 @@ _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
-_NEW_HEARTBEAT = struct.Struct("<5B?BB24x")
+_NEW_HEARTBEAT = struct.Struct(
+    f"<{HEADER_BYTES}B{HeartbeatMessage.BODY.format[1:]}{BODY_BYTES - HeartbeatMessage.BODY.size}x"
+)
 _EXTENSIONS = {  # the bytes behind a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
@@ -329,10 +331,16 @@ header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct("<5B")
 hop: Callable[[bytes], tuple[int, int]] = struct.Struct("<xBxB").unpack_from
 """The sender and the receiver of this hop."""
 
-heartbeat_body: Callable[[bytes], tuple[bool, int, int]] = struct.Struct("<5x?BB").unpack_from
+_SKIP_HEADER = f"<{HEADER_BYTES}x"
+
+heartbeat_body: Callable[[bytes], tuple[bool, int, int]] = struct.Struct(
+    _SKIP_HEADER + HeartbeatMessage.BODY.format[1:]
+).unpack_from
 """Whether the creator of a HEARTBEAT knows a gateway, which, and the hops so far."""
 
-present_body: Callable[[bytes], tuple[int, bool]] = struct.Struct("<5xB?").unpack_from
+present_body: Callable[[bytes], tuple[int, bool]] = struct.Struct(
+    _SKIP_HEADER + IntroduceMessage.BODY.format[1:]
+).unpack_from
 """The hops of the creator of a PRESENT to its gateway, and whether it knows one."""
 
 sender: Callable[[bytes], int] = operator.itemgetter(_FROM)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import urllib.error
-import urllib.request
 from typing import Any
 
 from drone_mesh.console.orders import OrderRefused
 from drone_mesh.errors import MeshError
+from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two seconds
 
@@ -38,26 +37,10 @@ class GatewayClient:
         self._ask("POST", f"/drones/{drone}/goal", json.dumps(body).encode())
 
     def _ask(self, method: str, path: str, body: bytes | None = None) -> Any:
-        request = urllib.request.Request(f"{self.url}{path}", body, method=method)
-        if body is not None:
-            request.add_header("Content-Type", "application/json")
-        if self._token:
-            request.add_header("Authorization", f"Bearer {self._token}")
         try:
-            with urllib.request.urlopen(request, timeout=ANSWER_WITHIN_S) as answer:
-                return json.load(answer)
-        except urllib.error.HTTPError as error:
-            raise GatewayGone(_reason(error)) from error
-        except (OSError, ValueError) as error:
-            raise GatewayGone(f"no answer from {self.url}: {error}") from error
-
-
-def _reason(error: urllib.error.HTTPError) -> str:
-    try:
-        with error:
-            return str(json.load(error)["detail"])
-    except (ValueError, KeyError, TypeError):
-        return str(error)
+            return ask_json(f"{self.url}{path}", ANSWER_WITHIN_S, self._token, method, body)
+        except NoAnswer as error:
+            raise GatewayGone(str(error)) from error
 
 
 class GatewayControls:

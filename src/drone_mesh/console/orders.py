@@ -17,7 +17,11 @@ from drone_mesh.layouts import MAX_CASE, Order, read_places
 MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here
 RECORDED = "this is a recording: it cannot be changed"
-LIMITS = {"coordinate": MAX_COORDINATE_M, "height": MAX_HEIGHT_M}  # metres; for the page's form
+LIMITS = {  # for the page's forms; metres, and the largest id
+    "coordinate": MAX_COORDINATE_M,
+    "height": MAX_HEIGHT_M,
+    "id": MAX_NODE_ID,
+}
 
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]

@@ -91,7 +91,7 @@ def table(status: dict[str, Any]) -> str:
 
 
 def _line(name: str, value: object) -> str:
-    words = {True: "yes", False: "no"}.get(value, value) if isinstance(value, bool) else value
+    words = ("no", "yes")[value] if isinstance(value, bool) else value
     return f"{name.replace('_', ' '):35}{'-' if words in (None, '') else words}"
 
 

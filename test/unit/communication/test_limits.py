@@ -31,7 +31,7 @@ def test_a_rate_is_limited_per_period_and_node():
 
 def test_a_node_that_took_a_packet_is_no_stranger():
     strangers = Strangers()
-    strangers.took_packet(5)
+    strangers.known.add(5)
     for node in range(100, 200):
         strangers.gave_up(node, 1.0)
     assert strangers.ignores(6, 1.0)

@@ -245,3 +245,12 @@ def test_numbers_that_are_none_can_be_decoded_and_are_known_as_such(kind, ids, t
     assert finite == (not (has_two or (has_one and not second)))
     if has_one and not second:
         assert not math.isfinite(MovementNegotiationMessage.from_payload(payload).cost)
+
+
+def test_the_short_ways_to_a_heartbeat_and_its_body_are_those_of_the_class():
+    message = messages.HeartbeatMessage(3, 2, 1, 0, True, 7, 0)
+    assert messages.heartbeat(3, 2, 1, 0, True, 7) == message.to_payload()
+    received = bytes.fromhex("03 02 00 01 00 01 07 09") + bytes(24)
+    assert messages.heartbeat_body(received) == (True, 7, 9)
+    present = messages.IntroduceMessage(3, 3, 254, 254, 5, True).to_payload()
+    assert messages.present_body(present) == (5, True)

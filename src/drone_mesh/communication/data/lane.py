@@ -231,7 +231,7 @@ class Lane:
         """Give up messages that waited for too long."""
         for message in list(self):
             if now_s >= message.expires_s:
-                what = "no route to" if not has_route else "no acknowledgement from"
+                what = "no acknowledgement from" if has_route else "no route to"
                 where = destination_in_words(self.to)
                 self.give_up(message, f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}")
 

@@ -3,7 +3,6 @@
 import { agreed } from "./confirm.js";
 import { typedNumber } from "./numbers.js";
 
-const MOST_ID = 253;
 const FIELDS = ["id", "x", "y"];
 
 const byId = (id) => document.getElementById(id);
@@ -92,12 +91,12 @@ export class Fleet {
   async #add(event) {
     event.preventDefault();
     this.#complain();
-    const { coordinate } = this.mesh.limits;
+    const { coordinate, id: mostId } = this.mesh.limits;
     const [x, y] = ["x", "y"].map((axis) =>
       typedNumber(byId(`add-${axis}`), axis, -coordinate, coordinate),
     );
     const chosen = byId("add-id").value.trim() !== "";
-    const id = chosen ? typedNumber(byId("add-id"), "id", 0, MOST_ID, true) : { error: "" };
+    const id = chosen ? typedNumber(byId("add-id"), "id", 0, mostId, true) : { error: "" };
     const wrong = [id, x, y].find((entry) => entry.error);
     if (wrong) {
       this.#complain(wrong.error);

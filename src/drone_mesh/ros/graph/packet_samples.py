@@ -14,6 +14,7 @@ from drone_mesh.state.packets import PacketSampler
 
 PERIOD_S = 0.2  # wall time; the frame period of the web console
 QUEUE = 2  # samples that may wait for a slow subscriber
+END_WITHIN_S = 1.0  # wall; our choice: several periods
 
 
 class PacketSamples(rospy.SubscribeListener):
@@ -28,6 +29,7 @@ class PacketSamples(rospy.SubscribeListener):
         self._lock = threading.Lock()
         self._sampler = PacketSampler(random.Random())  # affects only what is displayed
         self._watched = threading.Event()
+        self._ended = threading.Event()
         self._publisher = rospy.Publisher(
             names.PACKETS_TOPIC, PacketSample, subscriber_listener=self, queue_size=QUEUE
         )
@@ -45,8 +47,13 @@ class PacketSamples(rospy.SubscribeListener):
 
     def start(self) -> None:
         """Start publishing, until the node shuts down."""
-        rospy.on_shutdown(self._watched.set)
         self._thread.start()
+        rospy.on_shutdown(self._end)
+
+    def _end(self) -> None:
+        self._ended.set()
+        self._watched.set()
+        self._thread.join(END_WITHIN_S)
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """A subscriber has connected (a thread of rospy)."""
@@ -54,12 +61,11 @@ class PacketSamples(rospy.SubscribeListener):
 
     def peer_unsubscribe(self, _topic: str, peers: int) -> None:
         """A subscriber has left; `peers` remain (a thread of rospy)."""
-        if not peers and not rospy.is_shutdown():
+        if not peers and not self._ended.is_set():
             self._watched.clear()
 
     def _run(self) -> None:
-        while self._watched.wait() and not rospy.is_shutdown():
-            time.sleep(PERIOD_S)
+        while self._watched.wait() and not self._ended.wait(PERIOD_S):
             try:
                 self._publisher.publish(self._message())
             except rospy.ROSException:  # the topic was closed: the node shuts down

@@ -49,11 +49,11 @@ _OUTCOMES = {
 
 
 class _Refused(Exception):
-    """An order did not leave: outcome and reason."""
+    """An order was not sent; the arguments are outcome and reason."""
 
 
 class _Flight:
-    """An order was not sent; the arguments are outcome and reason."""
+    """One accepted goal."""
 
     def __init__(self, handle: actionlib.ServerGoalHandle, drone: int, since_s: float) -> None:
         """`since_s`: simulated; no event of the order is older."""
