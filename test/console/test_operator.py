@@ -146,6 +146,18 @@ def test_the_map_follows_a_drone(page):
     )
 
 
+def test_a_drone_that_is_gone_is_no_longer_followed(page):
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.click("#follow")
+    page.page.click("#remove")
+    page.page.click("#confirm >> text=Remove 17")
+    page.wait_for("17 drones", lambda: page.drawn("drones") == 17)
+    assert not page.page.is_checked("#follow")
+    page.page.click("#nodes tr[data-id='5']")
+    page.page.click("#follow")
+    assert page.page.is_checked("#follow")
+
+
 def saved(page: Visit, button: str, folder: Path) -> Path:
     if not page.page.is_visible("#files"):
         page.page.click("#files-button")

@@ -139,6 +139,22 @@ class FrameStore:
                 )
             )
 
+    def expect_orders(self, drones: Iterable[int]) -> int:
+        """An order to these drones is being given; returns a ticket for `forget_expected`."""
+        ticket = self._orders.expect(drones)
+        self._show_orders()
+        return ticket
+
+    def forget_expected(self, ticket: int) -> None:
+        """Show the progress of earlier orders again, where no event of this one has come."""
+        self._orders.forget_expected(ticket)
+        self._show_orders()
+
+    def _show_orders(self) -> None:
+        self._next_version()
+        for node in self._nodes:
+            self._update_node(node, {"order": self._orders.words(node)})
+
     @property
     def mesh(self) -> MeshStatus | None:
         """The newest state."""

@@ -81,6 +81,10 @@ class PageOrder(_Request, abc.ABC):
     def carry_out(self, controls: MeshControls) -> str:
         """Carry the order out; returns a short text for the page. Raises OrderRefused."""
 
+    def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
+        """The drones that it sends somewhere."""
+        return ()
+
 
 class _Power(PageOrder):
     do: Literal["power"]
@@ -101,6 +105,9 @@ class _Fly(PageOrder):
     def carry_out(self, controls: MeshControls) -> str:
         return controls.fly(self.node, self.x, self.y, self.z)
 
+    def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
+        return (self.node,)
+
 
 class _Layout(PageOrder):
     do: Literal["layout"]
@@ -108,6 +115,9 @@ class _Layout(PageOrder):
 
     def carry_out(self, controls: MeshControls) -> str:
         return controls.layout(self.case)
+
+    def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
+        return [place[0] for offer in layouts if offer.case == self.case for place in offer.places]
 
 
 class _Speed(PageOrder):

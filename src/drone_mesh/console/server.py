@@ -57,6 +57,7 @@ SEND_TIMEOUT_S = 10.0
 MOST_PAGES = 32
 MOST_ORDERS_WAITING = 16  # per page
 ORDER_THREADS = 8
+EVENT_WITHIN_S = 5.0  # wall, our choice: after the answer to an order; hosts report every second
 ALL_ACTIONS = ("fly", "power", "layout", "speed", "add", "remove", "demonstrate", "packets")
 COOKIE = "drone_mesh_token"
 POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1
@@ -274,11 +275,15 @@ class ConsoleServer:
 
     async def _carry_out(self, page: Page, order: PageOrder) -> None:
         loop = asyncio.get_running_loop()
+        # Before it is carried out: its first event may come before its answer.
+        ticket = self._store.expect_orders(order.drones(self._layouts))
         try:
             text = await loop.run_in_executor(self._workers, order.carry_out, self._controls)
         except OrderRefused as error:
+            self._store.forget_expected(ticket)
             await self._answer(page, order.number, False, str(error))
         else:
+            loop.call_later(EVENT_WITHIN_S, self._store.forget_expected, ticket)
             await self._answer(page, order.number, True, text)
 
     async def _read_places(self, page: Page, request: ReadPlaces) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Iterable
 
 from drone_mesh.communication.observer import MeshEventKind
@@ -18,6 +19,7 @@ _STATE_OF = {
     MeshEventKind.NO_ROUTE.value: OrderState.NO_ROUTE,
 }
 
+BEING_SENT = "being sent"  # no gateway has reported the order yet
 
 _OPEN = (OrderState.ASKED, OrderState.UNDER_WAY)
 
@@ -69,6 +71,23 @@ class OrderWatch:
 
     def __init__(self) -> None:
         self._latest: dict[int, tuple[int, str, str]] = {}  # drone -> gateway, order, words
+        self._tickets = itertools.count()
+        self._expected: dict[int, int] = {}  # drone -> ticket of an order without an event so far
+
+    def expect(self, drones: Iterable[int]) -> int:
+        """An order to these drones is being given; returns a ticket for `forget_expected`.
+
+        Until its first event, the progress of an earlier order is not shown.
+        """
+        ticket = next(self._tickets)
+        self._expected.update(dict.fromkeys(drones, ticket))
+        return ticket
+
+    def forget_expected(self, ticket: int) -> None:
+        """No event of this order is expected any more: it was refused, or events stay away."""
+        self._expected = {
+            drone: other for drone, other in self._expected.items() if other != ticket
+        }
 
     def take(self, events: Iterable[EventRecord]) -> None:
         """Process new events, oldest first. The end of an older order changes nothing."""
@@ -83,14 +102,19 @@ class OrderWatch:
                 counts = order == latest or state in (OrderState.ASKED, OrderState.NO_ROUTE)
             else:  # another gateway may have no route
                 counts = state is not OrderState.NO_ROUTE
+            if state in (OrderState.ASKED, OrderState.NO_ROUTE):
+                self._expected.pop(drone, None)
             if counts:
                 words = f"{state.value}: {reason}" if reason else state.value
                 self._latest[drone] = event.node, order, words
 
     def words(self, drone: int) -> str:
         """The progress of its latest order, as text; empty if there was none."""
+        if drone in self._expected:
+            return BEING_SENT
         return self._latest[drone][2] if drone in self._latest else ""
 
     def forget(self) -> None:
         """Forget all orders: a new run has begun."""
         self._latest.clear()
+        self._expected.clear()

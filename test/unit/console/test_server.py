@@ -13,7 +13,7 @@ from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import LayoutOffer, OrderRefused
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
-from drone_mesh.state.model import MeshStatus, NodeStatus
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.web.access import Access
 
 LIMIT_S = 5.0
@@ -179,6 +179,30 @@ def test_orders_are_answered_by_their_numbers():
         assert (answers[4]["done"], answers[4]["text"]) == (True, "3 False")
         assert (answers[5]["done"], answers[5]["text"]) == (False, "no case 9")
         assert not answers[6]["done"]
+
+    run(scenario)
+
+
+def test_a_new_order_of_a_page_hides_the_progress_of_the_one_before():
+    async def scenario(server: ConsoleServer, store: FrameStore) -> None:
+        def order() -> str:
+            return json.loads(store.frame_since(0))["nodes"]["1"]["order"]
+
+        store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "order 7")])
+        store.update_mesh(MeshStatus(1.0, [NodeStatus(1)]), 0.0)
+        page = FakePage(server).open()
+        page.say(do="power", number=1, node=1, on=False)
+        await until("an answer", lambda: page.of_type("answer"))
+        assert order() == "arrived"
+        for number, request in enumerate(
+            ({"do": "fly", "node": 1, "x": 2.0, "y": 3.0, "z": 0.0}, {"do": "layout", "case": 0}), 2
+        ):
+            page.say(number=number, **request)
+            await until("an answer", lambda number=number: len(page.of_type("answer")) == number)
+            assert order() == "being sent"
+            store.add_events([EventRecord(2.0, 0, "order sent", (1,), f"order {number + 6}: to x")])
+            store.update_mesh(MeshStatus(2.0, [NodeStatus(1)]), 0.0)
+            assert order() == "asked: to x"
 
     run(scenario)
 

@@ -274,10 +274,12 @@ byId("find-form").addEventListener("submit", (event) => {
   byId("find").value = "";
   byId("map").focus();
 });
-byId("follow").addEventListener("change", (event) => {
-  map.following = event.target.checked;
+function follow(on) {
+  byId("follow").checked = map.following = on;
   map.redraw();
-});
+}
+byId("follow").addEventListener("change", (event) => follow(event.target.checked));
+mesh.addEventListener("select", () => mesh.selected === null && follow(false));
 mesh.addEventListener("select", () => {
   const link = mesh.selected === null ? location.pathname : `#node=${mesh.selected}`;
   if (location.hash !== link) history.replaceState(null, "", link);
