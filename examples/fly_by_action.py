@@ -7,15 +7,20 @@ Ctrl-C cancels the flight, and the drone stops.
 
 from __future__ import annotations
 
+import argparse
 import sys
+import time
 
 import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
 
 from drone_mesh.msg import FlyAction, FlyFeedback, FlyGoal, FlyResult
+from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 
-SERVER_WITHIN_S = 20.0  # simulated
+OFFERED_WITHIN_S = 20.0  # wall: a simulation that has just been started needs a few seconds
+LOOK_PERIOD_S = 0.2  # wall
+CONNECTED_WITHIN_S = 20.0  # simulated
 CANCELLED_WITHIN_S = 10.0  # simulated
 
 
@@ -25,11 +30,41 @@ def show(feedback: FlyFeedback) -> None:
     print(f"{feedback.state}: {place}, {feedback.distance:.1f} m left", flush=True)
 
 
+def why_not_offered(drone: int) -> str:
+    """The reason why the drone cannot be ordered yet; empty if it can."""
+    if drones_if_known() is None:
+        return "no simulation is running: roslaunch drone_mesh factory.launch actions:=true"
+    if any(topic == f"/Drones/{drone}/fly/status" for topic, _ in rospy.get_published_topics()):
+        return ""
+    return f"drone {drone} has no action: start the simulation with actions:=true"
+
+
+def wait_until_offered(drone: int) -> str:
+    """Wait until the drone can be ordered, and print for what; returns the reason if it cannot."""
+    deadline_s = time.monotonic() + OFFERED_WITHIN_S
+    printed = ""
+    while True:
+        present = drones_if_known()
+        if present is not None and drone not in present.roles:
+            return f"there is no drone {drone}: `rosrun drone_mesh status` lists the drones"
+        why = why_not_offered(drone)
+        if not why or time.monotonic() > deadline_s:
+            return why
+        if why != printed:
+            print(f"{why} (waiting for it, up to {OFFERED_WITHIN_S:.0f} s)", flush=True)
+            printed = why
+        time.sleep(LOOK_PERIOD_S)
+
+
 def main(drone: int, x: float, y: float, height: int) -> int:
     """Exit code: 0 if the drone has arrived."""
+    why = wait_until_offered(drone)
+    if why:
+        print(why)
+        return 1
     client = actionlib.SimpleActionClient(f"/Drones/{drone}/fly", FlyAction)
-    if not client.wait_for_server(rospy.Duration(SERVER_WITHIN_S)):
-        print(f"drone {drone} has no action: start the simulation with actions:=true")
+    if not client.wait_for_server(rospy.Duration(CONNECTED_WITHIN_S)):
+        print(f"the action of drone {drone} does not answer")
         return 1
     client.send_goal(FlyGoal(latitude=y, longitude=x, height=height), feedback_cb=show)
     try:
@@ -46,12 +81,14 @@ def main(drone: int, x: float, y: float, height: int) -> int:
 
 
 if __name__ == "__main__":
-    words = rospy.myargv()[1:]
-    if len(words) not in (3, 4):
-        sys.exit(__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    parser.add_argument("id", type=int, help="of the drone")
+    parser.add_argument("x", type=float, help="metres")
+    parser.add_argument("y", type=float, help="metres")
+    parser.add_argument("height", type=int, nargs="?", default=0, help="metres (default: 0)")
+    goal = parser.parse_args(rospy.myargv()[1:])
     rospy.init_node("fly_by_action", anonymous=True, disable_signals=True)  # Ctrl-C is ours
-    numbers = [float(word) for word in words]
     try:
-        sys.exit(main(int(numbers[0]), numbers[1], numbers[2], int((numbers[3:] or [0])[0])))
+        sys.exit(main(goal.id, goal.x, goal.y, goal.height))
     except KeyboardInterrupt:  # before the drone had an order
         sys.exit(130)

@@ -56,14 +56,25 @@ class FlyActionsTest(unittest.TestCase):
         self.assertTrue(client.wait_for_result(within), "no result")
         return client.get_state(), client.get_result()
 
-    def test_1_the_example_follows_a_flight_to_its_end(self) -> None:
-        example = subprocess.run(
-            [sys.executable, str(EXAMPLE), "2", "6", "4"],
+    def example(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, str(EXAMPLE), *words],
             stdout=subprocess.PIPE,
             timeout=2 * WALL_LIMIT_S,
             check=False,
             text=True,
         )
+
+    def test_0_the_example_names_a_drone_that_is_not_there(self) -> None:
+        example = self.example("42", "6", "4")
+        self.assertEqual(example.returncode, 1, example.stdout)
+        self.assertEqual(
+            example.stdout,
+            "there is no drone 42: `rosrun drone_mesh status` lists the drones\n",
+        )
+
+    def test_1_the_example_follows_a_flight_to_its_end(self) -> None:
+        example = self.example("2", "6", "4")
         self.assertEqual(example.returncode, 0, example.stdout)
         self.assertIn("under way: x ", example.stdout)
         self.assertEqual(example.stdout.splitlines()[-1], "arrived")
