@@ -13,7 +13,7 @@ from typing import Any, Sequence
 from drone_mesh.bench import cases, inprocess, overload, report, soak
 from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import RosResult, measure
-from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, check_environment, free_port
 from drone_mesh.communication.key_file import read_key_file
 from drone_mesh.errors import ConfigurationError
@@ -137,7 +137,7 @@ def _in_short(case: Case) -> str:
 class Benchmark:
     """The options of one run, and the results so far."""
 
-    def __init__(self, options: argparse.Namespace, progress: Progress) -> None:
+    def __init__(self, options: argparse.Namespace, progress: ProgressLine) -> None:
         self._options = options
         self._progress = progress
         self._machine = report.Machine.here()
@@ -288,6 +288,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:
-        sys.exit(Benchmark(options, Progress(sys.stderr)).run())
+        sys.exit(Benchmark(options, ProgressLine(sys.stderr)).run())
     except (BenchmarkError, ConfigurationError) as error:
         sys.exit(f"bench: {error}")

@@ -6,16 +6,16 @@ import time
 from dataclasses import dataclass
 
 from drone_mesh.bench.cases import Case
-from drone_mesh.bench.observation import REST, TAKE_OFF, WATCH, Look, Watch
+from drone_mesh.bench.observation import REST, TAKE_OFF, WATCH, StateSample, Watch
 from drone_mesh.bench.processes import Use, cores_between
-from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, System
 from drone_mesh.state.figures import DELIVERED, LOST_IN_RANGE, WORST_LAG
 
 ON_WITHIN_S = 180.0  # wall; our choice: six times the allowed time for 254 drones
 CONNECTED_WITHIN_S = 120.0  # wall; the same limit as for the original
 SETTLE_S = 5.0  # wall; the start costs more than later seconds
-LOOK_WITHIN_S = 20.0  # wall
+SAMPLE_WITHIN_S = 20.0  # wall
 MEGABYTE = 1e6
 
 
@@ -52,15 +52,15 @@ class RosResult:
 
 @dataclass(frozen=True)
 class _Moment:
-    look: Look
+    sample: StateSample
     use: Use
     delivered: float | None
-    delivered_s: float  # when `delivered` arrived: once a second, independent of the look
+    delivered_s: float  # when `delivered` arrived: once a second, independent of the sample
     lost: float | None
 
 
 def measure(
-    case: Case, launch_args: list[str], port: int, window_s: float, progress: Progress
+    case: Case, launch_args: list[str], port: int, window_s: float, progress: ProgressLine
 ) -> RosResult:
     """Start a fleet, wait until all are connected, measure `window_s` wall seconds, stop it.
 
@@ -93,7 +93,7 @@ def measure(
     return result
 
 
-def await_all_on(system: System, case: Case, progress: Progress) -> None:
+def await_all_on(system: System, case: Case, progress: ProgressLine) -> None:
     """Wait until all nodes of the fleet are on. Raises BenchmarkError after a time limit."""
     watch = system.watch
 
@@ -109,12 +109,12 @@ def await_all_on(system: System, case: Case, progress: Progress) -> None:
 def _take_moment(system: System) -> _Moment:
     """The current figures. The first state may be old, so wait for the second."""
     watch = system.watch
-    seen = len(watch.looks)
-    if not system.wait_for(lambda: len(watch.looks) >= seen + 2, LOOK_WITHIN_S, lambda: None):
-        raise BenchmarkError(f"no /mesh/state for {LOOK_WITHIN_S:g} s")
-    look = watch.looks[-1]
+    seen = len(watch.samples)
+    if not system.wait_for(lambda: len(watch.samples) >= seen + 2, SAMPLE_WITHIN_S, lambda: None):
+        raise BenchmarkError(f"no /mesh/state for {SAMPLE_WITHIN_S:g} s")
+    sample = watch.samples[-1]
     return _Moment(
-        look,
+        sample,
         system.use(),
         watch.total(DELIVERED),
         watch.received_s(DELIVERED),
@@ -125,9 +125,9 @@ def _take_moment(system: System) -> _Moment:
 def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosResult:
     watch = system.watch
     assert watch.all_on is not None
-    wall_s = last.look.wall_s - first.look.wall_s
-    sim_s = last.look.sim_s - first.look.sim_s
-    messages = last.look.messages - first.look.messages
+    wall_s = last.sample.wall_s - first.sample.wall_s
+    sim_s = last.sample.sim_s - first.sample.sim_s
+    messages = last.sample.messages - first.sample.messages
     delivered = _increase(first.delivered, last.delivered)
     lost = _increase(first.lost, last.lost)
     cores = cores_between(first.use, last.use)
@@ -136,11 +136,11 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         drones=case.drones,
         spacing_m=case.spacing_m,
         real_time_factor=case.real_time_factor,
-        flying=last.look.flying,
+        flying=last.sample.flying,
         on_after_wall_s=watch.all_on.wall_s - system.launched_s,
         connected_after_sim_s=watch.connected_after_s(),
         connected_after_wall_s=connected.wall_s - watch.all_on.wall_s if connected else None,
-        routers_connected=last.look.connected,
+        routers_connected=last.sample.connected,
         window_wall_s=wall_s,
         window_sim_s=sim_s,
         messages_per_wall_s=messages / wall_s,
@@ -150,8 +150,8 @@ def _result(case: Case, system: System, first: _Moment, last: _Moment) -> RosRes
         lost_before=first.lost,
         cpu_ms_per_message=1000 * sum(cores.values()) * wall_s / messages if messages else None,
         cores=cores,
-        links=last.look.links,
-        cpu_ms_per_sim_s_and_link=_per_link(sum(cores.values()) * wall_s, sim_s, last.look.links),
+        links=last.sample.links,
+        cpu_ms_per_sim_s_and_link=_per_link(sum(cores.values()) * wall_s, sim_s, last.sample.links),
         pss_mb=last.use.pss_bytes / MEGABYTE,
         rss_mb=last.use.rss_bytes / MEGABYTE,
         threads=last.use.threads,
@@ -179,7 +179,7 @@ def _share(lost: float | None, delivered: float | None) -> float | None:
     return lost / (lost + delivered)
 
 
-def _sleep(system: System, seconds: float, progress: Progress, what: str) -> None:
+def _sleep(system: System, seconds: float, progress: ProgressLine, what: str) -> None:
     until_s = time.monotonic() + seconds
     system.wait_for(
         lambda: time.monotonic() >= until_s,

@@ -20,7 +20,7 @@ WATCH, REST, TAKE_OFF = "watch", "rest", "take off"
 
 
 @dataclass(frozen=True)
-class Look:
+class StateSample:
     """One MeshState as numbers."""
 
     wall_s: float  # when it arrived, time.monotonic
@@ -50,8 +50,8 @@ class Figures:
     values: dict[str, float] = field(default_factory=dict)
 
 
-Sight = Union[Look, Happening, Figures]
-_KINDS = {kind.__name__: kind for kind in (Look, Happening, Figures)}
+Sight = Union[StateSample, Happening, Figures]
+_KINDS = {kind.__name__: kind for kind in (StateSample, Happening, Figures)}
 
 
 def to_line(sight: Sight) -> str:
@@ -75,11 +75,11 @@ class Watch:
     def __init__(self, drones: int) -> None:
         self._drones = drones
         self._happenings: list[Happening] = []
-        self.looks: list[Look] = []
+        self.samples: list[StateSample] = []
         self.figures: dict[str, Figures] = {}  # the latest, by source
         self.worst: dict[str, float] = {}  # the largest value of each figure, from any source
-        self.all_on: Look | None = None  # the first look with all nodes on
-        self.all_connected: Look | None = None
+        self.all_on: StateSample | None = None  # the first sample with all nodes on
+        self.all_connected: StateSample | None = None
 
     def see(self, sight: Sight) -> None:
         """Add an observation."""
@@ -90,16 +90,16 @@ class Watch:
             for name, value in sight.values.items():
                 self.worst[name] = max(value, self.worst.get(name, -math.inf))
         else:
-            self.looks.append(sight)
+            self.samples.append(sight)
             if self.all_on is None and sight.on == self._drones:
                 self.all_on = sight
             if self.all_on and not self.all_connected and sight.connected == self._drones - 1:
                 self.all_connected = sight
 
     @property
-    def last(self) -> Look | None:
-        """The latest look, or None."""
-        return self.looks[-1] if self.looks else None
+    def last(self) -> StateSample | None:
+        """The latest sample, or None."""
+        return self.samples[-1] if self.samples else None
 
     def connected_after_s(self) -> float | None:
         """Simulated seconds from the start of the last node until all were connected; None: never.

@@ -10,7 +10,7 @@ from typing import Callable, Iterator, Sequence
 
 from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import CONNECTED_WITHIN_S, await_all_on
-from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, System
 
 SIMULATED_S = 300.0
@@ -58,7 +58,7 @@ def overload(
     counts: Sequence[int],
     launch_args: list[str],
     port: int,
-    progress: Progress,
+    progress: ProgressLine,
     on_result: Callable[[OverloadResult], None],
     simulated_s: float = SIMULATED_S,
 ) -> None:
@@ -86,7 +86,7 @@ def overload(
 
 
 def _run(
-    system: System, case: Case, count: int, simulated_s: float, progress: Progress
+    system: System, case: Case, count: int, simulated_s: float, progress: ProgressLine
 ) -> OverloadResult:
     watch = system.watch
     first = watch.last

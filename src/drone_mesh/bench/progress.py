@@ -8,7 +8,7 @@ from typing import TextIO
 QUIET_S = 10.0  # without a terminal: at most one line in this time within a stage
 
 
-class Progress:
+class ProgressLine:
     """One updating line on a terminal; occasional lines in a file or pipe."""
 
     def __init__(self, stream: TextIO) -> None:

@@ -8,7 +8,7 @@ from typing import Callable, Sequence
 
 from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import MEGABYTE, await_all_on
-from drone_mesh.bench.progress import Progress
+from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, System
 
 SAMPLE_PERIOD_S = 60.0  # simulated
@@ -107,7 +107,7 @@ def soak(
     hours: float,
     launch_args: list[str],
     port: int,
-    progress: Progress,
+    progress: ProgressLine,
     on_sample: Callable[[Sample], None],
 ) -> SoakResult:
     """Run a fleet for `hours` of simulated time; `on_sample` gets each sample at once.
@@ -144,17 +144,17 @@ def soak(
 
 
 def _take_sample(system: System) -> Sample:
-    look = system.watch.last
-    assert look is not None
+    sample = system.watch.last
+    assert sample is not None
     use = system.use()
     return Sample(
-        sim_s=look.sim_s,
-        wall_s=look.wall_s - system.launched_s,
+        sim_s=sample.sim_s,
+        wall_s=sample.wall_s - system.launched_s,
         pss_mb=use.pss_bytes / MEGABYTE,
         rss_mb=use.rss_bytes / MEGABYTE,
         threads=use.threads,
         open_files=use.open_files,
-        routers_connected=look.connected,
+        routers_connected=sample.connected,
         threads_of={process.name: process.threads for process in use.processes.values()},
         open_files_of={process.name: process.open_files for process in use.processes.values()},
     )

@@ -14,7 +14,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.messages import Message, MessageType
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.router_states import Link, RouterEvent, RouterStates
+from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
 from drone_mesh.communication.swallowing import Detours, Swallowing
 
 _log = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ class Shortcut(NamedTuple):
 class GatewayConnection:
     """The preferred gateway of one router, the hops to it, and whether it answers.
 
-    It drives the `Link` of the router's states.
+    It drives the `ConnectionState` of the router's states.
     """
 
     def __init__(
@@ -321,7 +321,7 @@ class GatewayConnection:
 
     def _show(self) -> None:
         """Report a change of the connection; do not wait for an answer longer than needed."""
-        if self._states.link in (Link.SEARCHING, Link.CONNECTED):
+        if self._states.link in (ConnectionState.SEARCHING, ConnectionState.CONNECTED):
             self._parts.deadlines.set(Due.ANSWER, math.inf)
         connected = self._states.connected
         if connected != self._shown_connected:

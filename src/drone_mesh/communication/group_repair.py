@@ -21,7 +21,7 @@ from drone_mesh.communication.flight_news import FlightNews
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.repair_interfaces import IRepairActions, IRepairStrategy, Step
-from drone_mesh.communication.router_states import Repair, RouterEvent
+from drone_mesh.communication.router_states import RepairState, RouterEvent
 from drone_mesh.communication.spots import PITCH
 from drone_mesh.drone.interfaces import Location
 
@@ -31,7 +31,7 @@ TAKE_OFF_WITHIN_S = 5.0  # docs/protocol.md, "Negotiation": then the winner is p
 ROUNDS_WITHOUT_FLIER = 2  # docs/protocol.md, "Negotiation": then the second choice counts
 HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a group to a gateway
 
-IN_A_ROUND = (Repair.ASKING, Repair.NEGOTIATING, Repair.WATCHING)
+IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 
 
 class GroupRepair(IRepairStrategy):
@@ -73,26 +73,26 @@ class GroupRepair(IRepairStrategy):
 
     def on_neighbour_lost(self, node: int) -> None:
         """Do not wait for its place or bid."""
-        if self.mesh.state in (Repair.ASKING, Repair.NEGOTIATING):
+        if self.mesh.state in (RepairState.ASKING, RepairState.NEGOTIATING):
             self.mesh.wait_until(self.mesh.now_s)
 
     def on_place(self, node: int, place: Location) -> None:
         """Possibly the last missing answer."""
-        if self.mesh.state is Repair.ASKING and self._all_answered():
+        if self.mesh.state is RepairState.ASKING and self._all_answered():
             self._negotiate()
 
     def on_time(self) -> None:
         """The time for places, bids or the winner's take-off is over."""
         state = self.mesh.state
-        if state is Repair.ASKING:
+        if state is RepairState.ASKING:
             until_s = self._asked_s + PLACES_WITHIN_S
             if self._all_answered() or self.mesh.now_s >= until_s:
                 self._negotiate()
             else:
                 self.mesh.wait_until(until_s)
-        elif state is Repair.NEGOTIATING:
+        elif state is RepairState.NEGOTIATING:
             self._decide()
-        elif state is Repair.WATCHING:
+        elif state is RepairState.WATCHING:
             self._pass_over_winner()
 
     # Where to --------------------------------------------------------------------------------
@@ -177,13 +177,13 @@ class GroupRepair(IRepairStrategy):
         if not self._credit.believes(node, score, from_, most):
             score = NO_BID
         is_best = self._election.heard(node, score, mesh.now_s)
-        if mesh.connected or mesh.state is Repair.FLYING or self._news.is_quiet(mesh.now_s):
+        if mesh.connected or mesh.state is RepairState.FLYING or self._news.is_quiet(mesh.now_s):
             return
         if is_best:
             mesh.bid(score, node, but_not_to=from_)
-        if mesh.state is Repair.LOST:
+        if mesh.state is RepairState.LOST:
             self._ask_for_places()
-        elif mesh.state is Repair.NEGOTIATING:
+        elif mesh.state is RepairState.NEGOTIATING:
             self._decide()
 
     def _negotiate(self) -> None:
@@ -209,7 +209,7 @@ class GroupRepair(IRepairStrategy):
 
     def _decide(self) -> None:
         mesh = self.mesh
-        if mesh.state is not Repair.NEGOTIATING:
+        if mesh.state is not RepairState.NEGOTIATING:
             return
         due_s = self._election.due_s(mesh.neighbours().keys())
         if mesh.now_s < due_s:

@@ -26,7 +26,7 @@ from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair_views import RepairViews
-from drone_mesh.communication.router_states import Repair, RouterEvent, RouterStates
+from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.communication.spots import PITCH, beside, own_spot
 from drone_mesh.drone.interfaces import Location
 
@@ -34,7 +34,7 @@ ROUNDING_S = 1e-6  # sums of periods are not exact
 
 
 class ConnectionRepair(RepairViews):
-    """The repair of one router. It drives the `Repair` of the router's states."""
+    """The repair of one router. It drives the `RepairState` of the router's states."""
 
     def __init__(
         self,
@@ -64,9 +64,9 @@ class ConnectionRepair(RepairViews):
         Time is counted between due times, so that a late check does not cost a period.
         """
         state = self._states.repair
-        if state is Repair.AT_REST:
+        if state is RepairState.AT_REST:
             self._notice_loss(due_s)
-        elif state is Repair.LOST:
+        elif state is RepairState.LOST:
             self._was_silent = self.silent
             if due_s >= self._emergency_s() - ROUNDING_S:
                 self._parts.report(MeshEventKind.EMERGENCY)
@@ -100,7 +100,7 @@ class ConnectionRepair(RepairViews):
         """A new node is in reach. After a silence, give the mesh time to recover."""
         if self._was_silent:
             self._was_silent = False
-            if self._states.repair is Repair.LOST:
+            if self._states.repair is RepairState.LOST:
                 self._lost_since_s = self.now_s
         self._strategy.on_neighbour_found(node)
 
@@ -138,17 +138,17 @@ class ConnectionRepair(RepairViews):
                 goal=flight.goal,
                 landed=flight.on_ground,
             )
-        at_rest = state is Repair.AT_REST and not strategy.reason
-        if self.connected or state is Repair.FLYING or at_rest:
+        at_rest = state is RepairState.AT_REST and not strategy.reason
+        if self.connected or state is RepairState.FLYING or at_rest:
             return NOTHING_TO_REPAIR
-        bids = state in (Repair.NEGOTIATING, Repair.WATCHING)
+        bids = state in (RepairState.NEGOTIATING, RepairState.WATCHING)
         return RepairStatus(
             state,
             strategy.reason,
             bid=strategy.own_bid if bids else NO_BID,
             bid_unit=strategy.bid_unit,
             place_of=strategy.bids_for if bids else NO_ROUTE,
-            winner=strategy.winner if state is Repair.WATCHING else NO_ROUTE,
+            winner=strategy.winner if state is RepairState.WATCHING else NO_ROUTE,
             emergency_s=self._emergency_s(),
             silent=self.silent,
         )

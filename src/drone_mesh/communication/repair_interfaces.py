@@ -14,7 +14,7 @@ from typing import Mapping, NamedTuple
 from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.router_states import Repair, RouterEvent
+from drone_mesh.communication.router_states import RepairState, RouterEvent
 from drone_mesh.drone.interfaces import Location
 
 SILENCE_PATIENCE = 5.0  # our choice: the factor on a node's patience if its medium may be down
@@ -78,7 +78,7 @@ class IRepairActions(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def state(self) -> Repair:
+    def state(self) -> RepairState:
         """The current repair state."""
 
     @property

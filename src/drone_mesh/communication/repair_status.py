@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.interfaces import Location
 
 
 class RepairStatus(NamedTuple):
     """The repair of one node at one moment. Immutable, so any thread may read it."""
 
-    state: Repair = Repair.AT_REST
+    state: RepairState = RepairState.AT_REST
     reason: str = ""  # why it does not fly, or why it lands early; empty: it flies, or may do so
     bid: float = NO_BID  # as in MOVEMENT_NEGOTIATION; negative: it does not bid
     bid_unit: str = ""  # of bids above 1
@@ -30,15 +30,15 @@ class RepairStatus(NamedTuple):
 
     def in_words(self, now_s: float) -> str:
         """One short sentence about the node; empty if nothing is to be repaired."""
-        if self.state is Repair.LOST:
+        if self.state is RepairState.LOST:
             return "; ".join(filter(None, (self._waits(now_s), self._does_not_fly())))
-        if self.state is Repair.ASKING:
+        if self.state is RepairState.ASKING:
             return "asks where its neighbours are"
-        if self.state is Repair.NEGOTIATING:
+        if self.state is RepairState.NEGOTIATING:
             return f"negotiating, {self._bids()}"
-        if self.state is Repair.WATCHING:
+        if self.state is RepairState.WATCHING:
             return f"waits for {self.winner} to take off"
-        if self.state is Repair.FLYING:
+        if self.state is RepairState.FLYING:
             return self._flies()
         return self._does_not_fly()
 

@@ -10,7 +10,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair_interfaces import IRepairActions, NeighbourView, Step
 from drone_mesh.communication.repair_options import RepairOptions
-from drone_mesh.communication.router_states import Repair, RouterStates
+from drone_mesh.communication.router_states import RepairState, RouterStates
 from drone_mesh.communication.spots import PITCH
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
@@ -63,7 +63,7 @@ class RepairViews(IRepairActions):
         return self._states.connected
 
     @property
-    def state(self) -> Repair:  # noqa: D102
+    def state(self) -> RepairState:  # noqa: D102
         return self._states.repair
 
     @property

@@ -28,7 +28,7 @@ from drone_mesh.communication.repair import ConnectionRepair
 from drone_mesh.communication.repair_interfaces import IRepairStrategy
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
-from drone_mesh.communication.router_states import Link, Repair, RouterStates
+from drone_mesh.communication.router_states import ConnectionState, RepairState, RouterStates
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
@@ -130,7 +130,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._routing.maintain_routing()
         if was_connected:
             self._connection.look_after(self._antenna.patience())
-        elif link is Link.SEARCHING and self._states.repair is not Repair.FLYING:
+        elif link is ConnectionState.SEARCHING and self._states.repair is not RepairState.FLYING:
             self._repair.on_unconnected_check(due_s)
 
     def _antenna_is_off(self) -> None:
@@ -240,7 +240,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _is_short_flight(self) -> bool:
         """Whether most neighbours will remain in reach, so that the router remains a relay."""
-        if not self._states.connected or self._states.repair is Repair.FLYING:
+        if not self._states.connected or self._states.repair is RepairState.FLYING:
             return False
         return self._pilot.distance_m() <= SHORT_FLIGHT * self._repair.range_m
 
@@ -251,7 +251,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._landed()
 
     def _landed(self) -> None:
-        if self._states.repair is Repair.FLYING:
+        if self._states.repair is RepairState.FLYING:
             self._repair.on_landed()
             super()._landed()
             return

@@ -4,8 +4,8 @@ A router is in two states at once, as an h11 connection is in the states of its 
 overlap: a lost router still tries the gateways that its neighbours offer, and a flying one may be
 answered in flight.
 
-* `Link`: whether a gateway answers.
-* `Repair`: the router's reaction to a lost connection.
+* `ConnectionState`: whether a gateway answers.
+* `RepairState`: the router's reaction to a lost connection.
 
 An event without an entry for the current state is a bug and raises RuntimeError.
 """
@@ -16,7 +16,7 @@ import enum
 from typing import Mapping
 
 
-class Link(enum.Enum):
+class ConnectionState(enum.Enum):
     """The connection to the preferred gateway."""
 
     __hash__ = object.__hash__  # each is one object; Enum's own hash is a Python function
@@ -27,7 +27,7 @@ class Link(enum.Enum):
     AWAITING_ANSWER = "awaiting an answer"  # connected; a heartbeat is under way
 
 
-class Repair(enum.Enum):
+class RepairState(enum.Enum):
     """The router's reaction to a lost connection."""
 
     __hash__ = object.__hash__
@@ -60,34 +60,34 @@ class RouterEvent(enum.Enum):
     ANTENNA_OFF = "the antenna has no power"
 
 
-CONNECTED_LINKS = frozenset((Link.CONNECTED, Link.AWAITING_ANSWER))
-AWAITING_LINKS = frozenset((Link.AWAITING_FIRST_ANSWER, Link.AWAITING_ANSWER))
+CONNECTED_LINKS = frozenset((ConnectionState.CONNECTED, ConnectionState.AWAITING_ANSWER))
+AWAITING_LINKS = frozenset((ConnectionState.AWAITING_FIRST_ANSWER, ConnectionState.AWAITING_ANSWER))
 
-_ALL_TO_SEARCHING = {state: Link.SEARCHING for state in Link}
+_ALL_TO_SEARCHING = {state: ConnectionState.SEARCHING for state in ConnectionState}
 _ALL_BUT_FLYING_TO_REST = {
-    Repair.AT_REST: Repair.AT_REST,
-    Repair.LOST: Repair.AT_REST,
-    Repair.ASKING: Repair.AT_REST,
-    Repair.NEGOTIATING: Repair.AT_REST,
-    Repair.WATCHING: Repair.AT_REST,
-    Repair.FLYING: Repair.FLYING,
+    RepairState.AT_REST: RepairState.AT_REST,
+    RepairState.LOST: RepairState.AT_REST,
+    RepairState.ASKING: RepairState.AT_REST,
+    RepairState.NEGOTIATING: RepairState.AT_REST,
+    RepairState.WATCHING: RepairState.AT_REST,
+    RepairState.FLYING: RepairState.FLYING,
 }
 
-LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[Link, Link]] = {
+LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[ConnectionState, ConnectionState]] = {
     RouterEvent.HEARTBEAT_SENT: {
-        Link.SEARCHING: Link.AWAITING_FIRST_ANSWER,
-        Link.AWAITING_FIRST_ANSWER: Link.AWAITING_FIRST_ANSWER,
-        Link.CONNECTED: Link.AWAITING_ANSWER,
-        Link.AWAITING_ANSWER: Link.AWAITING_ANSWER,
+        ConnectionState.SEARCHING: ConnectionState.AWAITING_FIRST_ANSWER,
+        ConnectionState.AWAITING_FIRST_ANSWER: ConnectionState.AWAITING_FIRST_ANSWER,
+        ConnectionState.CONNECTED: ConnectionState.AWAITING_ANSWER,
+        ConnectionState.AWAITING_ANSWER: ConnectionState.AWAITING_ANSWER,
     },
     RouterEvent.ANSWER_MISSED: {
-        Link.AWAITING_FIRST_ANSWER: Link.SEARCHING,
-        Link.AWAITING_ANSWER: Link.SEARCHING,
+        ConnectionState.AWAITING_FIRST_ANSWER: ConnectionState.SEARCHING,
+        ConnectionState.AWAITING_ANSWER: ConnectionState.SEARCHING,
     },
-    RouterEvent.GATEWAY_ANSWERED: {state: Link.CONNECTED for state in Link},
+    RouterEvent.GATEWAY_ANSWERED: {state: ConnectionState.CONNECTED for state in ConnectionState},
     RouterEvent.LOSS_NOTICED: {
-        Link.SEARCHING: Link.SEARCHING,
-        Link.AWAITING_FIRST_ANSWER: Link.SEARCHING,
+        ConnectionState.SEARCHING: ConnectionState.SEARCHING,
+        ConnectionState.AWAITING_FIRST_ANSWER: ConnectionState.SEARCHING,
     },
     RouterEvent.TOOK_OFF: _ALL_TO_SEARCHING,
     RouterEvent.LANDED: _ALL_TO_SEARCHING,
@@ -95,21 +95,21 @@ LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[Link, Link]] = {
 }
 """An event without an entry leaves the link unchanged."""
 
-REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[Repair, Repair]] = {
+REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[RepairState, RepairState]] = {
     RouterEvent.GATEWAY_ANSWERED: _ALL_BUT_FLYING_TO_REST,
-    RouterEvent.LOSS_NOTICED: {Repair.AT_REST: Repair.LOST},
-    RouterEvent.ASKED_FOR_PLACES: {Repair.LOST: Repair.ASKING},
-    RouterEvent.BID: {Repair.ASKING: Repair.NEGOTIATING},
-    RouterEvent.BIDS_COUNTED: {Repair.NEGOTIATING: Repair.WATCHING},
-    RouterEvent.WINNER_MISSED: {Repair.WATCHING: Repair.NEGOTIATING},
+    RouterEvent.LOSS_NOTICED: {RepairState.AT_REST: RepairState.LOST},
+    RouterEvent.ASKED_FOR_PLACES: {RepairState.LOST: RepairState.ASKING},
+    RouterEvent.BID: {RepairState.ASKING: RepairState.NEGOTIATING},
+    RouterEvent.BIDS_COUNTED: {RepairState.NEGOTIATING: RepairState.WATCHING},
+    RouterEvent.WINNER_MISSED: {RepairState.WATCHING: RepairState.NEGOTIATING},
     RouterEvent.ROUND_OVER: {
-        Repair.ASKING: Repair.AT_REST,
-        Repair.NEGOTIATING: Repair.AT_REST,
-        Repair.WATCHING: Repair.AT_REST,
+        RepairState.ASKING: RepairState.AT_REST,
+        RepairState.NEGOTIATING: RepairState.AT_REST,
+        RepairState.WATCHING: RepairState.AT_REST,
     },
-    RouterEvent.NO_NEIGHBOURS: {Repair.LOST: Repair.AT_REST},
-    RouterEvent.TOOK_OFF: {state: Repair.FLYING for state in Repair},
-    RouterEvent.LANDED: {Repair.FLYING: Repair.AT_REST},
+    RouterEvent.NO_NEIGHBOURS: {RepairState.LOST: RepairState.AT_REST},
+    RouterEvent.TOOK_OFF: {state: RepairState.FLYING for state in RepairState},
+    RouterEvent.LANDED: {RepairState.FLYING: RepairState.AT_REST},
     RouterEvent.ANTENNA_OFF: _ALL_BUT_FLYING_TO_REST,
 }
 """An event without an entry leaves the repair unchanged."""
@@ -122,8 +122,8 @@ class RouterStates:
     """
 
     def __init__(self) -> None:
-        self.link = Link.SEARCHING
-        self.repair = Repair.AT_REST
+        self.link = ConnectionState.SEARCHING
+        self.repair = RepairState.AT_REST
         self.connected = False  # the gateway answered the last heartbeat, or may still answer it
         self.awaiting = False  # a heartbeat to the gateway is under way
         self.nothing_to_repair = False  # connected, and the repair at rest
@@ -142,4 +142,4 @@ class RouterStates:
         self.link, self.repair = link, repair
         self.connected = link in CONNECTED_LINKS
         self.awaiting = link in AWAITING_LINKS
-        self.nothing_to_repair = self.connected and repair is Repair.AT_REST
+        self.nothing_to_repair = self.connected and repair is RepairState.AT_REST

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Callable, Dict, Generator, List, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.console.orders import MeshControls, OrderRefused
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus, position_is_known
@@ -194,9 +194,9 @@ def _know_fallback(mesh: MeshStatus, group: Sequence[int], lost: int) -> bool:
 
 def _pace(group: Sequence[NodeStatus]) -> float:
     states = {REPAIR_STATES[node.repair_state] for node in group}
-    if Repair.FLYING in states:
+    if RepairState.FLYING in states:
         return _FLYING
-    if states & {Repair.ASKING, Repair.NEGOTIATING, Repair.WATCHING}:
+    if states & {RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING}:
         return _BIDDING
     soon = any(node.emergency_in < _SLOW_DOWN_S for node in group)
     return _FLYING if soon else _WAITING

@@ -17,8 +17,8 @@ from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.communication.messages import BODY_BYTES
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
+from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import Hop, IdealDisc
-from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
 RANGE_M = 9.0
@@ -27,7 +27,7 @@ CONNECT_WITHIN_S = 120.0
 END_WITHIN_S = 600.0  # of the messages
 
 
-class Case(NamedTuple):
+class DataCase(NamedTuple):
     """One row of the table."""
 
     rate: str
@@ -37,7 +37,7 @@ class Case(NamedTuple):
     reliable: bool
 
 
-class Outcome(NamedTuple):
+class Throughput(NamedTuple):
     """The result of a case."""
 
     kbit_s: float  # of payload, for all flows together
@@ -99,21 +99,25 @@ def bound_kbit_s(settings: RadioSettings, hops: int) -> float:
     return MAX_MESSAGE_BYTES * 8 / packets / settings.acknowledged_s / at_a_time / 1e3
 
 
-def measure(case: Case, messages: int, seed: int) -> Outcome:
+def measure(case: DataCase, messages: int, seed: int) -> Throughput:
     """Send this many messages of 1024 bytes in total from the end of a line to its gateway.
 
     With several flows the messages come from the last nodes of the line in turn.
     """
     settings = RadioSettings(data_rate=DATA_RATES[case.rate])
     rng = random.Random(f"{seed} loss")
-    mesh = EmulatedMesh(VirtualClock(), LossyDisc(RANGE_M, case.loss, rng), seed, settings=settings)
+    mesh = EmulatedMesh(
+        CooperativeClock(), LossyDisc(RANGE_M, case.loss, rng), seed, settings=settings
+    )
     try:
         return _measured(mesh, case, messages, settings)
     finally:
         mesh.stop()
 
 
-def _measured(mesh: EmulatedMesh, case: Case, messages: int, settings: RadioSettings) -> Outcome:
+def _measured(
+    mesh: EmulatedMesh, case: DataCase, messages: int, settings: RadioSettings
+) -> Throughput:
     mesh.add_gateway(0, (0.0, 0.0, 0.0))
     for node in range(1, case.hops + 1):
         mesh.add_router(node, (SPACING_M * node, 0.0, 0.0))
@@ -139,7 +143,7 @@ def _measured(mesh: EmulatedMesh, case: Case, messages: int, settings: RadioSett
     delivered = len(received) / messages
     if case.reliable:
         delivered = sum(t.state is TicketState.DELIVERED for t in tickets) / messages
-    return Outcome(
+    return Throughput(
         len(received) * MAX_MESSAGE_BYTES * 8 / took_s / 1e3,
         delivered,
         bound_kbit_s(settings, case.hops),
@@ -159,10 +163,10 @@ def _hand_in(
     mesh.nodes[node].submit(hand_in)
 
 
-def cases() -> list[Case]:
+def cases() -> list[DataCase]:
     """The rows of the table in docs/performance.md."""
     return [
-        Case(rate, hops, flows, loss, reliable)
+        DataCase(rate, hops, flows, loss, reliable)
         for rate in DATA_RATES
         for hops in (1, 2, 4, 8)
         for flows in (1, 10)

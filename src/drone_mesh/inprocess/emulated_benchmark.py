@@ -10,10 +10,10 @@ from pathlib import Path
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.emulator.measured import measured_curve
 from drone_mesh.nrf24.emulator.trace import FrameTrace
-from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
@@ -85,7 +85,7 @@ def _grid(mesh: EmulatedMesh, nodes: int, spacing_m: float) -> None:
 def main(argv: list[str] | None = None) -> int:
     """Run it and print the result."""
     arguments = _arguments(argv)
-    clock = WallClock() if arguments.wall else VirtualClock()
+    clock = WallClock() if arguments.wall else CooperativeClock()
     settings = RadioSettings(data_rate=DATA_RATES[arguments.rate])
     rng = random.Random(f"{arguments.seed} links")
     links = _links(arguments.links, rng, settings.data_rate.value)

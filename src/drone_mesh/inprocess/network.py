@@ -32,7 +32,7 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.node import Node, NoInternet
+from drone_mesh.inprocess.node import InProcessNode, NoInternet
 from drone_mesh.inprocess.oracle import Oracle
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir
@@ -113,7 +113,7 @@ class Network:
         else:
             raise ConfigurationError(f"invalid radio {radio!r}: use disc or shared")
         self._link_map = LinkMap(self.clock, self.links)
-        self.nodes: dict[int, Node] = {}
+        self.nodes: dict[int, InProcessNode] = {}
         self.events: list[MeshEvent] = []
         self.received: dict[int, list[ReceivedMessage]] = {}  # by receiver, in order
 
@@ -163,12 +163,12 @@ class Network:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
         place = Location(y, x, 0.0)
-        node = Node(self.clock, self.air, node_id, place, radio_rng, gateway, why_not_fly)
+        node = InProcessNode(self.clock, self.air, node_id, place, radio_rng, gateway, why_not_fly)
         self._install(node, node_id)
         self.nodes[node_id] = node
-        self.clock.call_at(start_s, Node.start, node)
+        self.clock.call_at(start_s, InProcessNode.start, node)
 
-    def _install(self, node: Node, node_id: int) -> None:
+    def _install(self, node: InProcessNode, node_id: int) -> None:
         """The mesh software of one node."""
         antenna: InProcessAntenna | SharedAntenna | SealedAntenna = node.antenna
         keys = self._key(node_id) if callable(self._key) else self._key

@@ -1,4 +1,4 @@
-"""Node: one drone of the in-process network with its mesh software."""
+"""One drone of the in-process network with its mesh software."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class NoInternet(IInternetConnection):
         """Does nothing."""
 
 
-class Node:
+class InProcessNode:
     """One drone of the network with its mesh software, driven by the virtual clock."""
 
     def __init__(

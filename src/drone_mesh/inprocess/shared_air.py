@@ -17,7 +17,7 @@ from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
-from drone_mesh.nrf24.medium_access import ALL_NODES, Outgoing
+from drone_mesh.nrf24.medium_access import ALL_NODES, OutgoingPacket
 from drone_mesh.nrf24.settings import RadioSettings
 
 
@@ -29,7 +29,7 @@ class Transmission:
     def __init__(
         self,
         sender: SharedRadio,
-        packet: Outgoing,
+        packet: OutgoingPacket,
         answers: SharedRadio | None,
         start_s: float,
         end_s: float,
@@ -121,7 +121,7 @@ class SharedAir:
     # Frames ----------------------------------------------------------------------------------
 
     def transmit(
-        self, sender: SharedRadio, packet: Outgoing, answers: SharedRadio | None = None
+        self, sender: SharedRadio, packet: OutgoingPacket, answers: SharedRadio | None = None
     ) -> None:
         """Start sending a frame now."""
         now_s = self.clock.now_s

@@ -19,7 +19,7 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
-from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, MediumAccess, Outgoing, Priority
+from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, MediumAccess, OutgoingPacket, Priority
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.registers import FIFO_DEPTH
 from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
@@ -61,12 +61,12 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         self._mesh: IMeshNetwork | None = None
         self.powered = True
         self._planned_s = math.inf
-        self._trying: Outgoing | None = None
+        self._trying: OutgoingPacket | None = None
         self._retransmits = 0
         self._ard_s = 0.0
         self._ce_rose_s = 0.0
         self._answered = False
-        self._last_taken: Outgoing | None = None  # the packet that came last on the own address
+        self._last_taken: OutgoingPacket | None = None  # the last packet on the own address
         self._unread = 0  # payloads in the FIFO
         self._radio = RadioStatistics()
         self._meter = ChannelMeter(self._clock.now_s)
@@ -156,7 +156,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         self._ce_rose_s = self._clock.now_s + self._tx_delay_s + PREPARE_S
         self._clock.call_at(self._ce_rose_s + SETTLING_S, self._send_frame, packet)
 
-    def _send_frame(self, packet: Outgoing) -> None:
+    def _send_frame(self, packet: OutgoingPacket) -> None:
         if packet is self._trying:
             self._radio.airtime_s += self._settings.frame_s
             self._air.transmit(self, packet)
@@ -248,7 +248,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         self._radio.airtime_s += self._settings.answer_frame_s
         self._air.transmit(self, frame.packet, answers=frame.sender)
 
-    def _read(self, arrived: tuple[int, Outgoing]) -> None:
+    def _read(self, arrived: tuple[int, OutgoingPacket]) -> None:
         self._unread -= 1
         self._radio.received += 1
         sender_id, packet = arrived

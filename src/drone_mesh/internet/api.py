@@ -95,8 +95,8 @@ class GoalSent(OrderSent):
     earth: Optional[EarthGoal] = Field(description="The same in degrees; null: no origin.")
 
 
-class NodeReport(BaseModel):
-    """One node as known to the gateway."""
+class NodeRoute(BaseModel):
+    """A node and the gateway's route to it."""
 
     id: int
     next_hop: Optional[int] = Field(description="The neighbour that leads to it; null: no route.")
@@ -108,7 +108,7 @@ class NodeReports(BaseModel):
     """All nodes known to the gateway, except itself."""
 
     gateway: int
-    nodes: List[NodeReport]
+    nodes: List[NodeRoute]
 
 
 def make_api(
@@ -244,9 +244,9 @@ def _report_nodes(gateway: IGatewayCommands, now_s: float) -> NodeReports:
     )
 
 
-def _report_node(node: KnownNode, now_s: float) -> NodeReport:
+def _report_node(node: KnownNode, now_s: float) -> NodeRoute:
     heard = math.isfinite(node.heard_s)
-    return NodeReport(
+    return NodeRoute(
         id=node.node_id,
         next_hop=None if node.next_hop == NO_ROUTE else node.next_hop,
         hops=None if node.hops == NO_ROUTE else node.hops,

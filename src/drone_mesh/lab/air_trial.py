@@ -15,8 +15,8 @@ from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
+from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
-from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 
 CHIPS, MODEL, DISC = "chips", "model", "disc"
@@ -82,7 +82,7 @@ class ChipMesh:
 
     def __init__(self, trial: AirTrial) -> None:
         settings = RadioSettings(data_rate=data_rate(trial.rate))
-        self.mesh = EmulatedMesh(VirtualClock(), _links(trial), trial.seed, settings=settings)
+        self.mesh = EmulatedMesh(CooperativeClock(), _links(trial), trial.seed, settings=settings)
         self.mesh.add_gateway(GATEWAY, (-1.0, 0.0, 0.0))
         for index, (x, y) in enumerate(trial.router_places()):
             self.mesh.add_router(index + 1, (x, y, 0.0))

@@ -33,7 +33,7 @@ def animate_repair(states: Sequence[MeshStatus], record: RunRecord) -> str:
         return ""
     stride = -(-len(shown) // MOST_FRAMES)
     frames = [*shown[::stride], shown[-1]]
-    served = {look.now_s: look.served for look in record.looks}
+    served = {sample.now_s: sample.served for sample in record.samples}
     scale = _Scale(frames)
     seconds = FRAME_S * len(frames)
     parts = [

@@ -24,10 +24,10 @@ _SECRET = b"the key of a lab"
 KEY = MeshKey(_SECRET)
 
 
-class Case(enum.Enum):
-    """Whether there is a key, and the kind of attacker."""
+class Threat(enum.Enum):
+    """The kind of attacker, and whether the mesh has a key."""
 
-    NOBODY = "no attack"
+    NONE = "no attack"
     WITHOUT_KEY = "without key"
     WITH_KEY = "with key"
     CAPTURED = "captured node"  # with its own keys, in a mesh with a key
@@ -45,13 +45,13 @@ class Damage(NamedTuple):
     metres: float  # distance of the farthest of them
 
 
-def trial(name: str, case: Case, seed: int) -> Damage:
+def trial(name: str, threat: Threat, seed: int) -> Damage:
     """One attack: on a mesh without a key, with one, or with one by a captured node."""
     attack = ATTACKS[name]
     shared = attack is invented_ids  # where an answer to an absent node costs airtime
     radio = "shared" if shared else "disc"
     network = Network(
-        seed, radio=radio, key=keys_of if case in (Case.WITH_KEY, Case.CAPTURED) else None
+        seed, radio=radio, key=keys_of if threat in (Threat.WITH_KEY, Threat.CAPTURED) else None
     )
     if attack in (highest_bid, plausible_bid):
         network.add_gateway(0, 0.0, 0.0)
@@ -67,11 +67,11 @@ def trial(name: str, case: Case, seed: int) -> Damage:
     network.run_for(20.0)
     places = {node: network.location(node) for node in network.nodes}
     stranger = Stranger(network, STRANGER, *at)
-    if case is Case.CAPTURED:
+    if threat is Threat.CAPTURED:
         stranger.join_with(KEY.for_node(STRANGER))
-    stranger.mute = case is Case.NOBODY
+    stranger.mute = threat is Threat.NONE
     stranger.switch_on()
-    if case is Case.CAPTURED:
+    if threat is Threat.CAPTURED:
         _get_acquainted(stranger)
     shares = _Sampler(network, stranger.swallows)
     ordered = attack(stranger)
@@ -96,15 +96,15 @@ def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> 
 
 def table(names: Sequence[str], runs: int) -> Iterator[str]:
     """The lines of a Markdown table: means over the runs, and the farthest of all drones."""
-    yield "| attack | " + " | ".join(case.value for case in Case) + " |"
-    yield "|---" * (1 + len(Case)) + "|"
+    yield "| attack | " + " | ".join(threat.value for threat in Threat) + " |"
+    yield "|---" * (1 + len(Threat)) + "|"
     for name in names:
         cells = []
-        for case in Case:
-            if case is Case.CAPTURED and ATTACKS[name] in RECORDING:
+        for threat in Threat:
+            if threat is Threat.CAPTURED and ATTACKS[name] in RECORDING:
                 cells.append("")  # a captured node replays recordings like any other radio
                 continue
-            damage = [trial(name, case, seed) for seed in range(runs)]
+            damage = [trial(name, threat, seed) for seed in range(runs)]
             cells.append(_in_words(damage))
         yield f"| {name} | " + " | ".join(cells) + " |"
 
@@ -170,14 +170,14 @@ class _Sampler:
         self._network = network
         self._swallow = swallow
         self._shares: list[float] | None = []
-        self._look()
+        self._sample()
 
     def mean(self) -> float:
         """The mean so far; ends the sampling."""
         shares, self._shares = self._shares, None
         return statistics.fmean(shares or [0.0])
 
-    def _look(self, _: object = None) -> None:
+    def _sample(self, _: object = None) -> None:
         if self._shares is not None:
             self._shares.append(share_cut_off(self._network, self._swallow))
-            self._network.clock.call_at(self._network.now_s() + 1.0, self._look, None)
+            self._network.clock.call_at(self._network.now_s() + 1.0, self._sample, None)

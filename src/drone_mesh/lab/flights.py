@@ -9,7 +9,7 @@ from typing import Callable
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, FlightPath
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.look import gateways_of, physical_graph
+from drone_mesh.lab.network_sample import gateways_of, physical_graph
 
 EVENTS_BACK = 20  # a flight's event is among this many latest ones when it starts
 

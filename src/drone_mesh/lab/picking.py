@@ -7,13 +7,13 @@ import random
 from typing import Sequence
 
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.look import gateways_of, physical_graph
-from drone_mesh.lab.medium import Medium
+from drone_mesh.lab.impairments import Impairments
+from drone_mesh.lab.network_sample import gateways_of, physical_graph
 from drone_mesh.lab.scenario import Pick
 
 
 def pick_drones(
-    pick: Pick, alive: bool, network: Network, medium: Medium, rng: random.Random
+    pick: Pick, alive: bool, network: Network, impairments: Impairments, rng: random.Random
 ) -> list[int]:
     """The drones with power (or without, for `alive=False`) that this fault affects, in order.
 
@@ -42,7 +42,7 @@ def pick_drones(
         near = {n for g in gateways for n in physical_graph(network).near.get(g, ())}
         fit = [n for n in fit if n in near]
     elif pick.pick == "busiest":
-        fit.sort(key=lambda n: (-medium.sent_by.get(n, 0), n))
+        fit.sort(key=lambda n: (-impairments.sent_by.get(n, 0), n))
     return fit[:number]
 
 

@@ -24,7 +24,7 @@ PLACES_HEADER = ["id", "x", "y", "role"]
 Draw = Callable[[Layout, float, Callable[[], float]], List[Tuple[float, float]]]
 
 
-class StartPlace(NamedTuple):
+class StartPoint(NamedTuple):
     """The start position of one drone, in metres."""
 
     node_id: int
@@ -35,18 +35,18 @@ class StartPlace(NamedTuple):
 
 def draw_places(
     layout: Layout, range_m: float, rng: random.Random, obstacles: Obstacles | None = None
-) -> list[StartPlace]:
+) -> list[StartPoint]:
     """All drones by id. Raises ConfigurationError for a layout that cannot be drawn.
 
     Random positions avoid the obstacles; "connected" includes the obstacles' effect on links.
     """
     if layout.kind == "file":
-        return [StartPlace(int(i), x, y, bool(g)) for i, x, y, g in layout.places or ()]
+        return [StartPoint(int(i), x, y, bool(g)) for i, x, y, g in layout.places or ()]
     if layout.kind == "casus":
         return _casus(layout)
     if layout.kind == "line":
         drones, step_m = range(layout.drones), layout.spacing_m
-        places = [StartPlace(i, i * step_m, 0.0, i < layout.gateways) for i in drones]
+        places = [StartPoint(i, i * step_m, 0.0, i < layout.gateways) for i in drones]
     elif layout.kind == "grid":
         places = _grid(layout)
     else:
@@ -60,7 +60,7 @@ def rows_of_file(path: Path) -> list[list[float]]:
     return [[float(p.node_id), p.x, p.y, float(p.gateway)] for p in read_places(path)]
 
 
-def read_places(path: Path) -> list[StartPlace]:
+def read_places(path: Path) -> list[StartPoint]:
     """A CSV file with the header id,x,y,role; role is gateway or router."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -69,7 +69,7 @@ def read_places(path: Path) -> list[StartPlace]:
         raise ConfigurationError(f"layout file {path}: {error}") from error
     if not rows or [name.strip() for name in rows[0]] != PLACES_HEADER:
         raise ConfigurationError(f"layout file {path}, line 1: expected {','.join(PLACES_HEADER)}")
-    places: dict[int, StartPlace] = {}
+    places: dict[int, StartPoint] = {}
     for number, row in enumerate(rows[1:], start=2):
         if not row:
             continue
@@ -82,34 +82,34 @@ def read_places(path: Path) -> list[StartPlace]:
             raise ConfigurationError(f"{where}: id {node_id} is out of range or a duplicate")
         if role not in ("gateway", "router") or not (math.isfinite(x) and math.isfinite(y)):
             raise ConfigurationError(f"{where}: expected finite x, y and role gateway or router")
-        places[node_id] = StartPlace(node_id, x, y, role == "gateway")
+        places[node_id] = StartPoint(node_id, x, y, role == "gateway")
     if not any(place.gateway for place in places.values()):
         raise ConfigurationError(f"layout file {path}: no gateway")
     return [places[node_id] for node_id in sorted(places)]
 
 
-def _casus(layout: Layout) -> list[StartPlace]:
+def _casus(layout: Layout) -> list[StartPoint]:
     """The drones of a DroneManager layout at their positions, and its gateway."""
     try:
         orders = Layouts.shipped().orders(layout.case)
     except UnknownCase as error:
         raise ConfigurationError(f"layout casus: {error}") from error
     fleet = plan_fleet(layout.gateways, 0, 1, 1.0)
-    places = [StartPlace(g.node_id, g.longitude, g.latitude, True) for g in fleet]
+    places = [StartPoint(g.node_id, g.longitude, g.latitude, True) for g in fleet]
     taken = {place.node_id for place in places}
     places += [
-        StartPlace(order.node_id, order.goal.longitude, order.goal.latitude, False)
+        StartPoint(order.node_id, order.goal.longitude, order.goal.latitude, False)
         for order in orders
         if order.node_id not in taken
     ]
     return sorted(places)
 
 
-def _grid(layout: Layout) -> list[StartPlace]:
+def _grid(layout: Layout) -> list[StartPoint]:
     routers = layout.drones - layout.gateways
     columns = layout.columns or max(1, math.ceil(math.sqrt(routers)))
     fleet = plan_fleet(layout.gateways, routers, columns, layout.spacing_m)
-    return [StartPlace(p.node_id, p.longitude, p.latitude, p.role is Role.GATEWAY) for p in fleet]
+    return [StartPoint(p.node_id, p.longitude, p.latitude, p.role is Role.GATEWAY) for p in fleet]
 
 
 def _connected_points(
@@ -201,7 +201,7 @@ def _clusters(
 
 def _with_gateways(
     layout: Layout, points: list[tuple[float, float]], rng: random.Random
-) -> list[StartPlace]:
+) -> list[StartPoint]:
     """The drones nearest to the wanted positions become gateways and get the lowest ids."""
     if layout.gateway_at == "random":
         order = rng.sample(range(len(points)), len(points))
@@ -214,11 +214,11 @@ def _with_gateways(
     chosen = order[: layout.gateways]
     rest = [index for index in range(len(points)) if index not in set(chosen)]
     return [
-        StartPlace(node_id, *points[index], node_id < layout.gateways)
+        StartPoint(node_id, *points[index], node_id < layout.gateways)
         for node_id, index in enumerate(chosen + rest)
     ]
 
 
-def _shuffled(places: list[StartPlace], rng: random.Random) -> list[StartPlace]:
+def _shuffled(places: list[StartPoint], rng: random.Random) -> list[StartPoint]:
     ids = rng.sample(range(len(places)), len(places))
     return sorted(place._replace(node_id=ids[place.node_id]) for place in places)

@@ -11,12 +11,12 @@ from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.lab import scenario as given
-from drone_mesh.lab.medium import Medium
+from drone_mesh.lab.impairments import Impairments
 
 MARGIN_STEP_DB = 0.1  # of the fading table
 
 
-def obstacles_of(part: given.Obstacles) -> Obstacles:
+def obstacles_of(part: given.ObstacleSettings) -> Obstacles:
     """The boxes of a scenario. A material is one of CUT_DB; `cut_db` is the loss of brick."""
     boxes = [box.to_box(part.cut_db) for box in part.boxes]
     return Obstacles(boxes, part.radio == "block", part.metre_db, part.exponent, part.ceiling_m)
@@ -46,7 +46,9 @@ def _faded(steps: int, fading: str, k_db: float) -> float:
     return float(ncx2.sf(2 * (k + 1) * below, 2, 2 * k))
 
 
-def put_obstacles(network: Network, medium: Medium, scenario: given.Scenario) -> Planner | None:
+def put_obstacles(
+    network: Network, impairments: Impairments, scenario: given.Scenario
+) -> Planner | None:
     """Apply the boxes to links and flights; None if the scenario has neither boxes nor fading.
 
     Call this before the nodes start.
@@ -57,7 +59,7 @@ def put_obstacles(network: Network, medium: Medium, scenario: given.Scenario) ->
     obstacles = obstacles_of(part)
     range_m = scenario.range_m
     if part.boxes:
-        medium.disc.sees = lambda a, b: (
+        impairments.disc.sees = lambda a, b: (
             obstacles.margin_db(a.to_vector(), b.to_vector(), range_m) > 0
         )
     if part.fading != "none":
@@ -66,7 +68,7 @@ def put_obstacles(network: Network, medium: Medium, scenario: given.Scenario) ->
             margin_db = obstacles.margin_db(a.to_vector(), b.to_vector(), range_m)
             return success(margin_db, part.fading, part.rician_k_db)
 
-        medium.arrives = arrives
+        impairments.arrives = arrives
     planner = Planner(obstacles)
     for node_id, node in network.nodes.items():
         node.drone.plan_flight = functools.partial(planner.plan, node_id)

@@ -7,10 +7,10 @@ from typing import Mapping, NamedTuple, Sequence, Tuple
 
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.graph import Graph
-from drone_mesh.lab.look import Look
-from drone_mesh.lab.medium import Traffic
+from drone_mesh.lab.impairments import Traffic
+from drone_mesh.lab.network_sample import NetworkSample
 from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.timeline import Happened, OrderSent
+from drone_mesh.lab.timeline import Happened, OrderAttempt
 from drone_mesh.state.model import EventRecord
 
 Place = Tuple[float, float, float]  # x, y, z in metres
@@ -49,12 +49,12 @@ class RunRecord:
     after_fault: Graph | None  # right after it
     end: Topology
     fault_s: float | None  # when it was
-    looks: Sequence[Look]
+    samples: Sequence[NetworkSample]
     happened: Sequence[Happened]
     events: Sequence[EventRecord]
     legs: Sequence[Leg]
     traffic: Mapping[int, Traffic]  # by message type
-    orders: Sequence[OrderSent]
+    orders: Sequence[OrderAttempt]
     collisions: int
     min_distance_m: float  # of two drones that were not as close at the start; inf: not measured
     end_s: float
@@ -69,15 +69,15 @@ class RunRecord:
         None: not before the end. A run without such a fault is healed from its start.
         """
         since_s: float | None = None
-        for look in self.looks:
-            if self.fault_s is not None and look.now_s < self.fault_s:
+        for sample in self.samples:
+            if self.fault_s is not None and sample.now_s < self.fault_s:
                 continue
-            if len(look.served) < len(look.alive):
+            if len(sample.served) < len(sample.alive):
                 since_s = None
             else:
                 if since_s is None:
-                    since_s = look.now_s
-                if look.now_s - since_s >= HOLD_S:
+                    since_s = sample.now_s
+                if sample.now_s - since_s >= HOLD_S:
                     return since_s
         return None
 
@@ -85,20 +85,20 @@ class RunRecord:
         """Each router's gaps in service since the fault, or since all were first served."""
         begin_s = self.fault_s
         if begin_s is None:
-            begin_s = next((look.now_s for look in self.looks if look.share == 1.0), None)
+            begin_s = next((sample.now_s for sample in self.samples if sample.share == 1.0), None)
         if begin_s is None:
             return []
         open_since: dict[int, float] = {}
         gaps = []
-        for look in self.looks:
-            if look.now_s < begin_s:
+        for sample in self.samples:
+            if sample.now_s < begin_s:
                 continue
-            for node in sorted(open_since.keys() & look.served):
-                gaps.append(ServiceGap(node, open_since.pop(node), look.now_s))
+            for node in sorted(open_since.keys() & sample.served):
+                gaps.append(ServiceGap(node, open_since.pop(node), sample.now_s))
             for node in list(open_since):
-                if node not in look.alive:
+                if node not in sample.alive:
                     del open_since[node]  # it died, so there is nothing left to repair
-            for node in sorted(look.alive - look.served):
-                open_since.setdefault(node, look.now_s)
+            for node in sorted(sample.alive - sample.served):
+                open_since.setdefault(node, sample.now_s)
         gaps += [ServiceGap(node, since_s, None) for node, since_s in open_since.items()]
         return sorted(gaps, key=lambda gap: (gap.lost_s, gap.node))

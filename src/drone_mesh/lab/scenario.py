@@ -198,7 +198,7 @@ class Churn(Part):
     for_s: Optional[Above0] = None
 
 
-class Order(Part):
+class FlightOrders(Part):
     """Flight orders through a gateway: one drone to one place, or random short ones."""
 
     id: Optional[NodeId] = None
@@ -208,7 +208,7 @@ class Order(Part):
     for_s: Optional[Above0] = None
 
     @model_validator(mode="after")
-    def _says_which(self) -> "Order":
+    def _says_which(self) -> "FlightOrders":
         if (self.id is None) != (self.to is None) or (self.id is None) == (self.every_s is None):
             raise ValueError("order needs id and to, or every_s")
         return self
@@ -239,7 +239,7 @@ class Fault(Part):
     loss: Optional[Loss] = None
     battery: Optional[Battery] = None
     churn: Optional[Churn] = None
-    order: Optional[Order] = None
+    order: Optional[FlightOrders] = None
     wind: Optional[Wind] = None
 
     @field_validator("when")
@@ -269,7 +269,7 @@ class Fault(Part):
         return getattr(self, self.action)
 
 
-class Obstacles(Part):
+class ObstacleSettings(Part):
     """Boxes that block or attenuate the radio, and block flight."""
 
     path: Optional[str] = None  # a file of boxes, beside the experiment
@@ -294,7 +294,7 @@ class Scenario(Part):
     repair: str = DEFAULT_REPAIR
     repair_options: Repair = Repair()
     timing: Timing = Timing()
-    obstacles: Obstacles = Obstacles()
+    obstacles: ObstacleSettings = ObstacleSettings()
     faults: List[Fault] = []
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
     sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # sampling period of the network

@@ -14,10 +14,16 @@ from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.graph import Graph
-from drone_mesh.lab.look import Look, gateways_of, look_at, physical_graph, route_hops
-from drone_mesh.lab.medium import Medium
+from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.metrics import STACKED_M
-from drone_mesh.lab.places import StartPlace, draw_places
+from drone_mesh.lab.network_sample import (
+    NetworkSample,
+    gateways_of,
+    physical_graph,
+    route_hops,
+    sample_of,
+)
+from drone_mesh.lab.places import StartPoint, draw_places
 from drone_mesh.lab.propagation import obstacles_of, put_obstacles
 from drone_mesh.lab.record import RunRecord, Topology
 from drone_mesh.lab.scenario import Scenario
@@ -26,7 +32,7 @@ from drone_mesh.lab.timeline import Timeline
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.observation import describe_obstacles
 
-FLIGHT_LOOK_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
+FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
 OnStatus = Callable[[MeshStatus], None]
 
@@ -38,11 +44,13 @@ class Simulation:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self.scenario = scenario
         self.network = _network(scenario, streams)
-        self.medium = Medium(self.network, streams.of, scenario.radio.loss)
-        self._planner = put_obstacles(self.network, self.medium, scenario)
+        self.impairments = Impairments(self.network, streams.of, scenario.radio.loss)
+        self._planner = put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
-        self.timeline = Timeline(scenario, self.network, self.medium, self.flights, streams, self)
-        self._looks: list[Look] = []
+        self.timeline = Timeline(
+            scenario, self.network, self.impairments, self.flights, streams, self
+        )
+        self._samples: list[NetworkSample] = []
         self._start_places = self._places()
         self._start: Topology | None = None
         self._before: Topology | None = None
@@ -66,10 +74,10 @@ class Simulation:
         while network.clock.now_s < end_s:
             step += 1
             self._pass_time(min(end_s, step * scenario.sample_s))
-            look = self._look()
+            sample = self._take_sample()
             if self._start is None:
-                self._start = self._scene(look)._replace(places=self._start_places)
-            self.timeline.check(look)
+                self._start = self._scene(sample)._replace(places=self._start_places)
+            self.timeline.check(sample)
             yield network.clock.now_s
 
     def record(self) -> RunRecord:
@@ -82,13 +90,13 @@ class Simulation:
             start=self._start,
             before=self._before,
             after_fault=self._after_fault,
-            end=self._scene(self._looks[-1]),
+            end=self._scene(self._samples[-1]),
             fault_s=self.timeline.first_disruption_s,
-            looks=self._looks,
+            samples=self._samples,
             happened=self.timeline.happened,
             events=network.event_records(),
             legs=self.flights.legs,
-            traffic=self.medium.traffic,
+            traffic=self.impairments.traffic,
             orders=self.timeline.orders,
             collisions=len(self._pairs),
             min_distance_m=self._min_distance_m,
@@ -110,26 +118,26 @@ class Simulation:
         clock = self.network.clock
         while clock.now_s < until_s:
             if self.flights.in_the_air:
-                clock.run_until(min(until_s, clock.now_s + FLIGHT_LOOK_S))
+                clock.run_until(min(until_s, clock.now_s + FLIGHT_SAMPLE_S))
                 self._watch_distances()
             else:
                 clock.run_until(until_s)
 
-    def _look(self) -> Look:
-        look = look_at(self.network)
-        self._looks.append(look)
-        return look
+    def _take_sample(self) -> NetworkSample:
+        sample = sample_of(self.network)
+        self._samples.append(sample)
+        return sample
 
     def before_disruption(self) -> None:
         """A fault that must be healed is about to happen."""
         if self._before is None:
-            self._before = self._scene(look_at(self.network))
+            self._before = self._scene(sample_of(self.network))
 
     def after_disruption(self) -> None:
         """The fault has happened."""
         if self._after_fault is None:
             self._after_fault = physical_graph(self.network)
-        self._look()
+        self._take_sample()
 
     def _places(self) -> dict[int, tuple[float, float, float]]:
         return {
@@ -137,8 +145,8 @@ class Simulation:
             for node_id, place in ((n, self.network.location(n)) for n in self.network.nodes)
         }
 
-    def _scene(self, look: Look | None) -> Topology:
-        hops = {} if look is None else route_hops(self.network, look.served)
+    def _scene(self, sample: NetworkSample | None) -> Topology:
+        hops = {} if sample is None else route_hops(self.network, sample.served)
         return Topology(physical_graph(self.network), hops, self._places())
 
     def _watch_distances(self) -> None:
@@ -177,7 +185,7 @@ def _network(scenario: Scenario, streams: Streams) -> Network:
     return network
 
 
-def _places(scenario: Scenario, streams: Streams) -> list[StartPlace]:
+def _places(scenario: Scenario, streams: Streams) -> list[StartPoint]:
     obstacles = obstacles_of(scenario.obstacles) if scenario.obstacles.boxes else None
     return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
 

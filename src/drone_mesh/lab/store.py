@@ -28,7 +28,7 @@ class StoreError(MeshError):
     """The results folder cannot be used. The message gives the reason and the remedy."""
 
 
-class Table:
+class CsvLog:
     """An append-only CSV file whose rows are either complete or absent."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
@@ -93,9 +93,9 @@ class Store:
         self._take_lock()
         own = plan.own_metrics
         columns = [*FIRST_COLUMNS, *plan.parameter_columns, *metric_columns(own), *LAST_COLUMNS]
-        self.runs = Table(folder / RUNS, columns)
-        self.outages = Table(folder / OUTAGES, OUTAGE_COLUMNS)
-        self.failures = Table(folder / FAILURES, FAILURE_COLUMNS)
+        self.runs = CsvLog(folder / RUNS, columns)
+        self.outages = CsvLog(folder / OUTAGES, OUTAGE_COLUMNS)
+        self.failures = CsvLog(folder / FAILURES, FAILURE_COLUMNS)
         self.done = {row["run"] for row in self.runs.rows}
         self.failed = {row["run"] for row in self.failures.rows}
         self._drop_orphans()

@@ -12,8 +12,8 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.conditions import StartCondition, parse_condition
 from drone_mesh.lab.flights import Flights
-from drone_mesh.lab.look import Look, gateways_of
-from drone_mesh.lab.medium import Jamming, Medium
+from drone_mesh.lab.impairments import Impairments, Jamming
+from drone_mesh.lab.network_sample import NetworkSample, gateways_of
 from drone_mesh.lab.picking import pick_drones
 from drone_mesh.lab.scenario import Fault, Scenario
 from drone_mesh.lab.streams import Streams
@@ -31,7 +31,7 @@ class Happened(NamedTuple):
 
 
 @dataclass
-class OrderSent:
+class OrderAttempt:
     """One flight order: when it was sent, and whether a next hop took it."""
 
     at_s: float
@@ -56,16 +56,16 @@ class Timeline:
         self,
         scenario: Scenario,
         network: Network,
-        medium: Medium,
+        impairments: Impairments,
         flights: Flights,
         streams: Streams,
         witness: Witness,
     ) -> None:
         """Schedule the faults on the network's clock."""
         self.happened: list[Happened] = []
-        self.orders: list[OrderSent] = []
+        self.orders: list[OrderAttempt] = []
         self.first_disruption_s: float | None = None
-        self._network, self._medium, self._flights = network, medium, flights
+        self._network, self._impairments, self._flights = network, impairments, flights
         self._scenario, self._streams = scenario, streams
         self._witness = witness
         self._waiting: list[tuple[StartCondition, int]] = []
@@ -77,25 +77,25 @@ class Timeline:
             else:
                 self._waiting.append((parse_condition(str(fault.when)), index))
 
-    def check(self, look: Look) -> None:
-        """Start faults that wait for a condition; to be called with every look."""
+    def check(self, sample: NetworkSample) -> None:
+        """Start faults that wait for a condition; to be called with every sample."""
         if not self._waiting:
             return
-        self._note_events(look)
+        self._note_events(sample)
         waiting, self._waiting = self._waiting, []
         for condition, index in waiting:
             seen_s = self._seen.get(condition.event)
             if seen_s is None:
                 self._waiting.append((condition, index))
             else:
-                at_s = max(seen_s + condition.delay_s, look.now_s)
+                at_s = max(seen_s + condition.delay_s, sample.now_s)
                 self._network.clock.call_at(at_s, self._start, index)
 
-    def _note_events(self, look: Look) -> None:
-        if look.alive and look.served == look.alive:
-            self._seen.setdefault("all connected", look.now_s)
-            if self.first_disruption_s is not None and look.now_s > self.first_disruption_s:
-                self._seen.setdefault("healed", look.now_s)
+    def _note_events(self, sample: NetworkSample) -> None:
+        if sample.alive and sample.served == sample.alive:
+            self._seen.setdefault("all connected", sample.now_s)
+            if self.first_disruption_s is not None and sample.now_s > self.first_disruption_s:
+                self._seen.setdefault("healed", sample.now_s)
         flown = (MeshEventKind.FLIGHT_DECIDED, MeshEventKind.FLIGHT_ORDERED)
         for event in self._network.events[self._events_read :]:
             if event.kind in flown:
@@ -136,17 +136,17 @@ class Timeline:
             self._network.power(node, on)
 
     def _kill(self, fault: Fault, rng: random.Random) -> list[int]:
-        nodes = pick_drones(fault.what, True, self._network, self._medium, rng)
+        nodes = pick_drones(fault.what, True, self._network, self._impairments, rng)
         self._power(nodes, False)
         return nodes
 
     def _revive(self, fault: Fault, rng: random.Random) -> list[int]:
-        nodes = pick_drones(fault.what, False, self._network, self._medium, rng)
+        nodes = pick_drones(fault.what, False, self._network, self._impairments, rng)
         self._power(nodes, True)
         return nodes
 
     def _cut_link(self, fault: Fault, rng: random.Random) -> list[int]:
-        air, what = self._medium.disc, fault.what
+        air, what = self._impairments.disc, fault.what
         if what.between is not None:
             links = [tuple(what.between)]
         else:
@@ -165,7 +165,7 @@ class Timeline:
         return sorted({node for link in links for node in link})
 
     def _jam(self, fault: Fault, _rng: random.Random) -> list[int]:
-        what, jams = fault.what, self._medium.jams
+        what, jams = fault.what, self._impairments.jams
         jamming = Jamming((what.center[0], what.center[1]), what.radius_m, what.loss)
         jams.append(jamming)
         self._after(what.for_s, lambda _: jams.remove(jamming))
@@ -178,9 +178,9 @@ class Timeline:
         return [node]
 
     def _loss(self, fault: Fault, _rng: random.Random) -> list[int]:
-        medium, before = self._medium, self._medium.loss
-        medium.loss = fault.what.share
-        self._after(fault.what.for_s, lambda _: setattr(medium, "loss", before))
+        impairments, before = self._impairments, self._impairments.loss
+        impairments.loss = fault.what.share
+        self._after(fault.what.for_s, lambda _: setattr(impairments, "loss", before))
         return []
 
     def _battery(self, fault: Fault, rng: random.Random) -> list[int]:
@@ -263,7 +263,7 @@ class Timeline:
             (g for g in gateways_of(self._network) if self._network.nodes[g].antenna.powered), None
         )
         taken = gateway is not None and self._network.order(node, x, y, height, gateway)
-        self.orders.append(OrderSent(self._network.clock.now_s, node, taken))
+        self.orders.append(OrderAttempt(self._network.clock.now_s, node, taken))
 
     def _wind(self, fault: Fault, _rng: random.Random) -> list[int]:
         drones = [node.drone for node in self._network.nodes.values()]

@@ -12,7 +12,7 @@ from drone_mesh.nrf24.access_rules import AccessRules
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch
-from drone_mesh.nrf24.medium_access import Fate, MediumAccess, Outgoing, Priority
+from drone_mesh.nrf24.medium_access import Fate, MediumAccess, OutgoingPacket, Priority
 from drone_mesh.nrf24.pace import access_rules
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import RadioSettings
@@ -114,7 +114,7 @@ class NRF24LowLevelInterface:
         """
         _check(payload)
         access = self.access
-        packet = Outgoing(node_id, payload, Priority.CONTROL, self._runtime.now_s(), 0.0)
+        packet = OutgoingPacket(node_id, payload, Priority.CONTROL, self._runtime.now_s(), 0.0)
         while True:
             retransmits, delay = access.retransmits()
             done = self.try_once(node_id, payload, packet.tries > 0, retransmits, delay)

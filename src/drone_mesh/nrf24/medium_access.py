@@ -65,7 +65,7 @@ class Fate(enum.Enum):
     GIVEN_UP = "given up"
 
 
-class Outgoing:
+class OutgoingPacket:
     """One packet on its way out."""
 
     __slots__ = ("not_before_s", "payload", "priority", "queued_s", "receiver", "tries")
@@ -96,7 +96,7 @@ class MediumAccess:
     def __init__(self, rules: AccessRules, rng: random.Random) -> None:
         self.rules = rules
         self._rng = rng
-        self._lines: dict[int, deque[Outgoing]] = {}  # by receiver
+        self._lines: dict[int, deque[OutgoingPacket]] = {}  # by receiver
         self._waiting = 0
         self._waiting_data = 0
         self._free_s = -math.inf  # the gap after the last packet ends
@@ -138,7 +138,7 @@ class MediumAccess:
             not_before_s += self._rng.random() * rules.answer_jitter_s
         if line is None:
             line = self._lines[receiver] = deque()
-        packet = Outgoing(receiver, payload, priority, now_s, not_before_s)
+        packet = OutgoingPacket(receiver, payload, priority, now_s, not_before_s)
         if priority is Priority.DATA:
             self._waiting_data += 1
             line.append(packet)
@@ -192,7 +192,7 @@ class MediumAccess:
         first_s = min(line[0].not_before_s for line in self._lines.values())
         return max(first_s, self._free_s, self._yields_until_s)
 
-    def due(self, now_s: float) -> Outgoing | None:
+    def due(self, now_s: float) -> OutgoingPacket | None:
         """The packet to try now. It stays in its line until `tried` says otherwise."""
         if not self._waiting or now_s < max(self._free_s, self._yields_until_s):
             return None
@@ -204,7 +204,7 @@ class MediumAccess:
         self._train_left = int(quiet * self.rules.train)
         return packet
 
-    def following(self, before: Outgoing, now_s: float) -> Outgoing | None:
+    def following(self, before: OutgoingPacket, now_s: float) -> OutgoingPacket | None:
         """The packet that follows `before`, which was just delivered, in the same train."""
         line = self._lines.get(before.receiver)
         self._train_left -= 1
@@ -220,7 +220,7 @@ class MediumAccess:
             return None
         return after
 
-    def tried(self, packet: Outgoing, acknowledged: bool, now_s: float) -> Fate:
+    def tried(self, packet: OutgoingPacket, acknowledged: bool, now_s: float) -> Fate:
         """The result of a try that has just ended."""
         rules, receiver = self.rules, packet.receiver
         packet.tries += 1
@@ -278,7 +278,7 @@ class MediumAccess:
         """
         return self.rules.train_retransmits, self.rules.retransmit_delays[0]
 
-    def clear(self) -> list[Outgoing]:
+    def clear(self) -> list[OutgoingPacket]:
         """Give up all that waits."""
         dropped = [packet for line in self._lines.values() for packet in line]
         self._lines.clear()
@@ -294,7 +294,7 @@ class MediumAccess:
         mean_s = rules.first_pause_s / (1.0 - self.contention) ** 2 * 2.0 ** (tries - 1)
         return min(mean_s, rules.longest_pause_s) * 2.0 * self._rng.random()
 
-    def _remove(self, packet: Outgoing) -> None:
+    def _remove(self, packet: OutgoingPacket) -> None:
         line = self._lines.get(packet.receiver)
         if line is None or packet not in line:
             return  # all was given up meanwhile
@@ -305,7 +305,7 @@ class MediumAccess:
             del self._lines[packet.receiver]
 
 
-def _before_untried_data(line: deque[Outgoing]) -> int:
+def _before_untried_data(line: deque[OutgoingPacket]) -> int:
     """The place in a line for a packet of the mesh: before all data that was not tried yet."""
     place = len(line)
     while place and line[place - 1].priority is Priority.DATA and not line[place - 1].tries:

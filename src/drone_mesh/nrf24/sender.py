@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Callable
 
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, InTrain, Outgoing, Priority
+from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, InTrain, OutgoingPacket, Priority
 from drone_mesh.nrf24.runtime import Runtime, Task
 
 
@@ -97,7 +97,7 @@ class Sender:
             else:
                 self._try(packet)
 
-    def _try(self, packet: Outgoing) -> None:
+    def _try(self, packet: OutgoingPacket) -> None:
         radio, access = self._radio, self._access
         if packet.receiver == ALL_NODES:
             done = radio.broadcast(packet.payload)
@@ -124,7 +124,7 @@ class Sender:
             fate = access.tried(packet, done, self._runtime.now_s())
         self._settle(packet, fate)
 
-    def _settle(self, packet: Outgoing, fate: Fate) -> None:
+    def _settle(self, packet: OutgoingPacket, fate: Fate) -> None:
         """Report the outcome of a packet."""
         if fate is Fate.GIVEN_UP:
             self._radio.drop()

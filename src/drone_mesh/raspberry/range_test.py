@@ -33,7 +33,7 @@ _FOLLOW, _FOLLOWING, _RETURN = b"RANGE", b"MOVED", b"ENDED"
 _RATES = tuple(DataRate)
 
 
-class _Request(NamedTuple):
+class _RateRequest(NamedTuple):
     from_: int
     what: bytes
     rate: DataRate
@@ -194,7 +194,7 @@ def answer(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
             yield said
 
 
-def _follow(radio: BenchRadio, request: _Request) -> str:
+def _follow(radio: BenchRadio, request: _RateRequest) -> str:
     """Confirm and go to the rate; stay if the chip does not have it."""
     base = radio.settings
     there = dataclasses.replace(base, data_rate=request.rate)
@@ -211,7 +211,7 @@ def _follow(radio: BenchRadio, request: _Request) -> str:
     return f"node {request.from_} measures at {_kbit_s(there)}"
 
 
-def _request_in(payload: bytes | None, me: int) -> _Request | None:
+def _request_in(payload: bytes | None, me: int) -> _RateRequest | None:
     """What a packet of the measurement asks for; None: it is no such packet, or not for me."""
     if payload is None or len(payload) != PAYLOAD_BYTES:
         return None
@@ -221,7 +221,7 @@ def _request_in(payload: bytes | None, me: int) -> _Request | None:
         return None
     if what not in (_FOLLOW, _FOLLOWING, _RETURN):
         return None
-    return _Request(from_, what, _RATES[rate], hold_s)
+    return _RateRequest(from_, what, _RATES[rate], hold_s)
 
 
 def _payload(from_: int, to: int, body: bytes = b"") -> bytes:

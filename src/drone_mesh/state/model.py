@@ -13,11 +13,11 @@ from typing import Sequence
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.roles import Role
 
 UNKNOWN_POSITION = (math.nan, math.nan, math.nan)
-REPAIR_STATES = tuple(Repair)  # in the order of the constants of NodeState.msg
+REPAIR_STATES = tuple(RepairState)  # in the order of the constants of NodeState.msg
 
 
 @dataclass

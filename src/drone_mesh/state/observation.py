@@ -11,7 +11,7 @@ from drone_mesh.air.box import Box
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, NodeStatus, ObstacleStatus
@@ -49,7 +49,7 @@ def describe_component(
     status.repair = repair.in_words(now_s)
     status.repair_state = REPAIR_STATES.index(repair.state)
     status.bid, status.place_of = repair.bid, repair.place_of
-    waits = repair.state is Repair.LOST
+    waits = repair.state is RepairState.LOST
     status.emergency_in = repair.emergency_s - now_s if waits else math.inf
     heard_s = component.get_neighbours()
     # numpy, because a crowd of 254 has 36,000 neighbours to list twice a second.

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Iterable, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus
 
@@ -19,7 +19,7 @@ _BIDS = {
     "thesis": ("its distance to the gateway", " m", "is farthest"),
     "nearest": ("how near it is to that place", "", "is nearest"),
 }
-_ELECTION = (Repair.ASKING, Repair.NEGOTIATING, Repair.WATCHING)
+_ELECTION = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 
 
 @dataclass(frozen=True)
@@ -60,14 +60,14 @@ class RepairStory:
         routers = [node for node in nodes.values() if node.on and node.role == Role.ROUTER]
         by_state = {
             state: [node for node in routers if REPAIR_STATES[node.repair_state] is state]
-            for state in Repair
+            for state in RepairState
         }
-        if by_state[Repair.FLYING]:
-            self._describe_flights(by_state[Repair.FLYING], mesh)
+        if by_state[RepairState.FLYING]:
+            self._describe_flights(by_state[RepairState.FLYING], mesh)
         elif any(by_state[state] for state in _ELECTION):
             self._describe_bids([n for state in _ELECTION for n in by_state[state]], mesh)
-        elif by_state[Repair.LOST]:
-            self._describe_loss(by_state[Repair.LOST], mesh)
+        elif by_state[RepairState.LOST]:
+            self._describe_loss(by_state[RepairState.LOST], mesh)
         elif self._lost and all(node.connected for node in routers if node.id in self._lost):
             self._describe_end(mesh)
         self._before = nodes
@@ -112,7 +112,7 @@ class RepairStory:
         self._lost.update(ids)
         ago = f" {now_s - self._lost_at_s:.0f} s ago" if self._lost_at_s < now_s else ""
         lost = f"{and_(ids)} lost the gateway{ago}"
-        bidding = [n for n in group if REPAIR_STATES[n.repair_state] is not Repair.ASKING]
+        bidding = [n for n in group if REPAIR_STATES[n.repair_state] is not RepairState.ASKING]
         if not bidding:
             asks = _each(ids, "it asks", "each asks")
             self._last(("asking",), f"{lost}; {asks} its neighbours for their positions", now_s)

@@ -15,7 +15,7 @@ from drone_mesh.state.model import ObstacleStatus
 from drone_mesh.view.camera import Camera
 from drone_mesh.view.palette import FRAME, LIGHT, ROTOR, Colour, rgb
 from drone_mesh.view.picture import DronePicture, Scene, Shape
-from drone_mesh.view.quadrocopter import MOTORS, Part, solid_of, turned_rad
+from drone_mesh.view.quadrocopter import MOTORS, BodyPart, solid_of, turned_rad
 from drone_mesh.view.solids import normal
 
 LIGHT_FROM = (-3.0, -6.0, 12.0)
@@ -53,13 +53,13 @@ class Bodies:
         if self._shape is Shape.BOX:
             box = self._box_shape(drone.size_m(scale), drone.colour)
             return self._add(box, (), drone.centre(scale))
-        frame = self._part_shape(Part.FRAME, drone, FRAME, scale)
-        lamp = self._part_shape(Part.LAMP, drone, drone.colour, scale)
+        frame = self._part_shape(BodyPart.FRAME, drone, FRAME, scale)
+        lamp = self._part_shape(BodyPart.LAMP, drone, drone.colour, scale)
         if not drone.is_flying:
-            blades = self._part_shape(Part.BLADES, drone, FRAME, scale)
+            blades = self._part_shape(BodyPart.BLADES, drone, FRAME, scale)
             return self._add(frame, (_Link(lamp), _Link(blades)), drone.underside(scale))
-        discs = self._part_shape(Part.DISCS, drone, ROTOR, scale)
-        rotor = self._part_shape(Part.ROTOR, drone, FRAME, scale)
+        discs = self._part_shape(BodyPart.DISCS, drone, ROTOR, scale)
+        rotor = self._part_shape(BodyPart.ROTOR, drone, FRAME, scale)
         rotors = (_Link(rotor, (x * scale, y * scale, 0.0), True) for x, y in MOTORS)
         links = (_Link(lamp), _Link(discs), *rotors)
         body = self._add(frame, links, drone.underside(scale))
@@ -139,7 +139,7 @@ class Bodies:
             )
         )
 
-    def _part_shape(self, part: Part, drone: DronePicture, colour: Colour, scale: float) -> int:
+    def _part_shape(self, part: BodyPart, drone: DronePicture, colour: Colour, scale: float) -> int:
         key = (part, drone.role, colour, scale)
         if key not in self._shapes:
             corners, normals = _triangles(drone.role, part)
@@ -158,7 +158,7 @@ class Bodies:
 
 
 @functools.lru_cache(maxsize=None)
-def _triangles(role: Role, part: Part) -> _Triangles:
+def _triangles(role: Role, part: BodyPart) -> _Triangles:
     solid = solid_of(role, part)
     corners = [corner for triangle in solid for corner in triangle]
     return corners, [normal(triangle) for triangle in solid for _ in triangle]

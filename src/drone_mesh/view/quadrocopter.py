@@ -23,7 +23,7 @@ ROTOR_RAD_PER_S = 9.0  # our choice: a real one is a blur
 _Place = Tuple[float, float]
 
 
-class Part(enum.Enum):
+class BodyPart(enum.Enum):
     """A part with its own colour."""
 
     FRAME = "frame"  # hull, arms, motors and legs
@@ -33,15 +33,15 @@ class Part(enum.Enum):
     ROTOR = "rotor"  # the blades of one rotor, around the origin
 
 
-def solid_of(role: Role, part: Part) -> Solid:
+def solid_of(role: Role, part: BodyPart) -> Solid:
     """The triangles of a part of a drone."""
-    if part is Part.FRAME:
+    if part is BodyPart.FRAME:
         return _frame()
-    if part is Part.LAMP:
+    if part is BodyPart.LAMP:
         return _gateway_lamp() if role is Role.GATEWAY else _router_lamp()
-    if part is Part.BLADES:
+    if part is BodyPart.BLADES:
         return [triangle for motor in range(4) for triangle in rotor(motor, 0.6 + 0.9 * motor)]
-    if part is Part.ROTOR:
+    if part is BodyPart.ROTOR:
         return prism(bar(*blade_ends((0.0, 0.0), 0.0), BLADE_WIDTH_M), DISC_HIGH_M, ROTOR_HIGH_M)
     discs = (polygon(motor, ROTOR_RADIUS_M, 12) for motor in MOTORS)
     return [t for disc in discs for t in prism(disc, ROTOR_LOW_M, DISC_HIGH_M)]
@@ -98,10 +98,10 @@ def obj(solid: Solid) -> str:
 
 def mesh_files() -> dict[str, str]:
     """The files of meshes/: one for each part that has its own colour in rviz, by name."""
-    frame = solid_of(Role.ROUTER, Part.FRAME)
+    frame = solid_of(Role.ROUTER, BodyPart.FRAME)
     solids = {
-        "standing": frame + solid_of(Role.ROUTER, Part.BLADES),
-        "flying": frame + solid_of(Role.ROUTER, Part.DISCS),
-        **{f"{role.word}_lamp": solid_of(role, Part.LAMP) for role in Role},
+        "standing": frame + solid_of(Role.ROUTER, BodyPart.BLADES),
+        "flying": frame + solid_of(Role.ROUTER, BodyPart.DISCS),
+        **{f"{role.word}_lamp": solid_of(role, BodyPart.LAMP) for role in Role},
     }
     return {f"{name}.obj": obj(solid) for name, solid in solids.items()}

@@ -8,7 +8,7 @@ from drone_mesh.bench.observation import (
     STARTED,
     Figures,
     Happening,
-    Look,
+    StateSample,
     Watch,
     first_time_all_are_connected,
     from_line,
@@ -17,7 +17,7 @@ from drone_mesh.bench.observation import (
 
 
 def look(sim_s, on, connected, wall_s=0.0):
-    return Look(wall_s, sim_s, on=on, connected=connected, messages=0, flying=0, links=0)
+    return StateSample(wall_s, sim_s, on=on, connected=connected, messages=0, flying=0, links=0)
 
 
 def watch_of(drones, *sights):
@@ -35,7 +35,9 @@ def test_what_the_probe_says_arrives_as_it_was_meant(sight):
     assert from_line(to_line(sight)) == sight
 
 
-@pytest.mark.parametrize("line", ["", "{}", "[ WARN] something", '{"kind": "Look"}', '{"kind": 1}'])
+@pytest.mark.parametrize(
+    "line", ["", "{}", "[ WARN] something", '{"kind": "StateSample"}', '{"kind": 1}']
+)
 def test_a_line_that_is_none_is_refused(line):
     with pytest.raises(ValueError, match="probe"):
         from_line(line)

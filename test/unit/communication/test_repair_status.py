@@ -6,7 +6,7 @@ import pytest
 from rig import Rig
 
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.interfaces import Location
 
 OCCUPIED = "the place of 2 is occupied by 3"
@@ -16,43 +16,43 @@ OCCUPIED = "the place of 2 is occupied by 3"
     ("status", "words"),
     [
         (NOTHING_TO_REPAIR, ""),
-        (RepairStatus(Repair.AT_REST, OCCUPIED), f"does not fly: {OCCUPIED}"),
-        (RepairStatus(Repair.LOST, emergency_s=111.2), "waits 12 s for a gateway"),
-        (RepairStatus(Repair.LOST, emergency_s=99.0), "waits for a gateway"),
+        (RepairStatus(RepairState.AT_REST, OCCUPIED), f"does not fly: {OCCUPIED}"),
+        (RepairStatus(RepairState.LOST, emergency_s=111.2), "waits 12 s for a gateway"),
+        (RepairStatus(RepairState.LOST, emergency_s=99.0), "waits for a gateway"),
         (
-            RepairStatus(Repair.LOST, OCCUPIED, emergency_s=111.2),
+            RepairStatus(RepairState.LOST, OCCUPIED, emergency_s=111.2),
             f"waits 12 s for a gateway; does not fly: {OCCUPIED}",
         ),
         (
-            RepairStatus(Repair.LOST, emergency_s=230.0, silent=True),
+            RepairStatus(RepairState.LOST, emergency_s=230.0, silent=True),
             "waits 130 s for a gateway: all its neighbours fell silent together",
         ),
-        (RepairStatus(Repair.ASKING, OCCUPIED), "asks where its neighbours are"),
+        (RepairStatus(RepairState.ASKING, OCCUPIED), "asks where its neighbours are"),
         (
-            RepairStatus(Repair.NEGOTIATING, bid=15.52, bid_unit="m", place_of=2),
+            RepairStatus(RepairState.NEGOTIATING, bid=15.52, bid_unit="m", place_of=2),
             "negotiating, bids 15.5 m for the place of 2",
         ),
         (
-            RepairStatus(Repair.NEGOTIATING, bid=1 / 9, bid_unit="m", place_of=0),
+            RepairStatus(RepairState.NEGOTIATING, bid=1 / 9, bid_unit="m", place_of=0),
             "negotiating, bids 0.111 for the place of 0",
         ),
         (
-            RepairStatus(Repair.NEGOTIATING, bid=1 + 1 / 9, place_of=2),
+            RepairStatus(RepairState.NEGOTIATING, bid=1 + 1 / 9, place_of=2),
             "negotiating, bids 1.11 for the place of 2",
         ),
         (
-            RepairStatus(Repair.NEGOTIATING, OCCUPIED),
+            RepairStatus(RepairState.NEGOTIATING, OCCUPIED),
             f"negotiating, does not bid: {OCCUPIED}",
         ),
-        (RepairStatus(Repair.WATCHING, bid=9.0, winner=4), "waits for 4 to take off"),
-        (RepairStatus(Repair.FLYING, place_of=2), "flies to the place of 2"),
+        (RepairStatus(RepairState.WATCHING, bid=9.0, winner=4), "waits for 4 to take off"),
+        (RepairStatus(RepairState.FLYING, place_of=2), "flies to the place of 2"),
         (
-            RepairStatus(Repair.FLYING, goal=Location(4.0, 3.0, 0.0)),
+            RepairStatus(RepairState.FLYING, goal=Location(4.0, 3.0, 0.0)),
             "flies to x 3.00 m, y 4.00 m, z 0 m",
         ),
-        (RepairStatus(Repair.FLYING, "a gateway answers"), "lands: a gateway answers"),
+        (RepairStatus(RepairState.FLYING, "a gateway answers"), "lands: a gateway answers"),
         (
-            RepairStatus(Repair.FLYING, place_of=2, landed=True),
+            RepairStatus(RepairState.FLYING, place_of=2, landed=True),
             "has landed, checks that no other drone is there",
         ),
     ],
@@ -88,7 +88,7 @@ def test_a_status_that_was_read_does_not_change():
     rig.antenna.dead = {2}
     rig.wait(20.0)
     before = rig.mesh.get_repair_status()
-    assert before.state is Repair.LOST
+    assert before.state is RepairState.LOST
     rig.connect_to_gateway()
-    assert before.state is Repair.LOST
+    assert before.state is RepairState.LOST
     assert rig.mesh.get_repair_status() == NOTHING_TO_REPAIR

@@ -9,8 +9,8 @@ import pytest
 from drone_mesh.communication.router_states import (
     LINK_TRANSITIONS,
     REPAIR_TRANSITIONS,
-    Link,
-    Repair,
+    ConnectionState,
+    RepairState,
     RouterEvent,
     RouterStates,
 )
@@ -24,7 +24,7 @@ def at(link, repair):
 
 def test_a_router_begins_searching_and_at_rest():
     states = RouterStates()
-    assert (states.link, states.repair) == (Link.SEARCHING, Repair.AT_REST)
+    assert (states.link, states.repair) == (ConnectionState.SEARCHING, RepairState.AT_REST)
     assert not states.connected
     assert not states.awaiting
 
@@ -34,7 +34,7 @@ def test_each_event_moves_one_of_the_two_states_at_least():
 
 
 def test_each_state_can_be_reached():
-    known = {(Link.SEARCHING, Repair.AT_REST)}
+    known = {(ConnectionState.SEARCHING, RepairState.AT_REST)}
     while True:
         reached = set(known)
         for (link, repair), event in itertools.product(known, RouterEvent):
@@ -47,20 +47,20 @@ def test_each_state_can_be_reached():
         if reached == known:
             break
         known = reached
-    assert {link for link, _ in known} == set(Link)
-    assert {repair for _, repair in known} == set(Repair)
+    assert {link for link, _ in known} == set(ConnectionState)
+    assert {repair for _, repair in known} == set(RepairState)
 
 
 @pytest.mark.parametrize(
     ("link", "repair", "event"),
     [
-        (Link.SEARCHING, Repair.AT_REST, RouterEvent.ANSWER_MISSED),
-        (Link.CONNECTED, Repair.AT_REST, RouterEvent.LOSS_NOTICED),
-        (Link.SEARCHING, Repair.FLYING, RouterEvent.LOSS_NOTICED),
-        (Link.SEARCHING, Repair.AT_REST, RouterEvent.BID),
-        (Link.SEARCHING, Repair.FLYING, RouterEvent.BID),
-        (Link.SEARCHING, Repair.LOST, RouterEvent.BIDS_COUNTED),
-        (Link.CONNECTED, Repair.AT_REST, RouterEvent.LANDED),
+        (ConnectionState.SEARCHING, RepairState.AT_REST, RouterEvent.ANSWER_MISSED),
+        (ConnectionState.CONNECTED, RepairState.AT_REST, RouterEvent.LOSS_NOTICED),
+        (ConnectionState.SEARCHING, RepairState.FLYING, RouterEvent.LOSS_NOTICED),
+        (ConnectionState.SEARCHING, RepairState.AT_REST, RouterEvent.BID),
+        (ConnectionState.SEARCHING, RepairState.FLYING, RouterEvent.BID),
+        (ConnectionState.SEARCHING, RepairState.LOST, RouterEvent.BIDS_COUNTED),
+        (ConnectionState.CONNECTED, RepairState.AT_REST, RouterEvent.LANDED),
     ],
 )
 def test_an_event_that_cannot_happen_is_refused_and_changes_nothing(link, repair, event):
@@ -71,7 +71,7 @@ def test_an_event_that_cannot_happen_is_refused_and_changes_nothing(link, repair
 
 
 def test_a_connected_router_that_awaits_an_answer_still_counts_as_connected():
-    states = at(Link.CONNECTED, Repair.AT_REST)
+    states = at(ConnectionState.CONNECTED, RepairState.AT_REST)
     states.happened(RouterEvent.HEARTBEAT_SENT)
     assert states.connected
     assert states.awaiting
@@ -80,14 +80,14 @@ def test_a_connected_router_that_awaits_an_answer_still_counts_as_connected():
 
 
 def test_a_lost_router_stays_lost_while_it_tries_another_gateway():
-    states = at(Link.SEARCHING, Repair.LOST)
+    states = at(ConnectionState.SEARCHING, RepairState.LOST)
     states.happened(RouterEvent.HEARTBEAT_SENT)
-    assert (states.link, states.repair) == (Link.AWAITING_FIRST_ANSWER, Repair.LOST)
+    assert (states.link, states.repair) == (ConnectionState.AWAITING_FIRST_ANSWER, RepairState.LOST)
     states.happened(RouterEvent.GATEWAY_ANSWERED)
-    assert (states.link, states.repair) == (Link.CONNECTED, Repair.AT_REST)
+    assert (states.link, states.repair) == (ConnectionState.CONNECTED, RepairState.AT_REST)
 
 
 def test_switching_the_antenna_off_does_not_end_a_flight():
-    states = at(Link.CONNECTED, Repair.FLYING)
+    states = at(ConnectionState.CONNECTED, RepairState.FLYING)
     states.happened(RouterEvent.ANTENNA_OFF)
-    assert (states.link, states.repair) == (Link.SEARCHING, Repair.FLYING)
+    assert (states.link, states.repair) == (ConnectionState.SEARCHING, RepairState.FLYING)

@@ -10,8 +10,8 @@ import pytest
 
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
-from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 
 # casus.yaml, layout 101: three rows of two behind a gateway
@@ -22,7 +22,7 @@ METRES_OF_THE_FIELD = 10.0
 
 
 def layout_101(links: LinkModel, scale: float = 1.0, seed: int = 1) -> EmulatedMesh:
-    mesh = EmulatedMesh(VirtualClock(), links, seed)
+    mesh = EmulatedMesh(CooperativeClock(), links, seed)
     mesh.add_gateway(0, (GATEWAY[0] * scale, GATEWAY[1] * scale, GATEWAY[2]))
     for node, (x_m, y_m) in LAYOUT_101.items():
         mesh.add_router(node, (x_m * scale, y_m * scale, 0.05))
@@ -89,7 +89,7 @@ def test_the_same_seed_gives_the_same_mesh():
 
 
 def grid(nodes, seed=1):
-    mesh = EmulatedMesh(VirtualClock(), IdealDisc(9.0), seed)
+    mesh = EmulatedMesh(CooperativeClock(), IdealDisc(9.0), seed)
     columns = round((nodes - 1) ** 0.5)
     mesh.add_gateway(0, GATEWAY)
     for index in range(nodes - 1):

@@ -148,19 +148,19 @@ def test_killed_drones_can_be_revived() -> None:
     faults = [kill(ids=[4]), {"at_s": 30, "revive": {"ids": [4]}}]
     record = run(faults=faults)
     assert happened(record) == [(20, "kill", (4,)), (30, "revive", (4,))]
-    assert record.looks[-1].served == {1, 2, 3, 4}
+    assert record.samples[-1].served == {1, 2, 3, 4}
 
 
 def test_a_gateway_that_is_off_for_a_while_comes_back() -> None:
     record = run(faults=[{"at_s": 15, "gateway_off": {"for_s": 5}}], duration_s=50)
-    assert not record.looks[17].served
-    assert record.looks[-1].share == 1.0
+    assert not record.samples[17].served
+    assert record.samples[-1].share == 1.0
 
 
 def test_a_cut_link_is_mended_after_its_time() -> None:
     faults = [{"at_s": 15, "cut_link": {"between": [0, 1], "for_s": 10}}]
     record = run(faults=faults, duration_s=50)
-    shares = {look.now_s: look.share for look in record.looks}
+    shares = {sample.now_s: sample.share for sample in record.samples}
     assert shares[16.0] == 0.0
     assert shares[50.0] == 1.0
 
@@ -174,16 +174,16 @@ def test_a_jammed_circle_loses_packets_only_while_it_is_jammed() -> None:
         Streams(1, 0),
     )
     record = simulation.run()
-    assert simulation.medium.lost > 0
-    assert not simulation.medium.jams
-    assert record.looks[-1].share == 1.0
+    assert simulation.impairments.lost > 0
+    assert not simulation.impairments.jams
+    assert record.samples[-1].share == 1.0
 
 
 def test_loss_lasts_from_one_time_to_another() -> None:
     faults = [{"at_s": 10, "loss": {"share": 1.0, "for_s": 20}}]
     record = run(faults=faults, duration_s=60, layout={"kind": "line", "drones": 2})
-    assert not record.looks[25].served
-    assert record.looks[-1].share == 1.0
+    assert not record.samples[25].served
+    assert record.samples[-1].share == 1.0
 
 
 def test_a_battery_ends_after_its_metres_or_its_minutes() -> None:
@@ -194,7 +194,7 @@ def test_a_battery_ends_after_its_metres_or_its_minutes() -> None:
     assert record.legs[0].metres_until(died_s) == pytest.approx(2.0)
     record = run(faults=[{"at_s": 6, "battery": {"live_min": 0.5}}], duration_s=40)
     assert {item.at_s for item in record.happened[1:]} == {36.0}
-    assert record.looks[-1].alive == frozenset()
+    assert record.samples[-1].alive == frozenset()
 
 
 def test_churn_is_random_and_the_same_for_the_same_seed() -> None:
@@ -258,7 +258,7 @@ def test_losses_of_a_link_do_not_depend_on_what_others_send() -> None:
     def fates(drones: int) -> list[bool]:
         content = {"layout": {"kind": "line", "drones": drones}, "radio": {"loss": 0.3}}
         simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
-        return [simulation.medium._is_lost(0, 1) for _ in range(50)]
+        return [simulation.impairments._is_lost(0, 1) for _ in range(50)]
 
     assert fates(3) == fates(6)
     assert 5 < sum(fates(3)) < 25
@@ -325,7 +325,7 @@ def test_a_wall_between_two_drones_ends_their_link_and_without_it_the_run_is_the
         }  # fmt: skip
         simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
         record = simulation.run()
-        return [simulation.event_hash(), sorted(record.looks[-1].served)]
+        return [simulation.event_hash(), sorted(record.samples[-1].served)]
 
     assert events(boxes=[HOUSE])[1] == [1]
     assert events(boxes=[{**HOUSE, "center": [9, 50, 5]}]) == events()
@@ -373,7 +373,7 @@ def test_fading_loses_packets_of_weak_links_more_often() -> None:
         }  # fmt: skip
         simulation = Simulation(Scenario.model_validate(content), Streams(1, 0))
         record = simulation.run()
-        return simulation.medium.lost / measure_all(record)["packets"]
+        return simulation.impairments.lost / measure_all(record)["packets"]
 
     assert lost(0.9) < 0.05  # a margin of 20 dB: 1 %
     assert 0.5 < lost(8.9) < 0.75  # no margin: 63 %

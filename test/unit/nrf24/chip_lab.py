@@ -7,10 +7,10 @@ from functools import partial
 
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, ScriptedLoss
 from drone_mesh.nrf24.emulator.quirks import ChipVariant
 from drone_mesh.nrf24.emulator.trace import FrameTrace
-from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.registers import Command, Register
 from drone_mesh.nrf24.settings import RadioSettings
@@ -118,7 +118,7 @@ class Lab:
     """One air. `loses` may be set to a function of a Hop that says which frames get lost."""
 
     def __init__(self, links=None):
-        self.clock = VirtualClock()
+        self.clock = CooperativeClock()
         self.loses = lambda hop: False
         model = ScriptedLoss(links or IdealDisc(1000.0), lambda hop: self.loses(hop))
         self.air = Air(self.clock, model, random.Random(7))

@@ -11,14 +11,14 @@ from chip_lab import PAYLOAD, Lab
 
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc
-from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 
 
 def test_threads_take_turns_in_the_order_of_virtual_time():
-    clock = VirtualClock()
+    clock = CooperativeClock()
     seen = []
 
     def count(name, period_s):
@@ -33,7 +33,7 @@ def test_threads_take_turns_in_the_order_of_virtual_time():
 
 
 def test_a_virtual_lock_goes_to_waiting_threads_in_their_order():
-    clock = VirtualClock()
+    clock = CooperativeClock()
     lock = clock.lock()
     order = []
 
@@ -54,7 +54,7 @@ def test_a_virtual_lock_goes_to_waiting_threads_in_their_order():
 
 
 def test_a_wait_ends_with_the_condition_or_with_the_time():
-    clock = VirtualClock()
+    clock = CooperativeClock()
     signal, flags = clock.signal(), []
     clock.call_at(500_000_000, lambda: (flags.append(1), signal.notify()))
     assert signal.wait_for(lambda: bool(flags), 2.0)
@@ -64,7 +64,7 @@ def test_a_wait_ends_with_the_condition_or_with_the_time():
 
 
 def test_what_a_thread_raises_is_raised_where_it_is_joined():
-    clock = VirtualClock()
+    clock = CooperativeClock()
 
     def fail():
         raise ZeroDivisionError("on purpose")
@@ -75,7 +75,7 @@ def test_what_a_thread_raises_is_raised_where_it_is_joined():
 
 
 def test_a_deadlock_of_all_threads_raises_an_error():
-    clock = VirtualClock()
+    clock = CooperativeClock()
     signal = clock.signal()
     with pytest.raises(RuntimeError, match="waits for ever"):
         signal.wait_for(lambda: False, float("inf"))

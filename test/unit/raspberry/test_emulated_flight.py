@@ -29,8 +29,8 @@ from drone_mesh.inprocess.emulated_mesh import EmulatedMesh, EmulatedNode
 from drone_mesh.inprocess.node import NoInternet
 from drone_mesh.layouts import Layouts
 from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc
-from drone_mesh.nrf24.emulator.virtual_clock import VirtualClock
 
 STEP_S = 0.05
 LIMITS = FlightLimits(speed_m_s=4.0, cruise_height_m=3.0, layer_m=0.5)
@@ -92,7 +92,7 @@ class FlyingMesh(EmulatedMesh):
 
     def __init__(self, kind: Autopilot, seed: int) -> None:
         timing = MeshTiming(check_period_s=5.0, connection_lost_after_s=15.0)
-        super().__init__(VirtualClock(), IdealDisc(9.0), seed, timing=timing)
+        super().__init__(CooperativeClock(), IdealDisc(9.0), seed, timing=timing)
         self.engines: dict[int, VirtualEngine] = {}
         self._kind = kind
 

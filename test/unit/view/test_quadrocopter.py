@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.view.quadrocopter import Part, mesh_files, solid_of
+from drone_mesh.view.quadrocopter import BodyPart, mesh_files, solid_of
 from drone_mesh.view.solids import dome, normal, polygon, prism
 
 MESHES = Path(__file__).parents[3] / "meshes"
@@ -21,7 +21,7 @@ def test_the_meshes_of_rviz_are_those_that_the_code_makes() -> None:
 
 @pytest.mark.parametrize("role", list(Role))
 def test_a_drone_stands_on_its_origin_and_is_about_as_large_as_its_box(role: Role) -> None:
-    corners = [c for part in Part for triangle in solid_of(role, part) for c in triangle]
+    corners = [c for part in BodyPart for triangle in solid_of(role, part) for c in triangle]
     assert min(z for _, _, z in corners) == 0.0
     assert max(z for _, _, z in corners) == pytest.approx(role.size_m[2])
     for axis in (0, 1):
@@ -30,7 +30,7 @@ def test_a_drone_stands_on_its_origin_and_is_about_as_large_as_its_box(role: Rol
 
 
 def test_a_gateway_looks_different_from_a_router() -> None:
-    lamps = {role: solid_of(role, Part.LAMP) for role in Role}
+    lamps = {role: solid_of(role, BodyPart.LAMP) for role in Role}
     assert lamps[Role.GATEWAY] != lamps[Role.ROUTER]
 
 

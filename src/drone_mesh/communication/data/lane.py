@@ -14,7 +14,7 @@ from collections import deque
 from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, Outgoing
+from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Head, Poll
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
@@ -57,8 +57,8 @@ class Lane:
         self._ended = ended
         self._session = session
         self._room = room
-        self._waiting: deque[Outgoing] = deque()
-        self._open: dict[int, Outgoing] = {}  # by number, oldest first
+        self._waiting: deque[OutgoingMessage] = deque()
+        self._open: dict[int, OutgoingMessage] = {}  # by number, oldest first
         self._number = 0
         self._orders: dict[tuple[int, bool], int] = {}  # next place, by port and reliability
         self._round_trip = RoundTrip()
@@ -66,13 +66,13 @@ class Lane:
         self._slow_start = True
         self._nonce = 0
         self._train: Train | None = None  # while relays share the channel with this node
-        self._latest: Outgoing | None = None  # message whose fragment left last
+        self._latest: OutgoingMessage | None = None  # message whose fragment left last
         self.not_before_s = -math.inf  # no route: time of the next attempt
 
     def __len__(self) -> int:
         return len(self._waiting) + len(self._open)
 
-    def __iter__(self) -> Iterator[Outgoing]:
+    def __iter__(self) -> Iterator[OutgoingMessage]:
         """All messages, oldest first."""
         yield from self._open.values()
         yield from self._waiting
@@ -82,7 +82,7 @@ class Lane:
         """Whether it has nothing to send, now or later."""
         return not len(self) and (self._train is None or not self._train.is_open)
 
-    def add(self, message: Outgoing) -> None:
+    def add(self, message: OutgoingMessage) -> None:
         """Add a message for this destination."""
         self._waiting.append(message)
 
@@ -235,7 +235,7 @@ class Lane:
                 where = destination_in_words(self.to)
                 self.give_up(message, f"{what} {where} for {LIFETIME_S:.0f} s{self._hint()}")
 
-    def give_up(self, message: Outgoing, reason: str) -> None:
+    def give_up(self, message: OutgoingMessage, reason: str) -> None:
         """Stop sending this message."""
         self._close(message, TicketState.GIVEN_UP, reason)
 
@@ -249,7 +249,7 @@ class Lane:
             else:
                 self.give_up(message, reason)
 
-    def take(self, to: int) -> list[Outgoing]:
+    def take(self, to: int) -> list[OutgoingMessage]:
         """Remove the messages addressed to `to`, and return them as if nothing had been sent."""
         messages = [message for message in self if message.ticket.to == to]
         for message in messages:
@@ -305,7 +305,7 @@ class Lane:
                 behind = max(behind, distance if distance < 1 << 15 else 0)
         return behind
 
-    def _body(self, message: Outgoing, index: int) -> bytes:
+    def _body(self, message: OutgoingMessage, index: int) -> bytes:
         head = message.head
         assert head is not None
         if index == 0:
@@ -313,7 +313,7 @@ class Lane:
             return packets.first_body(head, message.sealed, self._room)
         return packets.further_body(head.number, index, message.sealed, self._room)
 
-    def _poll(self, message: Outgoing) -> DataPacket:
+    def _poll(self, message: OutgoingMessage) -> DataPacket:
         if message.asks >= 2:
             self._window, self._slow_start = float(LEAST_WINDOW), True
             message.ticket.reason = f"no acknowledgement yet{self._hint()}"
@@ -332,14 +332,14 @@ class Lane:
         poll = Poll(self._session, NO_ANSWER, self._latest.head.number)
         return DataPacket(packets.POLL, packets.poll_body(poll), self._latest, ends_train=True)
 
-    def _asking(self, message: Outgoing) -> DataPacket:
+    def _asking(self, message: OutgoingMessage) -> DataPacket:
         assert message.head is not None
         self._nonce = self._nonce % 0xFF + 1
         message.nonce = self._nonce
         poll = Poll(self._session, self._nonce, message.head.number)
         return DataPacket(packets.POLL, packets.poll_body(poll), message)
 
-    def _partly(self, message: Outgoing, ack: Ack, now_s: float) -> None:
+    def _partly(self, message: OutgoingMessage, ack: Ack, now_s: float) -> None:
         if ack.nonce != message.nonce or not message.ticket.reliable:
             return  # an older answer: a newer one is on its way
         if message.asks == 1:
@@ -356,12 +356,12 @@ class Lane:
             again = [index for index in range(len(packets.FRAGMENTS)) if lost >> index & 1]
             message.to_send.extendleft(reversed(again))
 
-    def _close(self, message: Outgoing, state: TicketState, reason: str = "") -> None:
+    def _close(self, message: OutgoingMessage, state: TicketState, reason: str = "") -> None:
         self._remove(message)
         message.ticket.becomes(state, reason)
         self._ended(state)
 
-    def _remove(self, message: Outgoing) -> None:
+    def _remove(self, message: OutgoingMessage) -> None:
         if message.head is None:
             self._waiting.remove(message)
         else:
@@ -376,5 +376,5 @@ class Lane:
     def _train_due_s(self, train: Train) -> float:
         return train.asked_s + self._round_trip.timeout_s(max(0, train.asks - 1))
 
-    def _timeout_s(self, message: Outgoing) -> float:
+    def _timeout_s(self, message: OutgoingMessage) -> float:
         return self._round_trip.timeout_s(max(0, message.asks - 1))

@@ -1,4 +1,4 @@
-"""Outgoing: one message of a lane, and the state of its fragments."""
+"""One message of a lane, and the state of its fragments."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class DataPacket(NamedTuple):
 
     kind: int
     body: bytes
-    message: Outgoing
+    message: OutgoingMessage
     ends_train: bool = False
 
 
-class Outgoing:
+class OutgoingMessage:
     """One message under way."""
 
     __slots__ = (

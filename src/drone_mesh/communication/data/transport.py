@@ -21,7 +21,7 @@ from drone_mesh.communication.data.echo import Echoes, OnEchoAnswer
 from drone_mesh.communication.data.flood import SeenFloods
 from drone_mesh.communication.data.inbox import Inbox
 from drone_mesh.communication.data.lane import Lane
-from drone_mesh.communication.data.outgoing import Outgoing
+from drone_mesh.communication.data.outgoing import OutgoingMessage
 from drone_mesh.communication.data.packets import Ack
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import (
@@ -95,7 +95,7 @@ class Transport:
         self._room = room
         self._session: int | None = None
         self._lanes: OrderedDict[int, Lane] = OrderedDict()  # the next one to send comes first
-        self._for_gateway: list[Outgoing] = []  # wait until there is one
+        self._for_gateway: list[OutgoingMessage] = []  # wait until there is one
         self._inboxes: OrderedDict[tuple[int, bool], Inbox] = OrderedDict()
         self._floods = SeenFloods()
         self._echoes = Echoes(self._send_packet, room)
@@ -129,7 +129,7 @@ class Transport:
             self._deliver(ReceivedMessage(me, port, payload, False, reliable, now_s))
             ticket.becomes(TicketState.DELIVERED)
             return ticket
-        message = Outgoing(ticket, payload, now_s)
+        message = OutgoingMessage(ticket, payload, now_s)
         if to == TO_GATEWAY:
             self._for_gateway.append(message)
         else:

@@ -8,7 +8,7 @@ tree. A drone whose next hop moves out of reach flies until it is in reach again
 from __future__ import annotations
 
 from drone_mesh.communication.repair_interfaces import Step
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.communication.spots import towards
 from drone_mesh.communication.strategies.nearest import Nearest
 from drone_mesh.drone.interfaces import Location
@@ -22,7 +22,7 @@ class Follow(Nearest):
     def on_place(self, node: int, place: Location) -> None:
         """If the next hop moves away, follow it as far as needed."""
         mesh, here = self.mesh, self.mesh.own_place()
-        may_follow = not (mesh.connected or mesh.why_not_fly() or mesh.state is Repair.FLYING)
+        may_follow = not (mesh.connected or mesh.why_not_fly() or mesh.state is RepairState.FLYING)
         if node != mesh.lost_next_hop or here is None or not may_follow:
             super().on_place(node, place)
         elif here.distance_m(place) > KEPT * mesh.range_m:

@@ -8,7 +8,7 @@ move may not suffice: a second one leads to the place itself, and a third flight
 from __future__ import annotations
 
 from drone_mesh.communication.repair_interfaces import Step
-from drone_mesh.communication.router_states import Repair
+from drone_mesh.communication.router_states import RepairState
 from drone_mesh.communication.spots import towards
 from drone_mesh.communication.strategies.home import Home
 from drone_mesh.drone.interfaces import Location
@@ -51,7 +51,7 @@ class Inward(Home):
     def on_place(self, node: int, place: Location) -> None:
         """If a neighbour moves out of reach, follow it as far as needed."""
         mesh, here = self.mesh, self.mesh.own_place()
-        may_move = not (mesh.connected or mesh.state is Repair.FLYING or mesh.why_not_fly())
+        may_move = not (mesh.connected or mesh.state is RepairState.FLYING or mesh.why_not_fly())
         if here is None or not may_move or node not in mesh.neighbours() or self._moves_itself():
             return
         if here.distance_m(place) > mesh.range_m:

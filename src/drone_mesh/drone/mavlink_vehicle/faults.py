@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass
-class Faults:
+class VehicleFaults:
     """No faults by default."""
 
     silent: bool = False  # the link is broken in both directions

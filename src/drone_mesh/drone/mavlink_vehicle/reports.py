@@ -16,7 +16,7 @@ from drone_mesh.drone.mavlink.telemetry import (
     Message,
 )
 from drone_mesh.drone.mavlink_vehicle.body import Body
-from drone_mesh.drone.mavlink_vehicle.faults import Faults
+from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_number
 
 SENSORS = (
@@ -36,7 +36,7 @@ class Reported(Protocol):
     autopilot: Autopilot
     home: Origin
     body: Body
-    faults: Faults
+    faults: VehicleFaults
     mode: Mode
     in_failsafe: bool
     now_s: float

@@ -12,7 +12,7 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body
-from drone_mesh.drone.mavlink_vehicle.faults import Faults
+from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
 from drone_mesh.drone.mavlink_vehicle.inquiries import Inquiries
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
 from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
@@ -53,7 +53,7 @@ class MavlinkVehicle:
         self.autopilot = autopilot
         self.system_id = system_id
         self.home = home
-        self.faults = Faults()
+        self.faults = VehicleFaults()
         self.body = Body(speed_m_s, drain_percent_s)
         self.parameters = Parameters(autopilot)
         self.mode = Mode.HOLD

@@ -81,24 +81,24 @@ def observed_s(run: RunRecord) -> float:
 
 @metric("s", "from the start until all routers are served for the first time", better="less")
 def connected_s(run: RunRecord) -> float:
-    return next((look.now_s for look in run.looks if look.share == 1.0), NAN)
+    return next((sample.now_s for sample in run.samples if sample.share == 1.0), NAN)
 
 
 @metric("share", "live routers that are served at the end", better="more")
 def connected_share(run: RunRecord) -> float:
-    return run.looks[-1].share
+    return run.samples[-1].share
 
 
 @metric("share", "served routers, mean over the time since the fault", better="more")
 def uptime(run: RunRecord) -> float:
     begin_s = 0.0 if run.fault_s is None else run.fault_s
-    looks = [look for look in run.looks if look.now_s >= begin_s]
+    samples = [sample for sample in run.samples if sample.now_s >= begin_s]
     area = sum(
         (after.now_s - before.now_s) * (before.share + after.share) / 2
-        for before, after in zip(looks, looks[1:])
+        for before, after in zip(samples, samples[1:])
     )
-    seconds = looks[-1].now_s - looks[0].now_s
-    return area / seconds if seconds else looks[-1].share
+    seconds = samples[-1].now_s - samples[0].now_s
+    return area / seconds if seconds else samples[-1].share
 
 
 def _phases(run: RunRecord) -> tuple[float, float, float, float]:

@@ -14,7 +14,7 @@ from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Position, Transmission
 from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.pins import EmulatedCe, EmulatedIrq
-from drone_mesh.nrf24.emulator.quirks import ChipVariant, Faults
+from drone_mesh.nrf24.emulator.quirks import ChipFaults, ChipVariant
 from drone_mesh.nrf24.emulator.register_bank import RegisterBank
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import RX_FIFO_IS_EMPTY, RX_P_NO
@@ -28,7 +28,7 @@ class ChipCore(abc.ABC):
         self.clock = air.clock
         self.name = name
         self.variant = variant
-        self.faults = Faults()
+        self.faults = ChipFaults()
         self.warnings: list[str] = []
         self._warned: set[str] = set()
         self._position = position

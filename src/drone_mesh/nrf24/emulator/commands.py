@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.nrf24.emulator.chip_core import ChipCore
-from drone_mesh.nrf24.emulator.fifos import Outgoing
+from drone_mesh.nrf24.emulator.fifos import TxPayload
 from drone_mesh.nrf24.emulator.states import ANSWERING, SENDING, State
 from drone_mesh.nrf24.emulator.transmitter import Transmitter
 from drone_mesh.nrf24.registers import (
@@ -65,7 +65,7 @@ class CommandDecoder:
         elif Command.W_ACK_PAYLOAD <= command < Command.W_ACK_PAYLOAD + PIPES:
             if not chip.registers.ack_payloads:
                 chip.warn("W_ACK_PAYLOAD without EN_ACK_PAY")
-            self._push(Outgoing(data[:MAX_PAYLOAD_BYTES], ack_pipe=command & 7))
+            self._push(TxPayload(data[:MAX_PAYLOAD_BYTES], ack_pipe=command & 7))
         elif command == Command.FLUSH_TX:
             chip.tx_fifo.flush()
             self._transmitter.flushed()
@@ -86,12 +86,12 @@ class CommandDecoder:
         if not 1 <= len(data) <= MAX_PAYLOAD_BYTES:
             chip.warn(f"a payload of {len(data)} bytes was written")
             data = data[:MAX_PAYLOAD_BYTES]
-        packet = Outgoing(data, no_ack=no_ack)
+        packet = TxPayload(data, no_ack=no_ack)
         if self._push(packet):
             packet.pid = self._transmitter.next_pid()
             self._transmitter.payload_written()
 
-    def _push(self, packet: Outgoing) -> bool:
+    def _push(self, packet: TxPayload) -> bool:
         if self._chip.tx_fifo.push(packet):
             return True
         self._chip.warn("a payload was written while the TX FIFO was full, and is lost")

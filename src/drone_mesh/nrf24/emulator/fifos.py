@@ -9,7 +9,7 @@ from drone_mesh.nrf24.registers import FIFO_DEPTH
 
 
 @dataclass(eq=False)
-class Outgoing:
+class TxPayload:
     """A payload in the TX FIFO; object identity distinguishes packets."""
 
     payload: bytes
@@ -85,7 +85,7 @@ class TxFifo:
     """Payloads to send: those of a transmitter, or ack payloads of a receiver."""
 
     def __init__(self) -> None:
-        self._payloads: list[Outgoing] = []
+        self._payloads: list[TxPayload] = []
 
     def __len__(self) -> int:
         return len(self._payloads)
@@ -95,21 +95,21 @@ class TxFifo:
         return len(self._payloads) == FIFO_DEPTH
 
     @property
-    def oldest(self) -> Outgoing | None:
+    def oldest(self) -> TxPayload | None:
         return self._payloads[0] if self._payloads else None
 
-    def push(self, outgoing: Outgoing) -> bool:
+    def push(self, outgoing: TxPayload) -> bool:
         """Add a payload. False: the FIFO is full, and the payload is lost."""
         if self.full:
             return False
         self._payloads.append(outgoing)
         return True
 
-    def push_back(self, outgoing: Outgoing) -> None:
+    def push_back(self, outgoing: TxPayload) -> None:
         """REUSE_TX_PL: put the payload that was sent last in front again."""
         self._payloads.insert(0, outgoing)
 
-    def remove(self, outgoing: Outgoing) -> None:
+    def remove(self, outgoing: TxPayload) -> None:
         """Remove a sent payload; ignored if it was flushed meanwhile."""
         if outgoing in self._payloads:
             self._payloads.remove(outgoing)
@@ -117,6 +117,6 @@ class TxFifo:
     def flush(self) -> None:
         self._payloads.clear()
 
-    def for_pipe(self, pipe: int) -> Outgoing | None:
+    def for_pipe(self, pipe: int) -> TxPayload | None:
         """The oldest ack payload for a pipe, or None."""
         return next((out for out in self._payloads if out.ack_pipe == pipe), None)

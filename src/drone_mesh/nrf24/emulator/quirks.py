@@ -22,7 +22,7 @@ class ChipVariant:
 
 
 @dataclass
-class Faults:
+class ChipFaults:
     """The current faults; may be changed at any time."""
 
     miso_stuck_at: int | None = None  # 0x00 or 0xFF: nothing answers, or nothing is connected

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drone_mesh.nrf24.airtime import SETTLING_NS
 from drone_mesh.nrf24.emulator.chip_core import ChipCore
-from drone_mesh.nrf24.emulator.fifos import Incoming, Outgoing
+from drone_mesh.nrf24.emulator.fifos import Incoming, TxPayload
 from drone_mesh.nrf24.emulator.frames import Frame, Packet
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import PIPES, RX_DR, TX_DS
@@ -74,7 +74,7 @@ class Receiver:
 
     def _answer(self, pipe: int, address: bytes, pid: int) -> None:
         chip, registers = self._chip, self._chip.registers
-        payload: Outgoing | None = None
+        payload: TxPayload | None = None
         if registers.ack_payloads and registers.dynamic[pipe]:
             payload = chip.tx_fifo.for_pipe(pipe)
         if payload is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drone_mesh.nrf24.airtime import SETTLING_NS
 from drone_mesh.nrf24.emulator.chip_core import ChipCore
-from drone_mesh.nrf24.emulator.fifos import Incoming, Outgoing
+from drone_mesh.nrf24.emulator.fifos import Incoming, TxPayload
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.states import State
 from drone_mesh.nrf24.registers import MAX_RT, RX_DR, TX_DS
@@ -20,8 +20,8 @@ class Transmitter:
     def __init__(self, chip: ChipCore) -> None:
         self._chip = chip
         self._pid = 0
-        self._current: Outgoing | None = None
-        self._last_sent: Outgoing | None = None
+        self._current: TxPayload | None = None
+        self._last_sent: TxPayload | None = None
         self._in_tx_since_ns = 0
         self.reuse = False  # REUSE_TX_PL is active
         self.retransmits = 0  # ARC_CNT
@@ -54,7 +54,7 @@ class Transmitter:
             again = self._chip.tx_fifo.oldest
             if again is None and self._last_sent is not None:
                 last = self._last_sent
-                again = Outgoing(last.payload, no_ack=last.no_ack)
+                again = TxPayload(last.payload, no_ack=last.no_ack)
                 self._chip.tx_fifo.push_back(again)
             if again is not None:
                 again.pid = self.next_pid()
@@ -153,7 +153,7 @@ class Transmitter:
         chip.settle()
         return True
 
-    def _sent(self, packet: Outgoing) -> None:
+    def _sent(self, packet: TxPayload) -> None:
         self._last_sent = packet
         self._chip.tx_fifo.remove(packet)
         self._chip.set_flags(TX_DS.mask)

@@ -12,7 +12,7 @@ HARDWARE_ID = "drone_mesh"
 PERIOD_S = 1.0  # wall: diagnostics go on while simulated time stands still
 
 
-class Figures:
+class FiguresPublisher:
     """Publishes measurements once a second, in a thread of its own.
 
     Publishes: /diagnostics (DiagnosticArray), one status "<node>: <task>" with level OK

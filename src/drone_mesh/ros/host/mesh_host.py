@@ -12,7 +12,7 @@ from typing import Callable, Mapping
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import MeshExecutor
-from drone_mesh.ros.graph.figures import Figures
+from drone_mesh.ros.graph.figures import FiguresPublisher
 from drone_mesh.ros.host.grounded_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
@@ -56,7 +56,7 @@ class MeshHost:
         self._on_failure = on_failure
         self.executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_host")
         self._radios = VirtualRadios(self.executor) if radios is None else radios
-        self._figures = Figures("host", self._take_figures)
+        self._figures = FiguresPublisher("host", self._take_figures)
         self._grounded = GroundedDrones()
         self.nodes: dict[int, VirtualRaspberryPi] = {}
         self._stopping = False

@@ -17,7 +17,7 @@ from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
-from drone_mesh.ros.graph.figures import Figures
+from drone_mesh.ros.graph.figures import FiguresPublisher
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.packet_samples import PacketSamples
@@ -79,7 +79,7 @@ class WirelessSignalSimulator:
         rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
         rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
         rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
-        Figures("air", self._figures).start()
+        FiguresPublisher("air", self._figures).start()
 
     def _drone_info(self, info: DroneInfo) -> None:
         try:

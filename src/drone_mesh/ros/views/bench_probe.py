@@ -19,8 +19,8 @@ from drone_mesh.bench.observation import (
     WATCH,
     Figures,
     Happening,
-    Look,
     Sight,
+    StateSample,
     to_line,
 )
 from drone_mesh.msg import Location, MeshEvent, MeshState, NodeState
@@ -70,7 +70,7 @@ class Probe:
         on = [node for node in mesh.nodes if node.on]
         routers = [node for node in on if node.role == NodeState.ROUTER]
         self._print(
-            Look(
+            StateSample(
                 wall_s=time.monotonic(),
                 sim_s=mesh.header.stamp.to_sec(),
                 on=len(on),

@@ -9,7 +9,7 @@ from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import or_exit
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
-from drone_mesh.ros.world.simulation import Simulation
+from drone_mesh.ros.world.simulation import RosSimulation
 from drone_mesh.world.bullet_world import BulletWorld
 
 
@@ -25,4 +25,4 @@ def main() -> None:
     show_library_logs_on_rosout()
     parameters = or_exit(FactoryParameters.read)
     with OrderlyStop() as stop, BulletWorld() as world:
-        Simulation(parameters, world).run(stop)
+        RosSimulation(parameters, world).run(stop)

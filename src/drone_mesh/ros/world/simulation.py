@@ -1,4 +1,4 @@
-"""Simulation: builds and runs the world, its drones, and by default their nodes."""
+"""Builds and runs the world, its drones, and by default their nodes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MQTT_SENDER = {0: "with internet mqtt it sends the messages published on the bro
 _log = logging.getLogger(__name__)
 
 
-class Simulation:
+class RosSimulation:
     """Built in `world` and run in the main thread, which steps the world."""
 
     def __init__(self, parameters: FactoryParameters, world: BulletWorld) -> None:

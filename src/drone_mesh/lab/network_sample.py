@@ -10,7 +10,7 @@ from drone_mesh.lab.graph import Graph
 
 
 @dataclass(frozen=True)
-class Look:
+class NetworkSample:
     """The network at one moment."""
 
     now_s: float
@@ -23,7 +23,7 @@ class Look:
         return len(self.served) / len(self.alive) if self.alive else 1.0
 
 
-def look_at(network: Network) -> Look:
+def sample_of(network: Network) -> NetworkSample:
     """A router is served while it considers itself connected and the chain of next hops leads to
     a gateway over links that exist now: a stale route does not count."""
     nodes = network.nodes
@@ -37,7 +37,7 @@ def look_at(network: Network) -> Look:
             alive.append(node_id)
             if node.component.get_connected_to_gateway() and _leads(network, node_id, leads):
                 served.append(node_id)
-    return Look(network.clock.now_s, frozenset(alive), frozenset(served))
+    return NetworkSample(network.clock.now_s, frozenset(alive), frozenset(served))
 
 
 def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:

@@ -32,7 +32,7 @@ class Jamming:
 
 
 @dataclass
-class Medium:
+class Impairments:
     """Counts the packets that are handed to the air, and loses some.
 
     The n-th packet from one drone to another has the same fate in every cell of an experiment,

@@ -44,7 +44,7 @@ class _Turn:
 
 
 class _VirtualTask(Task):
-    def __init__(self, clock: VirtualClock, run: Callable[[], None], name: str) -> None:
+    def __init__(self, clock: CooperativeClock, run: Callable[[], None], name: str) -> None:
         self.turn = _Turn(greenlet.greenlet(self._live, clock.first_stack))
         self.name = name
         self.done = False
@@ -76,7 +76,7 @@ class _VirtualTask(Task):
         self.turn.stack.parent = self._clock.next_turn().stack  # continues when this returns
 
 
-class VirtualClock(Runtime, EmulatorClock):
+class CooperativeClock(Runtime, EmulatorClock):
     """Both the clock of the air and the runtime of its drivers."""
 
     def __init__(self) -> None:
@@ -182,7 +182,7 @@ class VirtualClock(Runtime, EmulatorClock):
 
 
 class _VirtualSignal(Signal):
-    def __init__(self, clock: VirtualClock) -> None:
+    def __init__(self, clock: CooperativeClock) -> None:
         self._clock = clock
         self._waiting: list[tuple[_Turn, int]] = []
 
@@ -205,7 +205,7 @@ class _VirtualSignal(Signal):
 class _VirtualLock(ContextManager[object]):
     """Goes to the waiting tasks in order of arrival, so that none starves."""
 
-    def __init__(self, clock: VirtualClock) -> None:
+    def __init__(self, clock: CooperativeClock) -> None:
         self._clock = clock
         self._held = False
         self._queue: list[list[tuple[_Turn, int]]] = []
