@@ -6,7 +6,7 @@ import math
 
 FIRST_LENGTH = 32  # our choice, in fragments
 LEAST_LENGTH = 8  # our choice
-MOST_LENGTH = 48  # our choice: a relay forwards it in one piece
+MOST_LENGTH = 80  # our choice: two messages of 1,024 bytes; a relay forwards it in one piece
 
 
 class Train:

@@ -77,11 +77,13 @@ def test_a_silent_receiver_does_not_stop_best_effort(chain):
 
 def test_a_train_grows_with_answers_and_is_halved_without():
     train = Train()
-    train.left = train.length
-    train.over(arrived=True)
-    assert train.length == min(MOST_LENGTH, 2 * FIRST_LENGTH)
+    assert train.length == FIRST_LENGTH
+    for longer in (2 * FIRST_LENGTH, MOST_LENGTH, MOST_LENGTH):
+        train.left = train.length
+        train.over(arrived=True)
+        assert train.length == longer
     train.over(arrived=True)  # it was not full: nothing is known of longer ones
-    assert train.length == min(MOST_LENGTH, 2 * FIRST_LENGTH)
+    assert train.length == MOST_LENGTH
     train.over(arrived=False)
     assert train.length == MOST_LENGTH // 2
     for _ in range(5):
