@@ -19,7 +19,7 @@ from drone_mesh.msg import FlyAction, FlyFeedback, FlyGoal, FlyResult
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 
 OFFERED_WITHIN_S = 20.0  # wall: a simulation that has just been started needs a few seconds
-LOOK_PERIOD_S = 0.2  # wall
+POLL_PERIOD_S = 0.2  # wall
 CONNECTED_WITHIN_S = 20.0  # simulated
 CANCELLED_WITHIN_S = 10.0  # simulated
 
@@ -53,7 +53,7 @@ def wait_until_offered(drone: int) -> str:
         if why != printed:
             print(f"{why} (waiting for it, up to {OFFERED_WITHIN_S:.0f} s)", flush=True)
             printed = why
-        time.sleep(LOOK_PERIOD_S)
+        time.sleep(POLL_PERIOD_S)
 
 
 def main(drone: int, x: float, y: float, height: int) -> int:

@@ -17,7 +17,7 @@ import traceback
 import console_process
 
 END_LIMIT_S = 10.0
-LOOK_PERIOD_S = 0.01
+POLL_PERIOD_S = 0.01
 
 
 def start(arguments: list[str]) -> None:
@@ -47,7 +47,7 @@ def end(pid: int) -> int | None:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
             return None
-        time.sleep(LOOK_PERIOD_S)
+        time.sleep(POLL_PERIOD_S)
 
 
 def main() -> None:

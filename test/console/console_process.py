@@ -29,7 +29,7 @@ LAYOUTS = [
 
 
 def feed(mesh: InProcessMesh, store: FrameStore) -> None:
-    status, events = mesh.look()
+    status, events = mesh.read()
     store.update_mesh(status, time.monotonic())
     if events:
         store.add_events(events)
@@ -44,7 +44,7 @@ def recorded(options: argparse.Namespace) -> History:
         if step == steps // 2:
             mesh.power(5, False)
         mesh.skip(0.5)
-        state, happened = mesh.look()
+        state, happened = mesh.read()
         states.append(state)
         events += happened
         packets.append(RecordedDots.of(state.stamp_s, *mesh.packets(0.5)))

@@ -20,7 +20,7 @@ STEP_S = 0.05  # wall time between two steps of the clock
 
 
 class InProcessMesh:
-    """Owns the network; a lock is held for each step, order and look, none of which waits."""
+    """Owns the network; a lock is held for each step, order and reading, none of which waits."""
 
     def __init__(
         self,
@@ -70,8 +70,8 @@ class InProcessMesh:
         with self._lock:
             self._network.run_for(seconds)
 
-    def look(self) -> tuple[MeshStatus, list[EventRecord]]:
-        """The mesh now, and what happened since the last look."""
+    def read(self) -> tuple[MeshStatus, list[EventRecord]]:
+        """The mesh now, and what happened since the last call."""
         with self._lock:
             for event in self._network.events[self._told :]:
                 self._batcher.observe(event)

@@ -18,7 +18,7 @@ from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
 
 PAYLOAD_BYTES = 32
 STANDSTILL_S = 20.0  # wall: time that does not move means that the world has died
-LOOK_PERIOD_S = 0.01
+POLL_PERIOD_S = 0.01
 WALL_LIMIT_S = 60.0  # for what takes a moment; a machine with much to do takes longer
 
 
@@ -28,7 +28,7 @@ def wait_for(what: str, within_s: float, condition: Callable[[], object]) -> Non
     while not condition():
         if time.monotonic() > deadline_s:
             raise AssertionError(f"timed out: {what}, waited {within_s:g} s")
-        time.sleep(LOOK_PERIOD_S)
+        time.sleep(POLL_PERIOD_S)
 
 
 def call(service: str, service_class: type, *arguments: object) -> object:
@@ -135,7 +135,7 @@ class MeshWatch:
             if time.monotonic() - moved_wall_s > STANDSTILL_S:
                 raise AssertionError(f"the world died: waited for '{what}', the clock stands still")
             begun_s = begun_s or now_s
-            time.sleep(LOOK_PERIOD_S)
+            time.sleep(POLL_PERIOD_S)
         return rospy.get_time() - begun_s
 
     def pass_time(self, duration_s: float) -> None:
@@ -211,9 +211,9 @@ class Stranger:
         """The first packet heard that starts like this."""
         found: list[bytes] = []
 
-        def look() -> bool:
+        def came() -> bool:
             found.extend(packet for packet in list(self.heard) if packet.startswith(start))
             return bool(found)
 
-        wait_for(f"{what} (packet {start.hex()}..); heard {len(self.heard)}", WALL_LIMIT_S, look)
+        wait_for(f"{what} (packet {start.hex()}..); heard {len(self.heard)}", WALL_LIMIT_S, came)
         return found[0]

@@ -26,7 +26,7 @@ LOOPBACK = "127.0.0.1"
 PART_WITHIN_S = 30.0  # wall; our choice, for master and probe
 END_WITHIN_S = 20.0  # wall; roslaunch itself waits 15 s before it kills a node
 LOG_LINES_SHOWN = 15
-LOOK_PERIOD_S = 0.05  # wall
+POLL_PERIOD_S = 0.05  # wall
 
 
 class BenchmarkError(MeshError):
@@ -155,7 +155,7 @@ class System:
                 return False
             self.check()
             progress()
-            time.sleep(LOOK_PERIOD_S)
+            time.sleep(POLL_PERIOD_S)
         return True
 
     def use(self) -> Use:

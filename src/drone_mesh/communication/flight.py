@@ -62,7 +62,7 @@ class Pilot:
             self._complaints.add("own location unknown", str(error), self._deadlines.now_s)
             return None
 
-    def look(self) -> Location | None:
+    def place(self) -> Location | None:
         """The drone's position; None, without a log line, if it is unknown."""
         try:
             return self._located()

@@ -51,7 +51,7 @@ class NodeReporter:
             neighbours=len(parts.neighbours.ids()),
             hops=mesh.get_hops_from_gateway_away(),
             next_hop=parts.routing.get_direction_to_node(gateway),
-            place=parts.pilot.look(),
+            place=parts.pilot.place(),
             battery_percent=parts.pilot.battery_percent(),
             flying=parts.pilot.goal is not None,
             can_fly=not why_not,

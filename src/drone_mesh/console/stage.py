@@ -13,7 +13,7 @@ from drone_mesh.console.orders import MeshControls, OrderRefused
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.repair_story import RepairStory
 
-LOOK_PERIOD_S = 0.1  # wall time
+POLL_PERIOD_S = 0.1  # wall time
 
 
 class Stage:
@@ -52,7 +52,7 @@ class Stage:
                     orders = demonstration.advance(mesh)
                     self._store.set_story(describe(story, mesh, running=True))
                     await self._carry_out(orders)
-                await asyncio.sleep(LOOK_PERIOD_S)
+                await asyncio.sleep(POLL_PERIOD_S)
             await self._carry_out(demonstration.leave())
         except OrderRefused as error:
             await self._stop(demonstration, str(error), shown)

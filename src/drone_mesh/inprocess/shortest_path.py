@@ -9,7 +9,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.inprocess.clock import VirtualClock
 
 SHORTEST_PATH = "shortest_path"
-LOOK_EVERY_S = 0.1  # our choice: period for recomputing links, which change when drones fly
+RECOMPUTE_EVERY_S = 0.1  # our choice: period for recomputing links, which change when drones fly
 
 
 class LinkMap:
@@ -20,7 +20,7 @@ class LinkMap:
         self._clock = clock
         self._links = links
         self._next_hops: dict[int, dict[int, int]] = {}  # by destination, by node
-        self._looked_s = -LOOK_EVERY_S
+        self._computed_s = -RECOMPUTE_EVERY_S
 
     def neighbours(self, node: int) -> frozenset[int]:
         """The nodes that `node` can send to now."""
@@ -29,9 +29,9 @@ class LinkMap:
     def next_hop(self, node: int, destination: int) -> int:
         """The next hop of `node` on a shortest path, the lowest id of several, or NO_ROUTE."""
         now_s = self._clock.now_s
-        if now_s - self._looked_s >= LOOK_EVERY_S:
+        if now_s - self._computed_s >= RECOMPUTE_EVERY_S:
             self._next_hops.clear()
-            self._looked_s = now_s
+            self._computed_s = now_s
         if destination not in self._next_hops:
             self._next_hops[destination] = self._paths_to(destination)
         return self._next_hops[destination].get(node, NO_ROUTE)

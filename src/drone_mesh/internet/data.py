@@ -26,7 +26,7 @@ from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk
 LONGEST_WAIT_S = 60.0  # our choice
 SIGN_OF_LIFE_S = 15.0  # our choice: a comment line for a client without messages
 MOST_UNREAD = 256  # messages waiting for a slow client; with more, its connection ends
-_LOOK_S = 0.02
+_POLL_S = 0.02
 
 Destination = Annotated[
     int, Path(ge=0, le=TO_ALL, description=f"Node id; {TO_ALL}: all nodes, best effort.")
@@ -108,7 +108,7 @@ async def _over(sending: Sending, wait_s: float) -> None:
         now_s = time.monotonic()
         if now_s >= (until_s if sending.is_taken else give_up_s):
             return
-        await asyncio.sleep(_LOOK_S)
+        await asyncio.sleep(_POLL_S)
 
 
 async def _events(users: UsersDesk, port: Optional[int]) -> AsyncIterator[str]:

@@ -122,7 +122,7 @@ class MqttInternet(IInternetConnection):
         self._client.loop_start()
         self._end_subscription = self._users.subscribe(self._received)
         self._watch = threading.Thread(
-            target=self._look_after, args=(commands,), name=f"MQTT states {self._node}"
+            target=self._keep_states_published, args=(commands,), name=f"MQTT states {self._node}"
         )
         self._watch.start()
 
@@ -163,7 +163,7 @@ class MqttInternet(IInternetConnection):
                     self._dropped,
                 )
 
-    def _look_after(self, commands: IGatewayCommands) -> None:
+    def _keep_states_published(self, commands: IGatewayCommands) -> None:
         due_s = 0.0
         while not self._stopped.wait(RETRY_S):
             with self._lock:

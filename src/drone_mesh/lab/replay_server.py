@@ -14,7 +14,7 @@ from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.web.access import Access
 
 LOOPBACK = "127.0.0.1"
-LOOK_PERIOD_S = 0.5  # period of checks for Ctrl-C
+POLL_PERIOD_S = 0.5  # period of checks for Ctrl-C
 
 
 def serve_replay(
@@ -30,7 +30,7 @@ def serve_replay(
     print(f"{title}: {runner.url}  (Ctrl-C ends it)", flush=True)
     try:
         while True:
-            time.sleep(LOOK_PERIOD_S)
+            time.sleep(POLL_PERIOD_S)
     except KeyboardInterrupt:
         pass
     finally:

@@ -17,7 +17,7 @@ class IrqWatch:
         """The wait for the pin is over."""
         self._said = low
 
-    def looked(self, found: bool, low_for_nothing: bool) -> bool:
+    def polled(self, found: bool, low_for_nothing: bool) -> bool:
         """The chip was read after the wait; returns whether the pin is now considered broken.
 
         `found`: there were payloads, so the pin should have been low. `low_for_nothing`: all flags

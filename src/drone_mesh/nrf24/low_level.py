@@ -195,7 +195,7 @@ class NRF24LowLevelInterface:
         inbox = self._chip.inbox
         while True:
             with self._lock:
-                self._look()
+                self._poll()
             if inbox:
                 return [inbox.popleft() for _ in range(len(inbox))]
             left_s = until_s - self._runtime.now_s()
@@ -215,9 +215,9 @@ class NRF24LowLevelInterface:
                 return
             self._runtime.sleep(min(left_s, POLL_S))
             with self._lock:
-                self._look()
+                self._poll()
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         """Empty the FIFO, and periodically check that the chip still holds its settings."""
         if not self._powered or (not self._working and not self._ready()):
             return
@@ -226,7 +226,7 @@ class NRF24LowLevelInterface:
             found = chip.drain()
             if self._irq is not None and self._irq_watch.trusted:
                 low_for_nothing = not chip.flags_seen and self._irq.wait_low(0.0)
-                if self._irq_watch.looked(found, low_for_nothing):
+                if self._irq_watch.polled(found, low_for_nothing):
                     self._statistics.irq_fallbacks += 1
                     logger.warning("node %d: the IRQ pin does not work; polling", self.node_id)
             now_s = self._runtime.now_s()

@@ -31,7 +31,7 @@ POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms [DS Table 16]
 RPD_VALID_S = 250e-6  # settling 130 us and 40 us of signal [DS 6.4], and some room
 SWITCH_S = 505e-6  # an acknowledgement that is being sent must not be cut off
 SEND_WITHIN_S = 95e-3  # the longest transaction takes 87.1 ms
-LEAST_LOOKS = 50  # our choice: on a busy machine the time may pass while this process waits
+LEAST_POLLS = 50  # our choice: on a busy machine the time may pass while this process waits
 _POLL_S = 100e-6
 
 
@@ -173,8 +173,8 @@ class BenchRadio:
 
     def _wait_for_end(self, retransmits_s: float) -> int:
         until_s = self.runtime.now_s() + SEND_WITHIN_S + retransmits_s
-        for looks in itertools.count(1):
-            is_over = looks > LEAST_LOOKS and self.runtime.now_s() >= until_s
+        for polls in itertools.count(1):
+            is_over = polls > LEAST_POLLS and self.runtime.now_s() >= until_s
             self.link.command(Command.NOP)
             if self.link.status & (TX_DS.mask | MAX_RT.mask):
                 return self.link.status

@@ -106,8 +106,8 @@ class RadioNode:
             "events": self.events.since(after, self._started_s),
         }
 
-    def look_at_others(self) -> None:
-        """Have a gateway report what changed at its routers; to be called again and again."""
+    def check_others(self) -> None:
+        """Have a gateway report what changed at its routers; to be called periodically."""
         if self._changes is not None:
             self._slot.submit(self._note_changes)
 
@@ -115,7 +115,7 @@ class RadioNode:
         component = self.component
         assert self._changes is not None
         assert isinstance(component, MeshnetworkGateway)
-        self._changes.look(component.get_known_nodes(), component.get_node_reports(), now_s)
+        self._changes.compare(component.get_known_nodes(), component.get_node_reports(), now_s)
 
     def status(self) -> dict[str, Any]:
         """The result of `node_status`; any thread may call it."""

@@ -1,4 +1,4 @@
-"""NodeChanges: events of other nodes, as their gateway can tell them from what it hears."""
+"""NodeChanges: events of other nodes, derived from what their gateway hears."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LOST_AFTER_CHECKS = 3  # our choice: a route that is missing for a moment is no 
 
 @dataclass
 class _Seen:
-    """A node as it was at the last look."""
+    """A node as it was at the last call."""
 
     connected: bool = False
     routed_s: float = -math.inf  # when the gateway last had a route to it
@@ -24,7 +24,7 @@ class _Seen:
 
 
 class NodeChanges:
-    """Compares what a gateway knows of its routers with the look before. One thread."""
+    """Compares what a gateway knows of its routers with the call before. One thread."""
 
     def __init__(self, gateway: int, check_period_s: float, observer: MeshObserver) -> None:
         """`observer` is called with each event; the event's node is the router."""
@@ -33,7 +33,7 @@ class NodeChanges:
         self._observer = observer
         self._seen: dict[int, _Seen] = {}
 
-    def look(
+    def compare(
         self, known: Sequence[KnownNode], reported: Sequence[ReportedNode], now_s: float
     ) -> None:
         """Report what has changed since the last call; times are those of the core's clock."""

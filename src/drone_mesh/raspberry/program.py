@@ -36,7 +36,7 @@ from drone_mesh.stopping import StopRequest
 if TYPE_CHECKING:
     from drone_mesh.internet.status import StatusServer
 
-LOOK_PERIOD_S = 0.5  # our choice: how often the main thread checks the nodes
+POLL_PERIOD_S = 0.5  # our choice: how often the main thread checks the nodes
 ALIVE_PERIOD_S = 5.0  # our choice: several times in WatchdogSec of the units
 STATUS_PERIOD_S = 60.0  # our choice: one line a minute for each node
 LONELY_AFTER_S = 15.0  # our choice: one check period and half of the next
@@ -109,10 +109,10 @@ def _run(options: Options, request: StopRequest) -> None:
         manager = ServiceManager()
         manager.ready()
         watch = _Watch(nodes, options, manager)
-        while not request.wait(LOOK_PERIOD_S):
-            watch.look(time.monotonic())
+        while not request.wait(POLL_PERIOD_S):
+            watch.check(time.monotonic())
             for node in nodes:
-                node.look_at_others()
+                node.check_others()
             move_radios()
         manager.stopping()
         _log.info("stopping")
@@ -259,7 +259,7 @@ class _Watch:
         self._started_s = time.monotonic()
         self._lonely_at_s = self._started_s + LONELY_AFTER_S
 
-    def look(self, now_s: float) -> None:
+    def check(self, now_s: float) -> None:
         """Log what has changed; to be called periodically."""
         self._log_status(now_s)
         if len(self._nodes) > 1:

@@ -31,7 +31,7 @@ from drone_mesh.users.socket_path import is_served, socket_path
 MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
 MOST_CLIENTS = 32  # our choice
 REQUEST_WITHIN_S = 5.0  # our choice
-_LOOK_S = 0.1  # how soon a listener's thread notices the end of the node
+_POLL_S = 0.1  # how soon a listener's thread notices the end of the node
 
 _log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class LocalSocket:
             raise ConfigurationError(f"socket {path}: {error.strerror or error}") from error
         path.chmod(0o600)
         self._thread = threading.Thread(
-            target=self._server.serve_forever, args=(_LOOK_S,), name=f"users of {desk.node_id}"
+            target=self._server.serve_forever, args=(_POLL_S,), name=f"users of {desk.node_id}"
         )
 
     def start(self) -> None:
@@ -157,9 +157,9 @@ class _Client(socketserver.StreamRequestHandler):
         if seconds <= 0:
             return bool(wait(0.0))
         while seconds > 0 and not self.server.stopping:
-            if wait(min(seconds, _LOOK_S)):
+            if wait(min(seconds, _POLL_S)):
                 return True
-            seconds -= _LOOK_S
+            seconds -= _POLL_S
         return False
 
     def _listen(self, port: int | None) -> None:
@@ -167,7 +167,7 @@ class _Client(socketserver.StreamRequestHandler):
         try:
             self._say({"listening": self.server.desk.node_id})
             while not (self.server.stopping or self._is_gone()):
-                message = listener.next(_LOOK_S)
+                message = listener.next(_POLL_S)
                 if message is not None:
                     self._say(
                         {

@@ -17,7 +17,7 @@ import drone_mesh
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.view.picture import Scene
 
-LOOK_PERIOD_S = 0.05  # wall; at most 20 scenes a second
+POLL_PERIOD_S = 0.05  # wall; at most 20 scenes a second
 END_TIMEOUT_S = 3.0  # wall; between the end of the pipe and the end of the process
 
 _log = logging.getLogger(__name__)
@@ -45,15 +45,15 @@ def require_screen(argument: str) -> None:
 
 
 class WindowProcess:
-    """Shows what `look` returns, at most 20 times a second, until the window is closed.
+    """Shows what `read_scene` returns, at most 20 times a second, until the window is closed.
 
-    `look` is called in this object's thread, the only one that waits for the window.
+    `read_scene` is called in this object's thread, the only one that waits for the window.
     """
 
-    def __init__(self, look: Callable[[], Scene]) -> None:
+    def __init__(self, read_scene: Callable[[], Scene]) -> None:
         """Raises ConfigurationError if there is no screen."""
         require_screen("gui")
-        self._look = look
+        self._read_scene = read_scene
         self._stopped = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
@@ -114,8 +114,8 @@ class WindowProcess:
     def _send(self, scenes: Connection) -> None:
         """Send each new scene, until this object is stopped or the window is gone."""
         shown: Scene | None = None
-        while not self._stopped.wait(LOOK_PERIOD_S):
-            scene = self._look()
+        while not self._stopped.wait(POLL_PERIOD_S):
+            scene = self._read_scene()
             if scene != shown:
                 scenes.send(scene)
                 shown = scene

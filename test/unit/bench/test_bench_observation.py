@@ -16,7 +16,7 @@ from drone_mesh.bench.observation import (
 )
 
 
-def look(sim_s, on, connected, wall_s=0.0):
+def sample(sim_s, on, connected, wall_s=0.0):
     return StateSample(wall_s, sim_s, on=on, connected=connected, messages=0, flying=0, links=0)
 
 
@@ -29,7 +29,7 @@ def watch_of(drones, *sights):
 
 @pytest.mark.parametrize(
     "sight",
-    [look(1.5, 3, 2), Happening(0.25, 7, CONNECTED), Figures("air", 1.0, {"delivered": 12.0})],
+    [sample(1.5, 3, 2), Happening(0.25, 7, CONNECTED), Figures("air", 1.0, {"delivered": 12.0})],
 )
 def test_what_the_probe_says_arrives_as_it_was_meant(sight):
     assert from_line(to_line(sight)) == sight
@@ -51,7 +51,7 @@ def test_the_time_to_connect_is_counted_from_the_last_start_by_the_stamps_of_the
         Happening(1.4, 2, STARTED),
         Happening(1.2, 1, CONNECTED),
         Happening(1.9, 2, CONNECTED),
-        look(2.5, on=3, connected=2),
+        sample(2.5, on=3, connected=2),
     )
     assert watch.connected_after_s() == pytest.approx(0.5)
 
@@ -61,9 +61,9 @@ def test_without_the_first_events_the_states_give_the_time_to_connect():
         3,
         Happening(1.4, 2, STARTED),
         Happening(1.9, 2, CONNECTED),
-        look(1.5, on=3, connected=1),
-        look(2.0, on=3, connected=1),
-        look(2.5, on=3, connected=2),
+        sample(1.5, on=3, connected=1),
+        sample(2.0, on=3, connected=1),
+        sample(2.5, on=3, connected=2),
     )
     assert watch.connected_after_s() == pytest.approx(1.0)
 
@@ -74,20 +74,20 @@ def test_a_fleet_connected_before_its_last_node_started_took_no_time():
         Happening(1.0, 1, STARTED),
         Happening(1.1, 1, CONNECTED),
         Happening(1.3, 0, STARTED),
-        look(1.5, on=2, connected=1),
+        sample(1.5, on=2, connected=1),
     )
     assert watch.connected_after_s() == 0.0
 
 
 def test_a_fleet_that_is_never_wholly_connected_has_no_time_to_connect():
-    watch = watch_of(3, look(1.0, on=3, connected=1), look(90.0, on=3, connected=1))
+    watch = watch_of(3, sample(1.0, on=3, connected=1), sample(90.0, on=3, connected=1))
     assert watch.connected_after_s() is None
     assert watch.all_connected is None
 
 
 def test_connected_routers_do_not_count_as_all_while_a_node_is_missing():
-    watch = watch_of(3, look(1.0, on=2, connected=2), look(2.0, on=3, connected=2))
-    assert watch.all_connected == look(2.0, on=3, connected=2)
+    watch = watch_of(3, sample(1.0, on=2, connected=2), sample(2.0, on=3, connected=2))
+    assert watch.all_connected == sample(2.0, on=3, connected=2)
 
 
 def test_a_router_that_lost_its_connection_again_is_waited_for():
@@ -122,7 +122,7 @@ def test_connections_lost_before_the_measurement_do_not_count():
         3,
         Happening(4.0, 1, DISCONNECTED),
         Happening(5.0, 1, CONNECTED),
-        look(6.0, on=3, connected=2),
+        sample(6.0, on=3, connected=2),
         Happening(7.0, 1, DISCONNECTED),
         Happening(7.5, 2, DISCONNECTED),
         Happening(8.0, 1, CONNECTED),

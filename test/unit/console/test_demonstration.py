@@ -8,7 +8,7 @@ from drone_mesh.console.demonstration import RepairDemonstration
 from drone_mesh.console.orders import OrderRefused
 from drone_mesh.inprocess import Network
 
-LOOK_S = 0.2  # wall time between two states
+STATE_PERIOD_S = 0.2  # wall time between two states
 
 
 class Fleet:
@@ -46,8 +46,8 @@ class Fleet:
             mesh = type(mesh)(**{**vars(mesh), "real_time_factor": self.factor})
             for order in demonstration.advance(mesh):
                 order(self)
-            self.network.run_for(LOOK_S * self.factor)
-            self.wall_s += LOOK_S
+            self.network.run_for(STATE_PERIOD_S * self.factor)
+            self.wall_s += STATE_PERIOD_S
         for order in demonstration.leave():
             order(self)
 

@@ -9,7 +9,7 @@ from scenarios import layout
 
 from drone_mesh.view.table import mesh_table
 
-LOOK_S = 0.1
+STEP_S = 0.1
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +19,8 @@ def sentences():
     network.run_for(20.0)
     network.power(1, False)
     said = {node: [""] for node in network.nodes}
-    for _look in range(1300):
-        network.run_for(LOOK_S)
+    for _step in range(1300):
+        network.run_for(STEP_S)
         for node in network.status().nodes:
             sentence = re.sub(r"waits \d+ s", "waits", node.repair)
             if sentence != said[node.id][-1]:

@@ -31,7 +31,7 @@ class Watched:
         self.said.clear()
         for _ in range(round(duration_s)):
             self.network.run_for(1.0)
-            self._changes.look(
+            self._changes.compare(
                 self.gateway.get_known_nodes(),
                 self.gateway.get_node_reports(),
                 self.network.clock.now_s,

@@ -7,7 +7,7 @@ import math
 from drone_mesh.inprocess import Network
 from drone_mesh.state.repair_story import RepairStory, and_
 
-LOOK_S = 0.2
+STEP_S = 0.2
 
 
 def group_behind_a_chain(repair: str = "thesis") -> Network:
@@ -25,9 +25,9 @@ def story_of(network: Network, off: int, seconds: float) -> RepairStory:
     story = RepairStory()
     story.update(network.status())
     network.power(off, False)
-    for _ in range(round(seconds / LOOK_S)):
+    for _ in range(round(seconds / STEP_S)):
         story.update(network.status())
-        network.run_for(LOOK_S)
+        network.run_for(STEP_S)
     return story
 
 

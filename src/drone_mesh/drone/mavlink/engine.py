@@ -43,7 +43,7 @@ class MavlinkEngine(IDroneEngine):
         self._link = MavlinkLink(address)
         self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send)
         self._goals: deque[tuple[Location, bool]] = deque()  # and whether it lands there
-        self._look = (PilotStatus(), time.monotonic())
+        self._latest = (PilotStatus(), time.monotonic())
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"mavlink {node_id}", daemon=True)
         self._thread.start()
@@ -91,7 +91,7 @@ class MavlinkEngine(IDroneEngine):
 
     def status(self) -> PilotStatus:
         """The latest status of the drone; without a position if it is too old."""
-        status, taken_s = self._look
+        status, taken_s = self._latest
         if time.monotonic() - taken_s > STALE_S:
             silent = "the engine does not answer"
             return PilotStatus(location_trouble=silent, why_not_fly=silent)
@@ -132,7 +132,7 @@ class MavlinkEngine(IDroneEngine):
             except GoalRefused as error:
                 _log.warning("node %d: the goal is refused: %s", self._node_id, error)
             self._pilot.tick(now_s)
-            self._look = (self._pilot.status(now_s), now_s)
+            self._latest = (self._pilot.status(now_s), now_s)
             self._goals.popleft()
         self._pilot.tick(now_s)
-        self._look = (self._pilot.status(now_s), now_s)
+        self._latest = (self._pilot.status(now_s), now_s)

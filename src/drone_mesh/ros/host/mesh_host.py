@@ -25,7 +25,7 @@ from drone_mesh.ros.host.virtual_raspberry_pi import (
 from drone_mesh.state.figures import LOST_IN_RANGE, WORST_LAG
 
 RADIOS_TIMEOUT_S = 10.0  # our choice: wall seconds to wait for a simulator before starting nodes
-_LOOK_PERIOD_S = 0.02  # wall; our choice
+_POLL_PERIOD_S = 0.02  # wall; our choice
 _KINDS = {Role.GATEWAY: VirtualRaspberryPiGateway, Role.ROUTER: VirtualRaspberryPiRouter}
 
 _log = logging.getLogger(__name__)
@@ -100,7 +100,7 @@ class MeshHost:
             if time.monotonic() > deadline_s:
                 _log.warning("no simulator after %g s: starting without it", RADIOS_TIMEOUT_S)
                 return
-            time.sleep(_LOOK_PERIOD_S)
+            time.sleep(_POLL_PERIOD_S)
 
     def start_nodes(self, nodes: Mapping[int, Role]) -> None:
         """Start these nodes, given by id and role, in this order."""

@@ -27,7 +27,7 @@ from drone_mesh.ros.host.followed_fleet import FollowedFleet
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.mesh_settings import MeshSettings
 
-LOOK_PERIOD_S = 0.1  # wall; our choice
+POLL_PERIOD_S = 0.1  # wall; our choice
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
 PROGRESS_PERIOD_S = 0.5  # wall; the world continues without a host that is silent for two seconds
 
@@ -40,7 +40,7 @@ def _wait_for(what: str, is_there: Callable[[], bool], give_up: Callable[[], boo
         if time.monotonic() - logged_s >= WAITING_LOG_PERIOD_S:
             logged_s = time.monotonic()
             _log.info("waiting for %s", what)
-        time.sleep(LOOK_PERIOD_S)
+        time.sleep(POLL_PERIOD_S)
 
 
 def _whole_parameter(name: str) -> int:

@@ -17,9 +17,9 @@ from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused
 from drone_mesh.ros.host.announcements import Announcements, probe_of
 from drone_mesh.ros.host.simulator_connection import SimulatorConnection
 
-LOOK_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
-ANNOUNCE_AGAIN_AFTER = 20  # looks; our choice: an unregistered antenna is announced again
-LOOKS_PER_ROUND = 50  # our choice: each antenna is announced at least once in so many looks
+POLL_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
+ANNOUNCE_AGAIN_AFTER = 20  # polls; our choice: an unregistered antenna is announced again
+POLLS_PER_ROUND = 50  # our choice: each antenna is announced at least once in so many polls
 
 _log = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ class SimulatorLink(rospy.SubscribeListener):
         self._connection: SimulatorConnection | None = None
         self._lock = threading.Lock()
         self._throttled_log = ThrottledLog(_log)
-        self._look = threading.Event()
+        self._wake = threading.Event()
         self._stopping = False
         self._never_handed_over = 0  # this and the next: written by the executor's worker
         self._under_way = 0
@@ -63,7 +63,7 @@ class SimulatorLink(rospy.SubscribeListener):
     def stop(self) -> None:
         """Stop looking; returns when the thread has ended."""
         self._stopping = True
-        self._look.set()
+        self._wake.set()
         if self._thread.is_alive():
             self._thread.join()
 
@@ -154,20 +154,20 @@ class SimulatorLink(rospy.SubscribeListener):
     # Connecting, the link's own thread -------------------------------------------------------
 
     def _keep_connected(self) -> None:
-        looks = 0
+        polls = 0
         while not self._stopping and not rospy.is_shutdown():
-            self._look.wait(LOOK_PERIOD_S)
-            self._look.clear()
+            self._wake.wait(POLL_PERIOD_S)
+            self._wake.clear()
             connection = self._connection
             if connection is not None and not connection.is_connected():
                 self._lost(connection, ServiceGone("it closed its connections"))
             if self._connection is None:
                 self._try_to_connect()
             if self._connection is not None:
-                self.antennas.announce_next(math.ceil(len(self.antennas) / LOOKS_PER_ROUND))
+                self.antennas.announce_next(math.ceil(len(self.antennas) / POLLS_PER_ROUND))
             if self._connection is not None and self.antennas.unregistered():
-                looks += 1
-                if looks % ANNOUNCE_AGAIN_AFTER == 0:
+                polls += 1
+                if polls % ANNOUNCE_AGAIN_AFTER == 0:
                     self.antennas.announce_unregistered()
                 if not self._probing:
                     self._probing = True
@@ -199,10 +199,10 @@ class SimulatorLink(rospy.SubscribeListener):
             self._connection = None
         self._executor.submit(lambda _now_s: connection.close())  # not during a call of the worker
         _log.error("lost the simulator: %s", error)
-        self._look.set()
+        self._wake.set()
 
     # A thread of rospy -----------------------------------------------------------------------
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """A new subscriber, perhaps a new simulator. rospy waits: only wake the thread."""
-        self._look.set()
+        self._wake.set()

@@ -38,7 +38,7 @@ from drone_mesh.srv import (
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/protocol.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
-LOOK_PERIOD_S = 0.05
+POLL_PERIOD_S = 0.05
 ORDERS_IN_QUEUE = 512  # two whole fleets
 
 _log = logging.getLogger(__name__)
@@ -145,7 +145,7 @@ class DroneManager:
                 return True
             if time.monotonic() >= deadline_s:
                 return False
-            time.sleep(LOOK_PERIOD_S)
+            time.sleep(POLL_PERIOD_S)
         return False
 
 

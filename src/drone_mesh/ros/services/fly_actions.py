@@ -33,7 +33,7 @@ from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused,
 from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
 from drone_mesh.state.orders import OrderProgress
 
-LOOK_PERIOD_S = 1.0  # wall; our choice: how often the drones are compared with the actions
+POLL_PERIOD_S = 1.0  # wall; our choice: how often the drones are compared with the actions
 ORDER_TIMEOUT_S = 10  # wall; longer than the DroneManager waits for a gateway
 SENT_WITHIN_S = 30.0  # wall; our choice: a gateway reports an order within a second
 CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the processes of this node and of a gateway
@@ -87,13 +87,13 @@ class FlyActions:
 
     def run(self, ended: Callable[[], bool]) -> None:
         """Serve until `ended`."""
-        looked_s = -math.inf
+        polled_s = -math.inf
         while not ended():
-            if time.monotonic() - looked_s >= LOOK_PERIOD_S:
-                looked_s = time.monotonic()
-                self._look()
+            if time.monotonic() - polled_s >= POLL_PERIOD_S:
+                polled_s = time.monotonic()
+                self._poll()
             try:
-                work = self._work.get(timeout=LOOK_PERIOD_S / 4)
+                work = self._work.get(timeout=POLL_PERIOD_S / 4)
             except queue.Empty:
                 continue
             work()
@@ -114,7 +114,7 @@ class FlyActions:
 
     # The thread of `run` ---------------------------------------------------------------------
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         """Offer the actions of the present drones and no others; end flights without news."""
         try:
             present = drones_if_known()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
-from drone_mesh.ros.views.look import live_state, parse_with_bag, state_in_bag
+from drone_mesh.ros.views.state_source import live_state, parse_with_bag, state_in_bag
 from drone_mesh.view.scene import scene_of
 from drone_mesh.view.snapshot import DEFAULT_SIZE, render
 

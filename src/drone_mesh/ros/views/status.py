@@ -16,7 +16,13 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.views.look import WAIT_S, NoState, live_state, parse_with_bag, state_in_bag
+from drone_mesh.ros.views.state_source import (
+    WAIT_S,
+    NoState,
+    live_state,
+    parse_with_bag,
+    state_in_bag,
+)
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.trouble import all_connected, find_trouble
 from drone_mesh.view.table import mesh_table

@@ -28,7 +28,7 @@ from drone_mesh.srv import (
 from drone_mesh.world.factory import DroneFactory
 
 NODE_TIMEOUT_S = 5.0  # our choice, wall: how long a node may take to start or to end
-_LOOK_PERIOD_S = 0.02  # wall
+_POLL_PERIOD_S = 0.02  # wall
 
 _log = logging.getLogger(__name__)
 
@@ -144,5 +144,5 @@ def _comes_true(condition: Callable[[], bool]) -> bool:
     while not condition():
         if time.monotonic() > deadline_s or rospy.is_shutdown():
             return False
-        time.sleep(_LOOK_PERIOD_S)
+        time.sleep(_POLL_PERIOD_S)
     return True

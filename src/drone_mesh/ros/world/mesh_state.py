@@ -49,7 +49,7 @@ class MeshStatePublisher:
 
     def __init__(
         self,
-        look: Callable[[], WorldView],
+        read_view: Callable[[], WorldView],
         max_distance_m: float,
         routing: str,
         repair_strategy: str,
@@ -57,19 +57,19 @@ class MeshStatePublisher:
         obstacles: Sequence[ObstacleStatus] = (),
         shape: str = "",
     ) -> None:
-        """`look` is called in the thread of this object and must not wait for the world.
+        """`read_view` is called in the thread of this object and must not wait for the world.
 
         Any thread fills `happened` with events of the drones; this object empties it. `routing` and
         `repair_strategy` are the names of what the nodes use.
         """
-        self._look = look
+        self._read_view = read_view
         self._max_distance_m = max_distance_m
         self._routing, self._repair_strategy = routing, repair_strategy
         self._obstacles, self._shape = obstacles, shape
         self._roster = MeshRoster()
         self._reports: deque[tuple[HostReport, float]] = deque(maxlen=REPORTS_KEPT)
         self._forgotten: deque[int] = deque()
-        self._last_look: tuple[float, float] | None = None  # wall, simulated
+        self._last_state: tuple[float, float] | None = None  # wall, simulated
         self._latest: MeshStatus | None = None
         self._diagnosed_s = float("-inf")
         self._state = rospy.Publisher(names.STATE_TOPIC, MeshState, queue_size=1, latch=True)
@@ -134,7 +134,7 @@ class MeshStatePublisher:
             self._events.publish(event_msg(self._happened.popleft()))
 
     def _publish(self, now_s: float) -> None:
-        view = self._look()
+        view = self._read_view()
         drones = list(view.drones)
         self._publish_grounded(drones)
         nodes = self._roster.snapshot(drones, now_s)
@@ -163,7 +163,7 @@ class MeshStatePublisher:
             self._grounded.publish(GroundedDrones(list(grounded), list(grounded.values())))
 
     def _achieved(self, now_s: float, view: WorldView) -> float:
-        before, self._last_look = self._last_look, (now_s, view.stamp_s)
+        before, self._last_state = self._last_state, (now_s, view.stamp_s)
         if before is None or view.paused:
             return 0.0
         return max(0.0, (view.stamp_s - before[1]) / (now_s - before[0]))

@@ -18,7 +18,7 @@ from drone_mesh.world.under_way import UnderWay
 # last consequence of an event. The mesh waits more than ten times as long for an answer.
 MAX_LAG_S = 0.03
 HOST_TIMEOUT_S = 2.0  # wall seconds; the world continues without a host that is silent for longer
-LOOK_AGAIN_AFTER_S = 1.0  # wall seconds; between two checks whether a stranger is a host
+ASK_AGAIN_AFTER_S = 1.0  # wall seconds; between two checks whether a stranger is a host
 
 _log = logging.getLogger(__name__)
 
@@ -127,7 +127,7 @@ class PacedHosts:
     def _is_host(self, reporter: str) -> bool:
         """Whether it has declared itself a host; asks the master at most once a second."""
         now_s = time.monotonic()
-        if now_s - self._strangers.get(reporter, -math.inf) < LOOK_AGAIN_AFTER_S:
+        if now_s - self._strangers.get(reporter, -math.inf) < ASK_AGAIN_AFTER_S:
             return False
         if rospy.has_param(names.host_param(reporter)):
             self._strangers.pop(reporter, None)

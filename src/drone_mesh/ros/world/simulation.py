@@ -124,14 +124,14 @@ class RosSimulation:
         configuration, world = self._parameters.configuration, self._world
         runner = WorldRunner(world, configuration.real_time_factor, host)
 
-        def look() -> WorldView:
+        def read_view() -> WorldView:
             now_s = world.now_s
             views = drone_views(self._present(), now_s)
             return WorldView(now_s, views, runner.wanted_factor, runner.paused)
 
         obstacles = self._parameters.obstacles
         state = MeshStatePublisher(
-            look,
+            read_view,
             configuration.max_distance,
             configuration.routing,
             configuration.repair,

@@ -29,7 +29,7 @@ _MEASURE_PERIOD_S = 1.0  # wall
 _LOG_PERIOD_S = 10.0  # wall
 _TOO_SLOW = 0.95  # of the requested factor
 _NAP_S = 0.001  # wall; while the mesh processes what is due
-_TASK_LOOK_S = 0.2  # wall; how soon a waiting caller notices the end of the simulation
+_TASK_POLL_S = 0.2  # wall; how soon a waiting caller notices the end of the simulation
 _LONGEST_NAP_S = 0.05  # wall; a new speed or Ctrl-C takes effect after this at the latest
 
 _log = logging.getLogger(__name__)
@@ -83,7 +83,7 @@ class WorldRunner:
         self._tasks.append((function, future))
         while True:
             try:
-                return future.result(_TASK_LOOK_S)
+                return future.result(_TASK_POLL_S)
             except TimeoutError:
                 if self._over.is_set():
                     raise FleetRefused("the simulation ends") from None

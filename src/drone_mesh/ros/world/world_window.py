@@ -21,11 +21,11 @@ def window_of(
     """A window that is not started yet; it shows current positions and the latest state."""
     lost_links = LostLinks()
 
-    def look() -> Scene:
+    def read_scene() -> Scene:
         mesh = state.latest
         if mesh is None:
             return Scene(title="starting")
         lost = lost_links.update(known_links(mesh.nodes), time.monotonic())
         return scene_of(mesh, lost, drone_views(drones(), world.now_s))
 
-    return WindowProcess(look)
+    return WindowProcess(read_scene)
