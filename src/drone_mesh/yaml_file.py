@@ -19,6 +19,8 @@ MAX_FILE_BYTES = 500_000
 MAX_DEPTH = 10
 MAX_VALUE_CHARACTERS = 250
 
+MERGE_TAG = "tag:yaml.org,2002:merge"  # of the key <<
+
 KeyPath = Tuple[Hashable, ...]
 
 
@@ -44,20 +46,20 @@ class YamlFile:
         return str(self.path)
 
 
-def read_mapping(path: str | Path) -> YamlFile:
+def read_mapping(path: str | Path, limited: bool = True) -> YamlFile:
     """Read this file like read_mapping_text; also raises ConfigurationError if unreadable."""
-    return read_mapping_text(_read_text(path), path)
+    return read_mapping_text(_read_text(path, limited), path, limited)
 
 
-def read_mapping_text(text: str, path: str | Path) -> YamlFile:
+def read_mapping_text(text: str, path: str | Path, limited: bool = True) -> YamlFile:
     """The mapping in this text of a file; an empty file is an empty mapping.
 
     `path` is for messages. Raises ConfigurationError (one line: file, line, what is wrong) for
-    invalid YAML, duplicate keys, exceeded limits (above) and anything but a mapping. Aliases
-    (*name) are refused, because a few lines of them can expand to gigabytes.
+    invalid YAML, duplicate keys and anything but a mapping. If `limited`, also for exceeded limits
+    (above) and for aliases (*name), because a few lines of them can expand to gigabytes.
     """
     try:
-        loader = _Loader(text)
+        loader = _Loader(text, limited)
         root = loader.get_single_node()
         lines: dict[KeyPath, int] = {}
         if root is not None:
@@ -66,7 +68,7 @@ def read_mapping_text(text: str, path: str | Path) -> YamlFile:
     except yaml.MarkedYAMLError as error:
         line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
         raise ConfigurationError(f"{path}{line}: {error.problem}") from error
-    except (yaml.YAMLError, ValueError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {' '.join(str(error).split())}") from error
     if content is None:
         content = {}
@@ -77,13 +79,13 @@ def read_mapping_text(text: str, path: str | Path) -> YamlFile:
     return YamlFile(path, content, lines)
 
 
-def _read_text(path: str | Path) -> str:
+def _read_text(path: str | Path, limited: bool) -> str:
     try:
         # Opening a pipe waits for its writer, and a device may never end.
         status = Path(path).stat()
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
             raise ConfigurationError(f"{path}: not a regular file")
-        if status.st_size > MAX_FILE_BYTES:
+        if limited and status.st_size > MAX_FILE_BYTES:
             raise ConfigurationError(f"{path}: larger than {MAX_FILE_BYTES} bytes")
         return Path(path).read_text(encoding="utf-8")
     except OSError as error:
@@ -93,13 +95,16 @@ def _read_text(path: str | Path) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader with limits, which refuses duplicate keys; SafeLoader would use the last one."""
+    """SafeLoader that refuses duplicate keys, of which SafeLoader uses the last; with limits."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, limited: bool) -> None:
         super().__init__(text)
+        self._limited = limited
         self._depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        if not self._limited:
+            return super().compose_node(parent, index)
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         mark: Any = event.start_mark
         if isinstance(event, yaml.AliasEvent):
@@ -125,11 +130,14 @@ class _Loader(yaml.SafeLoader):
         if not isinstance(node, yaml.MappingNode):
             return
         for key_node, value_node in node.value:
+            if key_node.tag == MERGE_TAG and not self._limited:
+                continue  # its keys come from another mapping
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, Hashable):
                 continue  # construct_document refuses it
             path = (*keys, key)
             if path in lines:
-                raise ConstructorError(None, None, f"duplicate key {key}", key_node.start_mark)
+                problem = f"duplicate key {key}, first on line {lines[path]}"
+                raise ConstructorError(None, None, problem, key_node.start_mark)
             lines[path] = key_node.start_mark.line + 1
             self.note_lines(value_node, path, lines)

@@ -2,14 +2,14 @@
 
 from typing import Any, List, Sequence, Union
 
-from drone_mesh.lab.marked_yaml import Place
+from drone_mesh.yaml_file import KeyPath
 
 
 class NoSuchPlace(Exception):
     """A dotted path that does not exist."""
 
 
-def put(content: Any, path: str, value: Any) -> Place:
+def put(content: Any, path: str, value: Any) -> KeyPath:
     """Set the value at a dotted path. A step into the faults is an index or an action's name."""
     place: List[Union[str, int]] = []
     steps = path.split(".")

@@ -17,8 +17,8 @@ from drone_mesh.lab import extensions, places
 from drone_mesh.lab.dotted_path import NoSuchPlace, put
 from drone_mesh.lab.experiment_source import Source, nearest_name
 from drone_mesh.lab.expression import ExpressionError, Where
-from drone_mesh.lab.marked_yaml import Place, read_marked
 from drone_mesh.lab.scenario import Fault, Part, Scenario
+from drone_mesh.yaml_file import KeyPath, read_mapping
 
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder
 
@@ -100,8 +100,11 @@ def load_experiment(
 
     `folder`: the location of the files and modules that it names, if not beside it.
     """
-    content, lines = read_marked(path)
-    source = Source(path, lines, folder or path.parent)
+    file = read_mapping(path, limited=False)  # its author may run code here anyway
+    content = file.content
+    source = Source(file, folder or path.parent)
+    if not content:
+        raise source.error((), "expected 'key: value' lines")
     for override in overrides:
         _override(content, override, source)
     extensions.search_in(source.folder)
@@ -156,7 +159,7 @@ def _override(content: Dict[str, Any], override: str, source: Source) -> None:
 
 def _cells(experiment: Experiment, source: Source) -> Iterator[Cell]:
     axes: List[List[Dict[str, Any]]] = []
-    named: Dict[str, Place] = {}
+    named: Dict[str, KeyPath] = {}
     for axis, values in experiment.sweep.items():
         named[axis] = ("sweep", axis)
         if not values:
@@ -190,10 +193,10 @@ def _where(experiment: Experiment, axes: Sequence[str], source: Source) -> Optio
 
 
 def _scenario(
-    experiment: Experiment, values: Mapping[str, Any], named: Mapping[str, Place], source: Source
+    experiment: Experiment, values: Mapping[str, Any], named: Mapping[str, KeyPath], source: Source
 ) -> Scenario:
     content = json.loads(json.dumps(experiment.base))
-    placed: Dict[Place, str] = {}
+    placed: Dict[KeyPath, str] = {}
     for axis, value in values.items():
         try:
             placed[put(content, axis, copy.deepcopy(value))] = axis
@@ -256,7 +259,7 @@ def _ids_of(fault: Fault) -> List[int]:
 
 
 def _check_metrics(experiment: Experiment, source: Source) -> None:
-    wanted: List[Tuple[Place, str]] = [
+    wanted: List[Tuple[KeyPath, str]] = [
         (("metrics", index), name) for index, name in enumerate(experiment.metrics)
     ]
     if experiment.stop is not None:

@@ -8,33 +8,30 @@ from pydantic import BaseModel, ValidationError
 from typing_extensions import get_args
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.marked_yaml import Lines, Place, nearest_line
+from drone_mesh.yaml_file import KeyPath, YamlFile
 
 
 class Source:
     """Creates errors that point into the file, or at the argument that overrode it."""
 
-    def __init__(self, path: Path, lines: Lines, folder: Path) -> None:
-        self.path = path
+    def __init__(self, file: YamlFile, folder: Path) -> None:
         self.folder = folder
-        self.lines = lines
-        self.overrides: Dict[Place, str] = {}
+        self.overrides: Dict[KeyPath, str] = {}
+        self._file = file
 
-    def error(self, place: Place, message: str) -> ConfigurationError:
+    def error(self, place: KeyPath, message: str) -> ConfigurationError:
         """The error to raise about the value at `place`."""
         for end in range(len(place), 0, -1):
             if place[:end] in self.overrides:
                 return ConfigurationError(f"argument {self.overrides[place[:end]]}: {message}")
-        line = nearest_line(self.lines, place)
-        where = f"{self.path}, line {line}" if line else f"{self.path}"
-        return ConfigurationError(f"{where}: {message}")
+        return ConfigurationError(f"{self._file.where(*place)}: {message}")
 
     def error_of(
-        self, error: ValidationError, before: Place, model: Any, shown: Place = ()
+        self, error: ValidationError, before: KeyPath, model: Any, shown: KeyPath = ()
     ) -> ConfigurationError:
         """The first problem that pydantic found, as one line. `shown`: where to point instead."""
         first = error.errors()[0]
-        inside: Place = tuple(first["loc"])
+        inside: KeyPath = tuple(first["loc"])
         key = ".".join(map(str, (*before, *inside))) or "the file"
         kind = first["type"]
         if kind == "extra_forbidden":
@@ -56,7 +53,7 @@ def nearest_name(name: str, known: Sequence[str]) -> str:
     return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
 
 
-def _keys_at(model: Any, place: Place) -> List[str]:
+def _keys_at(model: Any, place: KeyPath) -> List[str]:
     """The keys of a model at this place."""
     for step in place:
         if isinstance(step, int):

@@ -64,6 +64,16 @@ def test_zip_moves_axes_in_step(tmp_path: Path) -> None:
     assert [(c.scenario.layout.drones, c.scenario.duration_s) for c in cells] == [(4, 5), (9, 10)]
 
 
+def test_parts_may_be_shared_by_anchors_and_a_title_may_be_long(tmp_path: Path) -> None:
+    shared = GOOD.replace("kill: {share: 0.1}", "kill: &some {share: 0.1}")
+    shared = shared.replace("revive: {number: 1}", "revive: *some") + f"title: {'x' * 300}\n"
+    faults = load_experiment(write(tmp_path, shared)).cells[0].scenario.faults
+    assert faults[0].kill == faults[1].revive
+    merged = GOOD.replace("revive: {number: 1}", "revive: {<<: {number: 1}, pick: busiest}")
+    revive = load_experiment(write(tmp_path, merged)).cells[0].scenario.faults[1].revive
+    assert (revive.number, revive.pick) == (1, "busiest")
+
+
 def test_an_argument_overrides_the_file(tmp_path: Path) -> None:
     path = write(tmp_path, GOOD)
     loaded = load_experiment(path, ["seeds=7", "base.range_m=12", "sweep.radio.loss=[0.1]"])
