@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+from pathlib import Path
+from typing import Iterator
+
 
 class MeshError(Exception):
     """Base of every error that this package raises on purpose."""
@@ -17,6 +21,20 @@ class LocationUnknown(MeshError):
 
 class ConfigurationError(MeshError):
     """A parameter or a file is invalid. The message names it and what is allowed: show it, stop."""
+
+
+@contextlib.contextmanager
+def naming_argument(argument: str, path: str | Path) -> Iterator[None]:
+    """Put an argument in front of each ConfigurationError about its file.
+
+    `argument`: what the user wrote before the path, such as "casus:=" or "--key-file ".
+    """
+    try:
+        yield
+    except ConfigurationError as error:
+        if not str(error).startswith(str(path)):
+            raise
+        raise ConfigurationError(f"{argument}{error}") from error
 
 
 class FleetRefused(MeshError):

@@ -48,10 +48,21 @@ class BadArgumentsTest(unittest.TestCase):
         )
 
     def test_a_file_of_layouts_that_is_not_there(self) -> None:
-        self.launch_and_expect("casus:=/no/such.yaml", "/no/such.yaml: No such file or directory")
+        self.launch_and_expect(
+            "casus:=/no/such.yaml", "casus:=/no/such.yaml: No such file or directory"
+        )
 
     def test_a_file_of_obstacles_that_is_not_there(self) -> None:
-        self.launch_and_expect("obstacles:=/no/such.yaml", "/no/such.yaml: No such file")
+        self.launch_and_expect("obstacles:=/no/such.yaml", "obstacles: /no/such.yaml: No such")
+
+    def test_a_directory_in_place_of_a_configuration(self) -> None:
+        self.launch_and_expect("config:=/tmp", "config:=/tmp: Is a directory")
+
+    def test_a_configuration_in_another_folder(self) -> None:
+        self.launch_and_expect("config:=mine.yaml", "config:=mine.yaml: no such file in ")
+
+    def test_a_key_file_that_is_not_there(self) -> None:
+        self.launch_and_expect("key:=/no/such", "key: /no/such: No such file or directory")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from drone_mesh.bench.measurement import RosResult, measure
 from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, check_environment, free_port
 from drone_mesh.communication.key_file import read_key_file
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 
 WINDOW_S = 20.0  # two rounds of the default timing
 QUICK_WINDOW_S = 10.0
@@ -147,7 +147,10 @@ class Benchmark:
         self._soak: soak.SoakResult | None = None
         self._overload: list[overload.OverloadResult] = []
         self._seal_cost: inprocess.SealCost | None = None
-        self._key = None if options.key_file is None else read_key_file(options.key_file)
+        self._key = None
+        if options.key_file is not None:
+            with naming_argument("--key-file ", options.key_file):
+                self._key = read_key_file(options.key_file)
 
     def run(self) -> int:
         """Measure and return the exit code. An interrupted run prints its results so far."""

@@ -19,18 +19,17 @@ def read_key_file(path: Path) -> MeshKey | NodeKeys:
             mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
             if mode & _FOR_OTHERS:
                 raise ConfigurationError(
-                    f"key file {path}: other users can access it (mode {mode:04o}); "
-                    f"run: chmod 600 {path}"
+                    f"{path}: other users can access it (mode {mode:04o}); run: chmod 600 {path}"
                 )
             text = file.read()
     except OSError as error:
-        raise ConfigurationError(f"key file {path}: {error.strerror or error}") from error
+        raise ConfigurationError(f"{path}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise ConfigurationError(f"key file {path}: not a text file") from error
+        raise ConfigurationError(f"{path}: not a text file") from error
     try:
         return keys_from_text(text)
     except ConfigurationError as error:
-        raise ConfigurationError(f"key file {path}: {error}") from None
+        raise ConfigurationError(f"{path}: {error}") from None
 
 
 def write_key_file(path: Path, keys: MeshKey | NodeKeys) -> None:

@@ -120,7 +120,7 @@ def main(argv: list[str] | None = None) -> int:
         try:
             written = trace.write(arguments.trace)
         except OSError as error:
-            print(f"cannot write {arguments.trace}: {error.strerror}", file=sys.stderr)
+            print(f"--trace {arguments.trace}: {error.strerror}", file=sys.stderr)
             return 1
         print(f"{written} frames written to {arguments.trace}")
     return 0

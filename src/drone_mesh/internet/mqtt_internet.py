@@ -105,8 +105,10 @@ class MqttInternet(IInternetConnection):
         if broker.tls:
             try:
                 context = ssl.create_default_context(cafile=ca_file)
+            except ssl.SSLError as error:
+                raise ConfigurationError(f"--mqtt-ca {ca_file}: no certificate in PEM") from error
             except OSError as error:
-                raise ConfigurationError(f"{ca_file}: {error}") from error
+                raise ConfigurationError(f"--mqtt-ca {ca_file}: {error.strerror}") from error
             self._client.tls_set_context(context)
         self._client.will_set(self._topics.state(self._node), _offline(self._node), QOS, True)
         self._client.on_connect = self._on_connect

@@ -22,7 +22,17 @@ def main(argv: list[str] | None = None) -> int:
     """Run the seeds missing from the table, then summarise it. Returns 1 if a drone did harm."""
     arguments = _arguments(argv)
     seeds = range(arguments.first, arguments.first + arguments.runs)
-    rows = _read(arguments.csv, seeds) if arguments.csv is not None else []
+    rows = []
+    if arguments.csv is not None:
+        try:
+            rows = _read(arguments.csv, seeds)
+            arguments.csv.open("a").close()  # now, not after the first sequence
+        except OSError as error:
+            print(f"--csv {arguments.csv}: {error.strerror}", file=sys.stderr)
+            return 2
+        except (TypeError, ValueError, KeyError):
+            print(f"--csv {arguments.csv}: not a table of this program", file=sys.stderr)
+            return 2
     done = {row.seed for row in rows}
     try:
         with quiet_nodes():
@@ -140,10 +150,9 @@ def _read(path: Path, seeds: range) -> list[SequenceOutcome]:
 
 
 def _append(path: Path, outcome: SequenceOutcome) -> None:
-    is_new = not path.exists()
     with path.open("a", newline="", encoding="utf-8") as table:
         writer = csv.DictWriter(table, FIELDS)
-        if is_new:
+        if table.tell() == 0:
             writer.writeheader()
         writer.writerow(asdict(outcome))
 

@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Mapping
 
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings
+from drone_mesh.raspberry.secret_file import read_secret
 from drone_mesh.raspberry.wiring_options import whole
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
@@ -55,14 +56,8 @@ def http_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> 
     """The parsed options. Raises ConfigurationError."""
     token = environment.get(TOKEN_VARIABLE, "")
     if parsed.token_file is not None:
-        try:
-            token = parsed.token_file.read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigurationError(f"--token-file {parsed.token_file}: {error}") from error
-        if not token:
-            raise ConfigurationError(
-                f"--token-file {parsed.token_file}: the file contains no token"
-            )
+        with naming_argument("--token-file ", parsed.token_file):
+            token = read_secret(parsed.token_file, "token")
     try:
         access_for(parsed.bind, token)
     except ConfigurationError as error:

@@ -11,7 +11,7 @@ from typing import Sequence
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.key_file import read_key_file, write_key_file
 from drone_mesh.communication.keys import KEY_BYTES, MeshKey
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.raspberry.wiring_options import whole
 
 
@@ -40,9 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             write_key_file(parsed.file, MeshKey(secrets.token_bytes(KEY_BYTES)))
             print(f"raspberry_key: new mesh key in {parsed.file}")
         else:
-            keys = read_key_file(parsed.mesh_key)
-            if not isinstance(keys, MeshKey):
-                raise ConfigurationError(f"key file {parsed.mesh_key}: not a mesh key")
+            with naming_argument("mesh_key ", parsed.mesh_key):
+                keys = read_key_file(parsed.mesh_key)
+                if not isinstance(keys, MeshKey):
+                    raise ConfigurationError(f"{parsed.mesh_key}: not a mesh key")
             write_key_file(parsed.file, keys.for_node(parsed.id))
             print(f"raspberry_key: keys of node {parsed.id} in {parsed.file}")
     except ConfigurationError as error:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Mapping
 
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
+from drone_mesh.raspberry.secret_file import read_secret
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,6 @@ def mqtt_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> 
         return None
     password = environment.get(PASSWORD_VARIABLE, "")
     if parsed.mqtt_password_file is not None:
-        try:
-            password = parsed.mqtt_password_file.read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigurationError(
-                f"--mqtt-password-file {parsed.mqtt_password_file}: {error}"
-            ) from error
+        with naming_argument("--mqtt-password-file ", parsed.mqtt_password_file):
+            password = read_secret(parsed.mqtt_password_file, "password")
     return MqttOptions(parse_broker(parsed.mqtt, password), parsed.mqtt_ca)

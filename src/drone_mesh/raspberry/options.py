@@ -21,7 +21,7 @@ from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S, MeshTiming
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import Location
-from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
 from drone_mesh.nrf24.spi import SPI_HZ
@@ -316,7 +316,8 @@ def _options(
 def _keys(parsed: argparse.Namespace) -> MeshKey | NodeKeys | None:
     if parsed.key_file is None:
         return None
-    keys = read_key_file(parsed.key_file)
+    with naming_argument("--key-file ", parsed.key_file):
+        keys = read_key_file(parsed.key_file)
     if isinstance(keys, MeshKey):
         return keys
     if parsed.emulated or parsed.gateway:

@@ -18,9 +18,15 @@ class Certificate:
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError unless both files can be read and match."""
+        for option, path in (("--cert", self.cert), ("--key", self.key)):
+            try:
+                path.open("rb").close()
+            except OSError as error:
+                raise ConfigurationError(f"{option} {path}: {error.strerror}") from error
         try:
             ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.cert, self.key)
         except (OSError, ssl.SSLError) as error:
             raise ConfigurationError(
-                f"--cert {self.cert} and --key {self.key} cannot be used: {error}"
+                f"--cert {self.cert} and --key {self.key} cannot be used: expected a certificate "
+                f"and its private key, in PEM ({error})"
             ) from error

@@ -18,6 +18,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.inprocess import Network
 from drone_mesh.internet.mqtt_internet import MqttInternet
@@ -245,6 +246,22 @@ def test_what_happens_to_a_node_is_published(gateway, client):
     gateway.submit(lambda _now_s: gateway.internet.observe(lost))
     event = json.loads(client.next(is_topic("0/event")).payload)
     assert event == {"event": "neighbour lost", "peer": 1, "detail": ""}
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("none", "No such file or directory"),
+        (".", "Is a directory"),
+        ("empty", "no certificate in PEM"),
+    ],
+)
+def test_a_certificate_that_cannot_be_read_is_named_by_its_option(tmp_path, name, reason):
+    (tmp_path / "empty").touch()
+    broker = Broker("127.0.0.1", 8883, tls=True, mesh="field")
+    with pytest.raises(ConfigurationError) as error:
+        Gateway(broker, tmp_path / name)
+    assert str(error.value) == f"--mqtt-ca {tmp_path / name}: {reason}"
 
 
 def test_data_goes_over_tls_with_a_password(secure_broker, tmp_path):

@@ -33,3 +33,12 @@ def test_the_command_goes_on_where_it_was_stopped(tmp_path, capsys):
     lines = table.read_text(encoding="utf-8").splitlines()
     assert [line.split(",")[0] for line in lines] == ["seed", "0", "1", "2"]
     assert "3 sequences, seeds 0..2" in capsys.readouterr().out
+
+
+def test_a_table_that_cannot_be_used_is_refused_before_the_first_sequence(tmp_path, capsys):
+    assert main(["--runs", "1", "--csv", str(tmp_path / "none" / "table")]) == 2
+    assert capsys.readouterr().err == (f"--csv {tmp_path}/none/table: No such file or directory\n")
+    other = tmp_path / "other.csv"
+    other.write_text("a,b\n1,2\n")
+    assert main(["--runs", "1", "--csv", str(other)]) == 2
+    assert capsys.readouterr().err == f"--csv {other}: not a table of this program\n"

@@ -224,7 +224,13 @@ def test_a_wrong_option_ends_the_program_with_status_2_and_the_reason(capsys, li
     [
         ("--bind 0.0.0.0", "0.0.0.0: other machines can reach it; set a token.*--token-file"),
         ("--port 0", "invalid value '0': must be a whole number 1..65535"),
-        ("--token-file /no/such/file", "--token-file /no/such/file: .*No such file"),
+        ("--token-file /no/such/file", ": --token-file /no/such/file: No such file or directory$"),
+        ("--token-file /", "--token-file /: Is a directory$"),
+        ("--key-file /no/such/file", ": --key-file /no/such/file: No such file or directory$"),
+        (
+            "--mqtt mqtts://u@h/m --mqtt-password-file /dev/null",
+            "--mqtt-password-file /dev/null: the file contains no password",
+        ),
         ("--token-file /dev/null", "--token-file /dev/null: the file contains no token"),
     ],
 )

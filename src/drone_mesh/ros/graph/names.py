@@ -10,6 +10,7 @@ OTHERS_IN_RANGE_SERVICE = "/SignalSimulator/othersinRange"
 MESSAGES_SERVICE = "/SignalSimulator/messages"
 BROADCAST_SERVICE = "/SignalSimulator/broadcast"
 
+LAYOUTS_PARAM = "/DroneManager/casus"  # the file of the layouts; empty or not set: the usual one
 GATEWAY_TOPIC = "/gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
 GATEWAY_ANSWERS_TOPIC = "/gateway/answers"  # FlightOrderAnswer: each gateway -> DroneManager
 REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"

@@ -12,8 +12,9 @@ import rospy
 from drone_mesh.air.obstacle_file import read_obstacles
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import Layouts
+from drone_mesh.ros.graph import names
 
 PACKAGE = "drone_mesh"
 
@@ -34,38 +35,55 @@ def factory_configuration(*keys: str) -> FactoryConfiguration:
     Raises ConfigurationError.
     """
     given = {key: rospy.get_param(f"~{key}", "") for key in keys}
-    return load_configuration(file_parameter("config", "factory.yaml"), given)
+    return _read("~config", "factory.yaml", lambda path: load_configuration(path, given))
 
 
 def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | None:
     """The boxes that the configuration names, or None. Raises ConfigurationError."""
-    path = configuration.obstacles
-    if not path:
+    if not configuration.obstacles:
         return None
-    if not Path(path).expanduser().is_absolute():  # roslaunch starts nodes in another folder
+    path = Path(configuration.obstacles).expanduser()
+    if not path.is_absolute():  # roslaunch starts nodes in another folder
         raise ConfigurationError(
-            f"invalid obstacles {path!r}: expected an absolute path, such as $PWD/{path}"
+            f"invalid obstacles {configuration.obstacles!r}: expected an absolute path, such as "
+            f"$PWD/{configuration.obstacles}"
         )
-    return read_obstacles(Path(path).expanduser(), configuration.obstacle_radio == "block")
+    with naming_argument("obstacles: ", path):
+        return read_obstacles(path, configuration.obstacle_radio == "block")
 
 
-def manager_layouts() -> Layouts:
-    """The layouts of the DroneManager, from the file in its parameter.
+def manager_layouts(parameter: str = names.LAYOUTS_PARAM) -> Layouts:
+    """The layouts of the DroneManager, from the file in this parameter.
 
     Raises ConfigurationError.
     """
-    given = str(rospy.get_param("/DroneManager/casus", ""))
-    return Layouts.load(given or file_parameter("casus", "casus.yaml"))
+    return _read(parameter, "casus.yaml", Layouts.load)
 
 
-def file_parameter(name: str, default: str) -> Path:
-    """The file in parameter `name`; by default `default` in the package's config folder."""
-    given = str(rospy.get_param(f"~{name}", ""))
-    if given:
-        return Path(given).expanduser()
+def _read(parameter: str, default: str, read: Callable[[Path], Result]) -> Result:
+    """Read the file in this parameter, by default `default` in the package's config folder.
+
+    Raises ConfigurationError, which names the argument if there is one.
+    """
+    argument = f"{parameter.lstrip('~').rpartition('/')[2]}:="
+    given = str(rospy.get_param(parameter, ""))
+    if not given:
+        return read(_in_package(default, argument))
+    path = Path(given).expanduser()
+    if not path.is_absolute() and not path.exists():
+        raise ConfigurationError(
+            f"{argument}{given}: no such file in {Path.cwd()}, where this program runs; "
+            f"give an absolute path, such as $PWD/{given}"
+        )
+    with naming_argument(argument, path):
+        return read(path)
+
+
+def _in_package(file: str, argument: str) -> Path:
     try:
-        return Path(rospkg.RosPack().get_path(PACKAGE)) / "config" / default
+        return Path(rospkg.RosPack().get_path(PACKAGE)) / "config" / file
     except rospkg.ResourceNotFound:
         raise ConfigurationError(
-            f"package {PACKAGE} is not on ROS_PACKAGE_PATH; source its setup.bash, or set ~{name}"
+            f"package {PACKAGE} is not on ROS_PACKAGE_PATH; source its setup.bash, or set "
+            f"{argument}"
         ) from None

@@ -15,7 +15,7 @@ from drone_mesh.communication.repair_strategies import create_repair_strategy
 from drone_mesh.communication.routing import create_routing_technique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.configuration import FactoryConfiguration
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
 
 
@@ -67,7 +67,8 @@ class MeshSettings:
 def _mesh_key(file: str) -> MeshKey | None:
     if not file:
         return None
-    keys = read_key_file(Path(file))
-    if not isinstance(keys, MeshKey):
-        raise ConfigurationError(f"key {file}: holds the keys of one node; expected a mesh key")
+    with naming_argument("key: ", file):
+        keys = read_key_file(Path(file))
+        if not isinstance(keys, MeshKey):
+            raise ConfigurationError(f"{file}: holds the keys of one node; expected a mesh key")
     return keys

@@ -20,7 +20,7 @@ from drone_mesh.ros.graph.conversions import flight_order, location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
-from drone_mesh.ros.graph.parameters import file_parameter, or_exit
+from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.services.order_answers import OrderAnswers
 from drone_mesh.ros.services.order_summary import OrderSummary
@@ -154,9 +154,8 @@ def main() -> None:
     prepare_node(DroneManager.__doc__)
     rospy.init_node("DroneManager")
     show_library_logs_on_rosout()
-    path = or_exit(lambda: file_parameter("casus", "casus.yaml"))
-    layouts = or_exit(lambda: Layouts.load(path))
+    layouts = or_exit(lambda: manager_layouts("~casus"))
     DroneManager(layouts)
-    _log.info("%d layouts: the built-in ones and those in %s", len(layouts.cases), path)
+    _log.info("%d layouts, the built-in ones among them", len(layouts.cases))
     MasterWatch().start()
     rospy.spin()

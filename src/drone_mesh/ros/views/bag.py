@@ -77,5 +77,7 @@ def _open(path: Path) -> rosbag.Bag:
         raise BagUnusable(
             f"{path}: the recording was not closed; 'rosbag reindex {path}' repairs it"
         ) from error
-    except (rosbag.ROSBagException, OSError, ValueError) as error:  # for arbitrary bytes
-        raise BagUnusable(f"{path}: not a readable bag ({error})") from error
+    except OSError as error:
+        raise BagUnusable(f"{path}: {error.strerror or error}") from error
+    except (rosbag.ROSBagException, ValueError) as error:  # for arbitrary bytes
+        raise BagUnusable(f"{path}: not a bag, or not a whole one") from error

@@ -113,10 +113,15 @@ def test_the_keys_of_a_node_make_no_keys_for_others(tmp_path, capsys):
     assert "not a mesh key" in capsys.readouterr().err
 
 
+def test_a_mesh_key_that_cannot_be_read_is_named_by_its_argument(tmp_path, capsys):
+    assert main(["node", str(tmp_path), "4", str(tmp_path / "other")]) == 1
+    assert capsys.readouterr().err == f"raspberry_key: mesh_key {tmp_path}: Is a directory\n"
+
+
 def test_a_key_file_that_is_not_there_is_one_line(tmp_path, capsys):
     with pytest.raises(ConfigurationError) as error:
         read_key_file(tmp_path / "none")
-    assert str(error.value) == f"key file {tmp_path}/none: No such file or directory"
+    assert str(error.value) == f"{tmp_path}/none: No such file or directory"
     assert main(["new", str(tmp_path / "none" / "key")]) == 1
     assert capsys.readouterr().err == (
         f"raspberry_key: key file {tmp_path}/none/key: No such file or directory\n"
