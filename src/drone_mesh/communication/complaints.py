@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
-from collections import Counter
+
+from drone_mesh.communication.throttle import Throttle
 
 COMPLAINT_PERIOD_S = 30.0  # our choice: one line per reason and node in this time
 FOREIGN_FOR_S = 60.0  # our choice: a neighbour speaks several times in this time
@@ -17,20 +18,15 @@ class Complaints:
 
     def __init__(self, node_id: int) -> None:
         self._node_id = node_id
-        self._logged_s: dict[str, float] = {}
+        self._throttle = Throttle(COMPLAINT_PERIOD_S)
         self._foreign = ("", -math.inf)
-        self.counts: Counter[str] = Counter()
+        self.counts = self._throttle.counts
 
     def add(self, reason: str, detail: str, now_s: float) -> None:
         """Count `reason`; log it with `detail` unless it was logged within the last period."""
-        self.counts[reason] += 1
-        logged_s = self._logged_s.get(reason)
-        if logged_s is not None and 0 <= now_s - logged_s < COMPLAINT_PERIOD_S:
-            return
-        self._logged_s[reason] = now_s
-        _log.warning(
-            "node %d: %s: %s (%d so far)", self._node_id, reason, detail, self.counts[reason]
-        )
+        if self._throttle.count(reason, now_s):
+            count = self.counts[reason]
+            _log.warning("node %d: %s: %s (%d so far)", self._node_id, reason, detail, count)
 
     def foreign(self, reason: str, payload: bytes, now_s: float) -> None:
         """A neighbour has another key than this node, or only one of the two has a key."""

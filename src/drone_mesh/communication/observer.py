@@ -65,6 +65,22 @@ def ignore_events(_event: MeshEvent) -> None:
     """An observer that does nothing."""
 
 
+class Observers:
+    """An observer that passes each event to several others."""
+
+    def __init__(self, *observers: MeshObserver) -> None:
+        self._observers = list(observers)
+
+    def add(self, observer: MeshObserver) -> None:
+        """Also pass each event to this one. Before the nodes start."""
+        self._observers.append(observer)
+
+    def __call__(self, event: MeshEvent) -> None:
+        """Pass an event on."""
+        for observer in self._observers:
+            observer(event)
+
+
 class Reporter:
     """Reports the events of one node to its observer."""
 

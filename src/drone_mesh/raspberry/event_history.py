@@ -8,7 +8,7 @@ from collections import deque
 from typing import Any
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.observer import MeshEvent, MeshEventKind, MeshObserver
+from drone_mesh.communication.observer import MeshEvent, MeshEventKind, Observers
 
 EVENTS_KEPT = 500  # our choice: an hour of a mesh with frequent changes
 
@@ -27,11 +27,7 @@ class EventHistory:
         self._lock = threading.Lock()
         self._number = 0
         self._kept: deque[tuple[int, MeshEvent]] = deque(maxlen=EVENTS_KEPT)
-        self._others: list[MeshObserver] = []  # complete before the nodes start
-
-    def pass_on(self, observer: MeshObserver) -> None:
-        """Also pass each event to `observer`. Before the nodes start."""
-        self._others.append(observer)
+        self.others = Observers()  # that also get each event
 
     def observe(self, event: MeshEvent) -> None:
         """A MeshObserver."""
@@ -39,8 +35,7 @@ class EventHistory:
             self._number += 1
             self._kept.append((self._number, event))
         _log_event(event)
-        for observer in self._others:
-            observer(event)
+        self.others(event)
 
     def since(self, number: int, started_s: float) -> list[dict[str, Any]]:
         """Events after this number, oldest first, as JSON values; times relative to the start."""

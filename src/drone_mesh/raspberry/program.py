@@ -203,7 +203,7 @@ def _internet(options: Options) -> MakeInternet:
         connections: list[IInternetConnection] = []
         if mqtt is not None:
             to_broker = mqtt_internet(node.submit, node.users, mqtt.broker, ca_file=mqtt.ca_file)
-            node.events.pass_on(to_broker.observe)
+            node.events.others.add(to_broker.observe)
             connections.append(to_broker)
         if http is not None:
             connections.append(_http(node, http, options.flight.origin))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections import Counter
+
+from drone_mesh.communication.throttle import Throttle
 
 COMPLAINT_PERIOD_S = 10.0  # our choice: one line per reason in this (wall) time
 
@@ -24,10 +25,9 @@ class ThrottledLog:
 
     def __init__(self, log: logging.Logger, period_s: float = COMPLAINT_PERIOD_S) -> None:
         self._log = log
-        self._period_s = period_s
-        self._logged_s: dict[str, float] = {}
-        self._lock = threading.Lock()  # guards the two dictionaries
-        self.counts: Counter[str] = Counter()
+        self._lock = threading.Lock()  # guards the throttle
+        self._throttle = Throttle(period_s)
+        self.counts = self._throttle.counts
 
     def warning(self, reason: str, text: str) -> None:
         """Count `reason`; log it with `text` unless it was logged within the last period."""
@@ -40,10 +40,7 @@ class ThrottledLog:
     def _complain(self, level: int, reason: str, text: str) -> None:
         now_s = time.monotonic()
         with self._lock:
-            self.counts[reason] += 1
+            is_due = self._throttle.count(reason, now_s)
             count = self.counts[reason]
-            logged_s = self._logged_s.get(reason)
-            if logged_s is not None and now_s - logged_s < self._period_s:
-                return
-            self._logged_s[reason] = now_s
-        self._log.log(level, "%s: %s (%d so far)", reason, text, count)
+        if is_due:
+            self._log.log(level, "%s: %s (%d so far)", reason, text, count)

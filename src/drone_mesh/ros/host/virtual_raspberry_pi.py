@@ -8,7 +8,7 @@ from typing import Callable
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.observer import MeshEvent
+from drone_mesh.communication.observer import Observers
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
@@ -46,7 +46,7 @@ class VirtualRaspberryPi(abc.ABC):
         self.slot = slot
         self.users = UsersDesk(node_id, slot.submit)
         self._users_of_node = UsersOfNode(self.users)
-        self._observers = [settings.observer]
+        self._observers = Observers(settings.observer)
         if settings.key is not None:
             antenna = SealedAntenna(
                 antenna,
@@ -66,7 +66,7 @@ class VirtualRaspberryPi(abc.ABC):
             repair=settings.repair,
             repair_options=settings.repair_options,
             timing=settings.timing,
-            observer=self._observe,
+            observer=self._observers,
             debug=settings.debug,
         )
 
@@ -83,10 +83,6 @@ class VirtualRaspberryPi(abc.ABC):
         self._users_of_node.stop()
         self.component.stop()
         self.engine.disconnect()
-
-    def _observe(self, event: MeshEvent) -> None:
-        for observer in self._observers:
-            observer(event)
 
     @abc.abstractmethod
     def _make_internet(self) -> IInternetConnection | None:
@@ -111,7 +107,7 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
             # Only one gateway forwards what is published; several would send it several times.
             sends, broker = self.node_id == 0, self.settings.broker
             mqtt = mqtt_internet(self.slot.submit, self.users, broker, sends=sends)
-            self._observers.append(mqtt.observe)
+            self._observers.add(mqtt.observe)
             return SeveralInternets(mock, mqtt)
         http = http_internet(
             self.slot.submit, HttpSettings(port=DEFAULT_PORT + self.node_id), users=self.users
