@@ -207,6 +207,9 @@ class Lane:
             if train.asks == 1:
                 self._round_trip.measured(now_s - train.asked_s)
             train.over(arrived)
+            for message in self._open.values():
+                if not message.ticket.reliable:
+                    message.sent &= message.known  # what is lost is not sent again
         elif arrived and not train.waits:
             train.over(arrived)
 
@@ -340,8 +343,11 @@ class Lane:
         return DataPacket(packets.POLL, packets.poll_body(poll), message)
 
     def _partly(self, message: OutgoingMessage, ack: Ack, now_s: float) -> None:
-        if ack.nonce != message.nonce or not message.ticket.reliable:
+        if ack.nonce != message.nonce:
             return  # an older answer: a newer one is on its way
+        if not message.ticket.reliable:
+            message.known = ack.has
+            return
         if message.asks == 1:
             self._round_trip.measured(now_s - message.asked_s)
         lost = message.sent & ~ack.has

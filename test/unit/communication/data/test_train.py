@@ -48,6 +48,16 @@ def test_behind_relays_no_more_than_a_train_leaves_without_an_answer(chain, reli
 
 
 @pytest.mark.parametrize("reliable", [True, False])
+def test_each_answered_train_is_followed_by_a_longer_one(chain, reliable):
+    kinds = left_node(chain, 3)
+    for _ in range(6):
+        chain.send(3, 0, bytes(1024), reliable=reliable)
+    assert chain.run_until(lambda: len(chain.received.get(0, [])) == 6, 30.0)
+    trains = "".join("P" if kind == packets.POLL else "f" for kind in kinds).split("P")
+    assert [len(train) for train in trains][:4] == [FIRST_LENGTH, 2 * FIRST_LENGTH, MOST_LENGTH, 64]
+
+
+@pytest.mark.parametrize("reliable", [True, False])
 def test_relays_are_informed_of_the_end_of_a_short_train_too(chain, reliable):
     kinds = left_node(chain, 3)
     chain.send(3, 0, bytes(199), reliable=reliable)
