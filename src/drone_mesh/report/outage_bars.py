@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from drone_mesh.report.drawing import figure_with_rows, svg_of
 from drone_mesh.report.story import RunStory
 from drone_mesh.state.outages import Outage
@@ -15,12 +17,17 @@ PHASES = (  # of an outage: until when, name, colour
     ("connected_s", "reconnects", LIGHT.connected),
 )
 OPACITY = 0.6
+ROW_IN = 0.32
+MOST_ROWS_IN = 12.0  # the rows of a crowd share this height: the page stays readable
+NAMED_ROW_IN = 0.16  # in lower rows the names of the nodes would overlap
 
 
 def outages_figure(story: RunStory) -> str:
     """The bars over simulated time."""
     nodes = sorted({outage.node for outage in story.outages})
-    figure, (axes,) = figure_with_rows(1.2 + 0.32 * len(nodes))
+    row_in = min(ROW_IN, MOST_ROWS_IN / len(nodes))
+    step = math.ceil(NAMED_ROW_IN / row_in)  # 1: every row has its name
+    figure, (axes,) = figure_with_rows(1.2 + row_in * len(nodes))
     end_s = story.samples[-1].stamp_s
     named: set[str] = set()
     for outage in story.outages:
@@ -32,9 +39,9 @@ def outages_figure(story: RunStory) -> str:
                 row, stop_s - start_s, left=start_s, height=0.62, color=colour, alpha=OPACITY,
                 label=label,
             )  # fmt: skip
-        if outage.connected_s is None:
+        if outage.connected_s is None and step == 1:
             axes.text(end_s, row, " still disconnected", va="center", color=LIGHT.disconnected)
-    axes.set_yticks(range(len(nodes)), [f"node {node}" for node in nodes])
+    axes.set_yticks(range(0, len(nodes), step), [f"node {node}" for node in nodes[::step]])
     axes.set_ylim(len(nodes) - 0.4, -0.6)  # the lowest id on top, and the same room in a crowd
     axes.set_xlabel("simulated time, s")
     figure.legend(loc="outside upper left", ncols=4, frameon=False, labelcolor=LIGHT.ink)

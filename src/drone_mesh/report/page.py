@@ -10,10 +10,17 @@ from drone_mesh.report.charts import messages_figure, timeline_figure
 from drone_mesh.report.maps import maps_figure
 from drone_mesh.report.outage_bars import outages_figure
 from drone_mesh.report.story import RunStory
-from drone_mesh.report.tables import EVENT_KINDS_LEFT_OUT, key_numbers, repair_rows, repairs_left
+from drone_mesh.report.tables import (
+    EVENT_KINDS_LEFT_OUT,
+    key_numbers,
+    outages_in_words,
+    repair_rows,
+    repairs_left,
+)
 from drone_mesh.state.trouble import find_trouble, summarise
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 
+ROWS_SHOWN = 40  # a longer table of outages is folded
 _TEMPLATE = Path(__file__).resolve().parent / "page.html"
 
 
@@ -28,6 +35,8 @@ def render_page(story: RunStory, title: str) -> str:
         numbers=key_numbers(story),
         summary=summarise(story.after.nodes, find_trouble(story.after.nodes)),
         repairs=repair_rows(story),
+        outages_in_words=outages_in_words(story),
+        rows_shown=ROWS_SHOWN,
         left=repairs_left(story),
         blips=story.blips,
         timeline=timeline_figure(story),

@@ -42,6 +42,21 @@ def key_numbers(story: RunStory) -> list[tuple[str, str]]:
     ]
 
 
+def outages_in_words(story: RunStory) -> str:
+    """How many nodes had an outage, had none, and had one that did not end."""
+    present = {node.id for node in story.after.nodes}
+    without = len(present - {outage.node for outage in story.outages})
+    nodes = len({outage.node for outage in story.outages})
+    still = len({outage.node for outage in story.outages if outage.connected_s is None})
+    return f"{_nodes(nodes)} had an outage of a second or longer; {_nodes(without)} had none." + (
+        f" {_nodes(still).capitalize()} had no gateway at the end." if still else ""
+    )
+
+
+def _nodes(count: int) -> str:
+    return f"{count} node{'s' * (count != 1)}"
+
+
 def repair_rows(story: RunStory) -> list[dict[str, str]]:
     """One row per outage: when it happened, and the duration of each repair phase."""
     return [

@@ -8,9 +8,9 @@ import re
 import pytest
 
 from drone_mesh.drone.roles import Role
-from drone_mesh.report.outage_bars import phases_of
+from drone_mesh.report.outage_bars import outages_figure, phases_of
 from drone_mesh.report.page import render_page
-from drone_mesh.report.story import NothingRecorded, tell_story
+from drone_mesh.report.story import NothingRecorded, RunStory, tell_story
 from drone_mesh.report.tables import key_numbers, repair_rows, write_csv
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
@@ -178,3 +178,35 @@ def test_the_page_says_what_each_node_still_does_about_its_lost_connection_at_th
 
 def test_the_page_of_a_mesh_that_needs_no_repair_has_no_such_list():
     assert "<li>" not in render_page(tell_story(STATES, EVENTS), "a run")
+
+
+def crowd(nodes: int, without: int) -> RunStory:
+    """All nodes but the last `without` have an outage; that of node 1 does not end."""
+    mesh = MeshStatus(
+        9.0, [NodeStatus(node, position=(float(node), 0.0, 0.0)) for node in range(nodes)]
+    )
+    lost = [EventRecord(1.0, node, "disconnected") for node in range(nodes - without)]
+    back = [EventRecord(7.0, event.node, "connected", (0,)) for event in lost if event.node != 1]
+    return tell_story([mesh], [*lost, *back])
+
+
+def test_the_chart_of_a_crowd_is_not_higher_than_two_pages():
+    heights = {}
+    for nodes in (3, 253):
+        svg = outages_figure(crowd(nodes, 1))
+        found = re.search(r'height="([0-9.]+)pt"', svg)
+        assert found
+        heights[nodes] = float(found[1]) / 72
+        assert "node 0" in svg
+    assert heights[3] < 2.5
+    assert heights[253] < 14.0
+
+
+def test_the_page_says_how_many_nodes_had_no_outage_and_folds_a_long_table():
+    few, many = (render_page(crowd(nodes, 2), "run") for nodes in (4, 60))
+    assert (
+        "2 nodes had an outage of a second or longer; 2 nodes had none. "
+        "1 node had no gateway at the end."
+    ) in few
+    assert "outages as a table" not in few
+    assert "<summary>All 58 outages as a table</summary>" in many
