@@ -16,8 +16,8 @@ from rostest_support import WALL_LIMIT_S, call, wait_for
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_mesh.msg import Location
-from drone_mesh.srv import PowerSwitch
+from drone_mesh.msg import Location, MeshState
+from drone_mesh.srv import PowerSwitch, SetSpeed
 
 RVIZ_LIMIT_S = 40.0  # software rendering takes its time
 
@@ -28,7 +28,11 @@ class MeshMarkersTest(unittest.TestCase):
             rospy.init_node("test_mesh_markers")
         self.markers: dict[tuple[str, int], Marker] = {}
         self.frames: dict[str, tuple[float, float, float]] = {}
+        self.stamps: list[tuple[str, rospy.Time]] = []  # of frames, in the order they came
+        self.states = 0
+        self.paused = False
         self.subscribers = [
+            rospy.Subscriber("/mesh/state", MeshState, self._on_state),
             rospy.Subscriber("/mesh/markers", MarkerArray, self._on_markers),
             rospy.Subscriber("/tf", TFMessage, self._on_frames),
         ]
@@ -36,6 +40,10 @@ class MeshMarkersTest(unittest.TestCase):
     def tearDown(self) -> None:
         for subscriber in self.subscribers:
             subscriber.unregister()
+
+    def _on_state(self, state: MeshState) -> None:
+        self.paused = state.paused
+        self.states += 1
 
     def _on_markers(self, array: MarkerArray) -> None:
         markers = dict(self.markers)
@@ -49,6 +57,7 @@ class MeshMarkersTest(unittest.TestCase):
     def _on_frames(self, message: TFMessage) -> None:
         for transform in message.transforms:
             place = transform.transform.translation
+            self.stamps.append((transform.child_frame_id, transform.header.stamp))
             self.frames[transform.child_frame_id] = (place.x, place.y, place.z)
             self.assertEqual(transform.header.frame_id, "map")
 
@@ -111,8 +120,25 @@ class MeshMarkersTest(unittest.TestCase):
         wait_for("rotors at rest", WALL_LIMIT_S, lambda: ("rotors", 0) not in self.markers)
         goals.unregister()
 
+    def test_4_a_paused_mesh_sends_no_frame_twice_and_shows_itself_to_newcomers(self) -> None:
+        wait_for("frames", WALL_LIMIT_S, lambda: len(self.frames) == 3)
+        call("/DroneFactory/setSpeed", SetSpeed, True, 0.0)
+        try:
+            wait_for("a paused state", WALL_LIMIT_S, lambda: self.paused)
+            self.stamps.clear()
+            seen = self.states
+            wait_for("twenty states", WALL_LIMIT_S, lambda: self.states >= seen + 20)
+            self.assertEqual(len(self.stamps), len(set(self.stamps)), self.stamps)
+            newcomer = ["rostopic", "echo", "-n", "1", "/tf/transforms[0]/child_frame_id"]
+            shown = subprocess.run(
+                newcomer, stdout=subprocess.PIPE, timeout=WALL_LIMIT_S, check=True, text=True
+            )
+            self.assertIn("drone_0", shown.stdout)
+        finally:
+            call("/DroneFactory/setSpeed", SetSpeed, False, 4.0)
+
     @unittest.skipUnless(shutil.which("rviz") and shutil.which("Xvfb"), "rviz or Xvfb is missing")
-    def test_4_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:
+    def test_5_rviz_runs_with_the_shipped_configuration_and_looks_at_the_mesh(self) -> None:
         config = os.path.join(rospkg.RosPack().get_path("drone_mesh"), "config", "drone_mesh.rviz")
         read, write = os.pipe()
         screen = subprocess.Popen(

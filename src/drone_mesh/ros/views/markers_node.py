@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import threading
+import contextlib
+import queue
 import time
+from typing import Callable, Iterable
 
 import rospy
 from geometry_msgs.msg import TransformStamped
@@ -16,9 +18,11 @@ from drone_mesh.ros.graph.command_line import prepare_node
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.views.markers import MarkerMaker
+from drone_mesh.ros.views.moved_frames import MovedFrames
 from drone_mesh.state.model import NodeStatus, position_is_known
 
-ALL_FRAMES_PERIOD_S = 1.0  # wall time; period of the frames of drones that do not move
+Send = Callable[[object], None]
+
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # x y z w
 
 
@@ -29,55 +33,64 @@ class MeshMarkers:
     Publishes:  /mesh/markers (MarkerArray), /tf (TFMessage); both at most as often as the state
     """
 
-    # The subscriber's thread does the work; the other threads of rospy only set `_newcomer`.
+    # The subscriber's thread does the work; the other threads of rospy only announce newcomers.
 
     def __init__(self) -> None:
         self._maker = MarkerMaker()
-        self._framed: dict[int, tuple[float, ...]] = {}
-        self._all_framed_s = float("-inf")
-        self._newcomer = threading.Event()
-        listener = _Newcomers(self._newcomer)
+        self._moved = MovedFrames()
+        self._new_viewers, self._new_listeners = _Newcomers(), _Newcomers()
         self._markers = rospy.Publisher(
-            names.MARKERS_TOPIC, MarkerArray, subscriber_listener=listener, queue_size=10
+            names.MARKERS_TOPIC, MarkerArray, subscriber_listener=self._new_viewers, queue_size=10
         )
-        self._frames = rospy.Publisher("/tf", TFMessage, queue_size=10)
+        self._frames = rospy.Publisher(
+            "/tf", TFMessage, subscriber_listener=self._new_listeners, queue_size=10
+        )
         rospy.Subscriber(names.STATE_TOPIC, MeshState, self._show, queue_size=1)
 
     def _show(self, state: MeshState) -> None:
         now_s = time.monotonic()
-        frames = self._moved_frames(state, now_s)
-        if frames.transforms:
-            self._frames.publish(frames)
+        stamp = state.header.stamp
+        newcomers = self._new_listeners.take()
+        moved = self._moved.select(state.nodes, stamp.to_sec(), now_s)
+        if moved:
+            self._frames.publish(_frames(moved, stamp))
+        if newcomers:  # the others have these frames, perhaps with this very stamp
+            sent = {node.id for node in moved}
+            known = [node for node in state.nodes if position_is_known(node)]
+            rest = _frames([node for node in known if node.id not in sent], stamp)
+            for send in newcomers:
+                send(rest)
         if self._markers.get_num_connections() == 0:
             return
-        if self._newcomer.is_set():
-            self._newcomer.clear()
+        if self._new_viewers.take():
             self._maker.forget_shown()
         markers = self._maker.markers(state, now_s)
         if markers.markers:
             self._markers.publish(markers)
 
-    def _moved_frames(self, state: MeshState, wall_s: float) -> TFMessage:
-        """Frames map -> drone_<id> of drones that moved; of all once per ALL_FRAMES_PERIOD_S."""
-        if wall_s - self._all_framed_s >= ALL_FRAMES_PERIOD_S:
-            self._all_framed_s = wall_s
-            self._framed.clear()
-        message = TFMessage()
-        for node in state.nodes:
-            position = tuple(node.position)
-            if position_is_known(node) and self._framed.get(node.id) != position:
-                self._framed[node.id] = position
-                message.transforms.append(_transform(node, state.header.stamp))
-        return message
-
 
 class _Newcomers(rospy.SubscribeListener):
-    def __init__(self, came: threading.Event) -> None:
-        super().__init__()
-        self._came = came
+    """New subscribers of a topic, each as the function that sends to it alone."""
 
-    def peer_subscribe(self, *_args: object) -> None:
-        self._came.set()
+    def __init__(self) -> None:
+        super().__init__()
+        self._new: queue.SimpleQueue[Send] = queue.SimpleQueue()
+
+    def peer_subscribe(self, _topic: str, _send_to_all: Send, send: Send) -> None:
+        self._new.put(send)
+
+    def take(self) -> list[Send]:
+        """Those since the last call."""
+        taken = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                taken.append(self._new.get_nowait())
+        return taken
+
+
+def _frames(nodes: Iterable[NodeStatus], stamp: rospy.Time) -> TFMessage:
+    """The frames map -> drone_<id>."""
+    return TFMessage(transforms=[_transform(node, stamp) for node in nodes])
 
 
 def _transform(node: NodeStatus, stamp: rospy.Time) -> TransformStamped:
