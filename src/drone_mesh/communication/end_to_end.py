@@ -213,4 +213,4 @@ def _use(windows: dict[int, ReplayWindow], creator: int, sequence: int) -> bool:
     if window is None:
         windows[creator] = ReplayWindow(sequence)
         return True
-    return window.use(window.expand(sequence, _SEQUENCES))
+    return window.use(window.expand(sequence))

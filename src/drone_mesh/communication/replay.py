@@ -15,10 +15,10 @@ class ReplayWindow:
         self.highest = highest
         self._seen = (1 << WIDTH) - 1  # bit n: highest - n was used
 
-    def expand(self, low: int, modulus: int) -> int:
-        """The value nearest to the highest one with the remainder `low`."""
-        ahead = (low - self.highest) % modulus
-        return self.highest + (ahead if ahead < modulus // 2 else ahead - modulus)
+    def expand(self, low: int) -> int:
+        """The value nearest to the highest one with these low 16 bits."""
+        highest = self.highest
+        return highest - _HALF + (low - highest + _HALF & _LOW)
 
     def use(self, value: int) -> bool:
         """Use a value whose packet is authentic. False: it was already used, or is too old."""
@@ -35,3 +35,5 @@ class ReplayWindow:
 
 
 _MASK = (1 << WIDTH) - 1
+_LOW = 2**16 - 1
+_HALF = 2**15

@@ -11,10 +11,10 @@ accepted.
 from __future__ import annotations
 
 import hashlib
-import hmac
 import random
 import struct
 from collections import OrderedDict
+from hmac import compare_digest
 from typing import NamedTuple
 
 from drone_mesh.communication import messages
@@ -32,14 +32,18 @@ WAITING_CHALLENGES = 16  # our choice: greatest number of nodes at once
 CHALLENGE_AGAIN_S = 2.0  # our choice: least time between two to the same node
 CHALLENGE_OUT_S = 0.5  # our choice: after that another node may take its slot
 
-_COUNT_BYTES = 2**16
 _EPOCH_BITS, _NONCE_BITS = 64, 64
-_COUNT = struct.Struct("<I")
 _CHALLENGE = struct.Struct("<Q")  # nonce
 _ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
-_NO_SEAL = bytes(SEAL_BYTES)
-_TO_ALL = bytes((BROADCAST,))
-_TO, _FORWARD = 3, 4
+_FROM, _TO, _FORWARD = 1, 3, 4
+_LOW_BYTES = 2**16 - 1  # of a counter: those in a packet
+
+# Each of these takes the whole packet (or all of it from `forward` on), and only the bytes before
+# its seal get into the result: one call is cheaper than slices that are put together.
+_covered = struct.Struct(f"<I{SEAL_AT}s").pack  # counter, packet
+_covered_to_all = struct.Struct(f"<I{_TO}sB{SEAL_AT - _FORWARD}s").pack
+_sealed = struct.Struct(f"<{SEAL_AT}sH{TAG_BYTES}s").pack  # packet, counter, tag
+_unsealed = struct.Struct(f"{SEAL_AT}s{SEAL_BYTES}x").pack
 
 
 class _Peer:
@@ -89,41 +93,34 @@ class HopSeal:
         if self._count == LAST_COUNT:
             self._begin_epoch()
         self._count = count = self._count + 1
-        head = payload[:SEAL_AT]
-        covered = head
         if payload[_FORWARD] == BROADCAST:  # `to` differs for each receiver
-            covered = head[:3] + _TO_ALL + head[4:]
-            state = self._state_to_all.copy()
+            tag = self._state_to_all.copy()
+            tag.update(_covered_to_all(count, payload, BROADCAST, payload[_FORWARD:]))
         else:
-            known = self._states.get(payload[_TO])
-            state = (known or self._state_to(payload[_TO])).copy()
-        number = _COUNT.pack(count)
-        state.update(number + covered)
-        return head + number[:2] + state.digest()  # little-endian: the low bytes come first
+            state = self._states.get(payload[_TO])
+            tag = (state or self._state_to(payload[_TO])).copy()
+            tag.update(_covered(count, payload))
+        return _sealed(payload, count & _LOW_BYTES, tag.digest())
 
     def open(self, payload: bytes, now_s: float) -> bytes | None:
         """The packet with zeros in place of its seal; None unless it is authentic and new."""
-        peer = self._peers.get(payload[1])
+        peer = self._peers.get(payload[_FROM])
         if peer is None or now_s - peer.heard_s > self._fresh_s:
             return None
-        head = payload[:SEAL_AT]
         window = peer.window
-        count = window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8, _COUNT_BYTES)
+        count = window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8)
         if not 0 <= count <= LAST_COUNT:
             return None
-        covered = head
         if payload[_FORWARD] == BROADCAST:
-            covered = head[:3] + _TO_ALL + head[4:]
-            state = peer.state_to_all.copy()
+            tag = peer.state_to_all.copy()
+            tag.update(_covered_to_all(count, payload, BROADCAST, payload[_FORWARD:]))
         else:
-            state = peer.state.copy()
-        state.update(_COUNT.pack(count) + covered)
-        if not hmac.compare_digest(state.digest(), payload[TAG_AT:]):
-            return None
-        if not window.use(count):
+            tag = peer.state.copy()
+            tag.update(_covered(count, payload))
+        if not compare_digest(tag.digest(), payload[TAG_AT:]) or not window.use(count):
             return None
         peer.heard_s = now_s
-        return head + _NO_SEAL
+        return _unsealed(payload)
 
     def knows(self, node: int, now_s: float) -> bool:
         """Whether the epoch of this neighbour is known and it was heard recently."""
@@ -207,7 +204,7 @@ class HopSeal:
 
     def _is_proven(self, payload: bytes) -> bool:
         proof = self._proof(payload[:TAG_AT], messages.sender(payload))
-        return hmac.compare_digest(proof, payload[TAG_AT:])
+        return compare_digest(proof, payload[TAG_AT:])
 
     def _proof(self, packet: bytes, other: int) -> bytes:
         """Covers all but byte 3, which differs for each receiver of a broadcast challenge."""
