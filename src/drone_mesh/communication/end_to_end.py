@@ -9,11 +9,11 @@ number, so that none counts twice.
 from __future__ import annotations
 
 import hashlib
-import hmac
 import random
 import struct
 from collections import deque
-from typing import NamedTuple
+from hmac import compare_digest
+from typing import Callable, NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import MAX_NODE_ID, PAYLOAD_BYTES
@@ -29,34 +29,66 @@ SAME_PACKET_S = 0.1  # our choice: tries and copies follow each other at once
 ORDER_TAG_BYTES = 6
 TAG_BYTES = 4
 
-_SEQUENCE = struct.Struct("<H")
-_SEQUENCE_AT = SEAL_AT - _SEQUENCE.size
+_SEQUENCE_BYTES = 2
 _SEQUENCES = 2**16
-_NONCE = struct.Struct("<I")
-_NONCE_AT = _SEQUENCE_AT - TAG_BYTES - _NONCE.size
-_PRESENT_NONCE_AT = SEAL_AT - 2 - _NONCE.size  # before the digest of its frame
+_NONCE_BYTES = 4
+_NONCE_AT = SEAL_AT - _SEQUENCE_BYTES - TAG_BYTES - _NONCE_BYTES
+_DIGEST_BYTES = 2  # of the frame of a PRESENT: it moves before the hop seal
+_DIGEST_AT = SEAL_AT - _DIGEST_BYTES
+_PRESENT_NONCE_AT = _DIGEST_AT - _NONCE_BYTES
 
+_CREATOR, _FROM, _TYPE, _FORWARD = 0, 1, 2, 4
 _HEARTBEAT = int(MessageType.HEARTBEAT)
+_REQUEST = int(MessageType.REQUESTLOCATION)
 _PRESENT = int(MessageType.PRESENT)
 _MISSING = int(MessageType.MISSING)
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
-_WITH_NONCE = {
-    _HEARTBEAT: _NONCE_AT,
-    int(MessageType.REQUESTLOCATION): _NONCE_AT,
-    _PRESENT: _PRESENT_NONCE_AT,
-}
 _PLACES = (int(MessageType.LOCATION), int(MessageType.GATEWAY_PLACE))
 _REPORTS = range(64, 125)  # the others of the range are for meshes with a key
+
+# As in seal.py: each takes the whole packet, of which only the first bytes get into the result.
+_with_nonce = struct.Struct(f"<{_NONCE_AT}sI{PAYLOAD_BYTES - _NONCE_AT - _NONCE_BYTES}x").pack
+_without_nonce = struct.Struct(f"{_NONCE_AT}s{PAYLOAD_BYTES - _NONCE_AT}x").pack
+_present_with_nonce = struct.Struct(f"<{_PRESENT_NONCE_AT}sI{_DIGEST_BYTES}s{SEAL_BYTES}x").pack
+_present_without_nonce = struct.Struct(
+    f"{_PRESENT_NONCE_AT}s{_NONCE_BYTES + SEAL_BYTES}x{_DIGEST_BYTES}s"
+).pack
+_nonce_of = struct.Struct(f"<{_NONCE_AT}xI").unpack_from
+_nonce_of_present = struct.Struct(f"<{_PRESENT_NONCE_AT}xI").unpack_from
+_nonce_and_sequence = struct.Struct("<IH").pack
+
+
+class _Form:
+    """What the proofs of some types of packets are like."""
+
+    def __init__(self, tag_bytes: int, by_authority: bool) -> None:
+        """`by_authority`: over the addressee; otherwise the key is that of the pair."""
+        self.tag_bytes = tag_bytes
+        self.by_authority = by_authority
+        self.at = at = _DIGEST_AT - tag_bytes  # where the proof starts
+        self.with_proof = struct.Struct(f"<{at}s{tag_bytes}sH{SEAL_BYTES}x").pack
+        self.without_proof = struct.Struct(f"{at}s{PAYLOAD_BYTES - at}x").pack
+        self.proof: Callable[[bytes], tuple[bytes, int]] = struct.Struct(
+            f"<{at}x{tag_bytes}sH"
+        ).unpack_from
+
+
+_OF_PAIR = _Form(TAG_BYTES, by_authority=False)
+_FORMS = {
+    _HEARTBEAT: _Form(TAG_BYTES, by_authority=True),
+    _ORDER: _Form(ORDER_TAG_BYTES, by_authority=True),
+    **dict.fromkeys((*_PLACES, *_REPORTS), _OF_PAIR),
+}
 
 
 def reserved_bytes(kind: int) -> int:
     """How many of the 27 bytes behind the header both seals of such a packet take."""
     if kind == _PRESENT:
-        return SEAL_BYTES + _NONCE.size  # the digest of its frame moves
+        return SEAL_BYTES + _NONCE_BYTES
     if kind == _HEARTBEAT:
         return PAYLOAD_BYTES - _NONCE_AT
     if kind in _PLACES or kind in _REPORTS:
-        return SEAL_BYTES + _SEQUENCE.size + TAG_BYTES
+        return PAYLOAD_BYTES - _OF_PAIR.at
     return SEAL_BYTES
 
 
@@ -72,7 +104,8 @@ class _Sealed(NamedTuple):
     """The packet that was sealed last."""
 
     what: bytes
-    proof: bytes
+    tag: bytes
+    sequence: int
     at_s: float
 
 
@@ -93,6 +126,11 @@ class EndToEnd:
         self._heard: dict[int, int] = {}  # the nonces of others
         self._sequences: dict[int, int] = {}  # by addressee: the number used last
         self._gateways: set[int] = set()  # nodes that proved to be one
+        # By the addressee or, if the key is that of a pair, by the other node. A state is copied
+        # for each proof, which saves hashing the key.
+        self._states: dict[_Form, dict[int, hashlib.blake2s]] = {
+            form: {} for form in _FORMS.values()
+        }
         self._is_gateway = False
         self._last: _Sealed | None = None
 
@@ -100,12 +138,25 @@ class EndToEnd:
 
     def seal(self, payload: bytes, now_s: float) -> bytes | None:
         """A packet of this node, sealed; None: its addressee has not announced a nonce yet."""
-        kind, forward = payload[2], payload[4]
-        nonce_at = _WITH_NONCE.get(kind)
-        if nonce_at is not None:
-            payload = self._with_nonce(payload, nonce_at, now_s)
-        key = self._key(payload, self._node_id, forward)
-        if key is None:
+        kind, forward = payload[_TYPE], payload[_FORWARD]
+        if kind == _PRESENT:
+            digest = payload[-_DIGEST_BYTES:]
+            return _present_with_nonce(payload, self._nonces[0].value, digest)
+        if kind == _HEARTBEAT:
+            gateway = messages.preferred_gateway(payload)
+            if forward == gateway and now_s - self._changed_s >= NEW_NONCE_AFTER_S:
+                self._nonces.appendleft(_Nonce(self._rng.getrandbits(32)))
+                self._changed_s = now_s
+            payload = _with_nonce(payload, self._nonces[0].value)
+            if gateway != self._node_id:
+                return payload
+        elif kind == _REQUEST:
+            return _with_nonce(payload, self._nonces[0].value)
+        form = _FORMS.get(kind)
+        if form is None or forward > MAX_NODE_ID:
+            return payload
+        state = self._states[form].get(forward) or self._state(form, forward)
+        if state is None:
             return payload
         if kind == _HEARTBEAT:
             self._is_gateway = True
@@ -113,20 +164,14 @@ class EndToEnd:
         if nonce is None:
             # Heartbeats are sent even without a proof, because they find neighbours.
             return payload if kind == _HEARTBEAT else None
-        what, last = messages.identity(payload), self._last
+        what, last = messages.identity(payload)[: form.at - 2], self._last
         if last is not None and last.what == what and now_s - last.at_s <= SAME_PACKET_S:
-            proof = last.proof  # another try, or a copy for another neighbour
-        else:
-            proof = self._proof(payload, key, nonce, self._next_sequence(forward))
-            self._last = _Sealed(what, proof, now_s)
-        return payload[: SEAL_AT - len(proof)] + proof + payload[SEAL_AT:]
-
-    def _with_nonce(self, payload: bytes, at: int, now_s: float) -> bytes:
-        to_gateway = payload[2] == _HEARTBEAT and payload[4] == messages.heartbeat_body(payload)[1]
-        if to_gateway and now_s - self._changed_s >= NEW_NONCE_AFTER_S:
-            self._nonces.appendleft(_Nonce(self._rng.getrandbits(32)))
-            self._changed_s = now_s
-        return payload[:at] + _NONCE.pack(self._nonces[0].value) + payload[at + _NONCE.size :]
+            # another try, or a copy for another neighbour
+            return form.with_proof(payload, last.tag, last.sequence)
+        sequence = self._next_sequence(forward)
+        tag = _tag(state, nonce, sequence, what)
+        self._last = _Sealed(what, tag, sequence, now_s)
+        return form.with_proof(payload, tag, sequence)
 
     def _next_sequence(self, forward: int) -> int:
         before = self._sequences.get(forward)
@@ -146,66 +191,67 @@ class EndToEnd:
 
         Raises NotProven if it is not authentic.
         """
-        creator, kind = payload[0], payload[2]
-        at = _WITH_NONCE.get(kind)
-        key = self._key(payload, creator, payload[4])
-        if key is not None:
-            proof_bytes = self._check(payload, key)
-            at = at or SEAL_AT - proof_bytes
-        elif kind in _PLACES and creator in self._gateways:
-            raise NotProven("a gateway's place that any node could have broadcast")
-        elif kind == _MISSING and creator != payload[1] and not self._is_gateway:
-            raise NotProven("a relayed MISSING")  # only sent to gateways, about orders
-        if at is None:
-            return payload
-        if kind in _WITH_NONCE:
-            self._heard[creator] = _NONCE.unpack_from(payload, at)[0]
+        creator, kind = payload[_CREATOR], payload[_TYPE]
         if kind == _PRESENT:
-            return payload[:at] + bytes(_NONCE.size) + payload[at + _NONCE.size :]
-        return payload[:at].ljust(len(payload), b"\0")
-
-    def _check(self, payload: bytes, key: bytes) -> int:
-        """The number of bytes of a valid proof. Raises NotProven without one."""
-        creator, kind = payload[0], payload[2]
-        sequence = _SEQUENCE.unpack_from(payload, _SEQUENCE_AT)[0]
-        for nonce in self._nonces:
-            proof = self._proof(payload, key, nonce.value, sequence)
-            if not hmac.compare_digest(proof, payload[SEAL_AT - len(proof) : SEAL_AT]):
-                continue
-            if not _use(nonce.windows, creator, sequence):
-                raise NotProven("a packet that came before")
-            if kind == _HEARTBEAT:
+            self._heard[creator] = _nonce_of_present(payload)[0]
+            return _present_without_nonce(payload, payload[_DIGEST_AT:])
+        if kind == _REQUEST:
+            self._heard[creator] = _nonce_of(payload)[0]
+            return _without_nonce(payload)
+        for_one = payload[_FORWARD] <= MAX_NODE_ID and creator <= MAX_NODE_ID
+        if kind == _HEARTBEAT:
+            if for_one and creator == messages.preferred_gateway(payload):
+                self._check(payload, _FORMS[kind])
                 self._gateways.add(creator)
-            return len(proof)
+            self._heard[creator] = _nonce_of(payload)[0]
+            return _without_nonce(payload)
+        form = _FORMS.get(kind)
+        if form is not None and for_one:
+            self._check(payload, form)
+            return form.without_proof(payload)
+        if kind in _PLACES and creator in self._gateways:
+            raise NotProven("a gateway's place that any node could have broadcast")
+        if kind == _MISSING and creator != payload[_FROM] and not self._is_gateway:
+            raise NotProven("a relayed MISSING")  # only sent to gateways, about orders
+        return payload
+
+    def _check(self, payload: bytes, form: _Form) -> None:
+        """Raises NotProven without a valid proof."""
+        creator = payload[_CREATOR]
+        node = self._node_id if form.by_authority else creator
+        state = self._states[form].get(node) or self._state(form, node)
+        assert state is not None, "a node has its own keys"
+        tag, sequence = form.proof(payload)
+        what = messages.identity(payload)[: form.at - 2]
+        for nonce in self._nonces:
+            if compare_digest(_tag(state, nonce.value, sequence, what), tag):
+                if not _use(nonce.windows, creator, sequence):
+                    raise NotProven("a packet that came before")
+                return
+        kind = payload[_TYPE]
         if kind == _HEARTBEAT:
             raise NotProven("a heartbeat without the proof of a gateway")
         raise NotProven("an order without proof" if kind == _ORDER else "a packet without proof")
 
     # Both ------------------------------------------------------------------------------------
 
-    def _key(self, payload: bytes, creator: int, forward: int) -> bytes | None:
-        """The key that a packet from `creator` to `forward` needs; None: it needs none."""
-        if forward > MAX_NODE_ID or creator > MAX_NODE_ID:
+    def _state(self, form: _Form, node: int) -> hashlib.blake2s | None:
+        """The hash state for such proofs; None: this node does not have the key."""
+        if form.by_authority:
+            key = self._keys.authority_over(node)
+        else:
+            key = self._keys.pair(self._node_id, node)
+        if key is None:
             return None
-        kind = payload[2]
-        if kind == _HEARTBEAT:
-            from_gateway = creator == messages.heartbeat_body(payload)[1]
-            return self._keys.authority_over(forward) if from_gateway else None
-        if kind == _ORDER:
-            return self._keys.authority_over(forward)
-        if kind in _PLACES or kind in _REPORTS:
-            return self._keys.pair(creator, forward)
-        return None
+        state = hashlib.blake2s(key=key, digest_size=form.tag_bytes, person=b"end2end")
+        self._states[form][node] = state
+        return state
 
-    def _proof(self, payload: bytes, key: bytes, nonce: int, sequence: int) -> bytes:
-        """Tag and sequence number, as placed before the hop seal."""
-        size = ORDER_TAG_BYTES if payload[2] == _ORDER else TAG_BYTES
-        number = _SEQUENCE.pack(sequence)
-        what = messages.identity(payload[: _SEQUENCE_AT - size])
-        tag = hashlib.blake2s(
-            _NONCE.pack(nonce) + number + what, key=key, digest_size=size, person=b"end2end"
-        )
-        return tag.digest() + number
+
+def _tag(state: hashlib.blake2s, nonce: int, sequence: int, what: bytes) -> bytes:
+    tag = state.copy()
+    tag.update(_nonce_and_sequence(nonce, sequence) + what)
+    return tag.digest()
 
 
 def _use(windows: dict[int, ReplayWindow], creator: int, sequence: int) -> bool:

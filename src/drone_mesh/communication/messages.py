@@ -338,6 +338,9 @@ heartbeat_body: Callable[[bytes], tuple[bool, int, int]] = struct.Struct(
 ).unpack_from
 """Whether the creator of a HEARTBEAT knows a gateway, which, and the hops so far."""
 
+preferred_gateway: Callable[[bytes], int] = operator.itemgetter(HEADER_BYTES + 1)
+"""The gateway of the creator of a HEARTBEAT; see heartbeat_body."""
+
 present_body: Callable[[bytes], tuple[int, bool]] = struct.Struct(
     _SKIP_HEADER + IntroduceMessage.BODY.format[1:]
 ).unpack_from

@@ -36,8 +36,6 @@ _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSW
 _PRESENT = int(MessageType.PRESENT)
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
 _NO_SEAL = bytes(SEAL_BYTES)
-_DIGEST_BYTES = 2
-_DIGEST_AT = SEAL_AT - _DIGEST_BYTES  # of a sealed PRESENT
 
 
 class _Unopened:
@@ -123,13 +121,18 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def send_message_to(self, payload: bytes) -> bool:
         """As every antenna; True also for a packet that its addressee could not believe yet."""
-        sealed = self._sealed(payload)
-        return sealed is None or self._antenna.send_message_to(sealed)
+        if payload[0] == self._node_id:
+            proven = self._proven(payload)
+            if proven is None:
+                return True
+            payload = proven
+        return self._antenna.send_message_to(self._seal.seal(payload))
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
-        sealed = [self._sealed(payload) for payload in payloads]
-        taken = iter(self._antenna.send_messages([s for s in sealed if s is not None]))
-        return [s is None or next(taken) for s in sealed]
+        proven = [self._proven(payload) for payload in payloads]
+        sealed = [self._seal.seal(payload) for payload in proven if payload is not None]
+        taken = iter(self._antenna.send_messages(sealed))
+        return [payload is None or next(taken) for payload in proven]
 
     def transmissions_of_last_send(self) -> int:
         return self._antenna.transmissions_of_last_send()
@@ -137,7 +140,6 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def broadcast_message(self, payload: bytes) -> None:
         payload = self._end_to_end.seal(payload, self._clock()) or payload
         if payload[2] == _PRESENT:
-            payload = payload[:_DIGEST_AT] + payload[-_DIGEST_BYTES:] + _NO_SEAL
             self._present = payload
         self._antenna.broadcast_message(self._seal.seal(payload))
 
@@ -147,16 +149,16 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def on(self) -> bool:
         return self._antenna.on()
 
-    def _sealed(self, payload: bytes) -> bytes | None:
-        if payload[0] == self._node_id and payload[SEAL_AT - 2 : SEAL_AT] == b"\0\0":
-            now_s = self._clock()
-            made = self._end_to_end.seal(payload, now_s)
-            if made is None:
-                detail = f"node {payload[4]} has not been heard by this node"
-                self.complaints.add("not sent, without a nonce", detail, now_s)
-                return None
-            payload = made
-        return self._seal.seal(payload)
+    def _proven(self, payload: bytes) -> bytes | None:
+        """A packet with its end-to-end seal; None: its addressee could not believe it yet."""
+        if payload[0] != self._node_id or payload[SEAL_AT - 2] or payload[SEAL_AT - 1]:
+            return payload
+        now_s = self._clock()
+        proven = self._end_to_end.seal(payload, now_s)
+        if proven is None:
+            detail = f"node {payload[4]} has not been heard by this node"
+            self.complaints.add("not sent, without a nonce", detail, now_s)
+        return proven
 
     # For the antenna -------------------------------------------------------------------------
 
@@ -182,8 +184,6 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
             except NotProven as error:
                 self._not_proven(str(error), payload, now_s)
                 return
-            if opened[2] == _PRESENT:
-                opened = opened[:_DIGEST_AT] + _NO_SEAL + opened[_DIGEST_AT:SEAL_AT]
         mesh.on_msg(opened, now_s)
 
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
