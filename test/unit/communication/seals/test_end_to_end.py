@@ -48,6 +48,23 @@ def test_a_proof_stands_before_the_hop_seal(pair):
     assert gateway.seal(LOCATION, 0.0)[:19] == LOCATION[:19]
 
 
+@pytest.mark.parametrize(
+    ("made", "end_of_body"),
+    [
+        (ORDER, "2a 00 94 e8 3b 09 80 ee ff 40"),
+        (LOCATION, "00 00 00 01 ef 67 07 f5 ff 40"),
+        (ANSWER, "3f 6c cb 59 44 9a ab d9 ff 40"),
+    ],
+    ids=["order", "place", "heartbeat"],
+)
+def test_a_proven_packet_has_these_bytes_on_the_air(pair, made, end_of_body):
+    gateway, _ = pair
+    sealed = gateway.seal(made, 0.0)
+    assert sealed[:15] == made[:15]
+    assert sealed[15:25] == bytes.fromhex(end_of_body)
+    assert sealed[25:] == bytes(7)
+
+
 @pytest.mark.parametrize("byte", [0, 2, 4, *range(5, 25)])
 def test_no_changed_byte_of_an_order_goes_unnoticed(pair, byte):
     gateway, drone = pair
