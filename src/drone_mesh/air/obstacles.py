@@ -93,8 +93,8 @@ class Obstacles:
     def _ways_round(
         self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
     ) -> Iterator[FlightPath]:
-        """As low as the flight usually is, and above each box on the straight way that is lower
-        than another one there."""
+        """Flights at the usual height, and just above each higher box on the straight path;
+        lowest first."""
         usual = FlightPath(start, goal, start_s, speed_m_s)
         lowest_m = max(usual.above_start[2], usual.above_goal[2])
         tops = {box.top_m + ABOVE_M for box in self._met(usual)}

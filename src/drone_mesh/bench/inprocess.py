@@ -75,7 +75,6 @@ def measure(
 
     The first phase costs more, because the nodes find each other in it. With a `key`, all packets
     are sealed.
-    are sealed.
     """
     case = Case(drones, SPACING_M)
     starting: list[_Pace] = []

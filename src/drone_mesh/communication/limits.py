@@ -37,7 +37,7 @@ class Strangers:
         self._losses = RateLimit(STRANGERS)
 
     def gave_up(self, node: int, now_s: float) -> None:
-        """It took no packet."""
+        """A packet for `node` was given up."""
         if node not in self.known:
             self._losses.count(0, now_s)
 

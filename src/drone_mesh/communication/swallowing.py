@@ -18,7 +18,7 @@ LEAST_UNANSWERED = 2  # our choice: of a next hop that was chosen because anothe
 
 
 class Swallowing:
-    """Counts the questions to one gateway that no answer followed."""
+    """Counts unanswered questions to one gateway."""
 
     def __init__(self, check_period_s: float) -> None:
         self._ask_period_s = ASK_PERIODS * check_period_s
@@ -41,7 +41,7 @@ class Swallowing:
         self._unanswered = 0
 
     def noticed(self, hops: int) -> bool:
-        """Whether packets are swallowed on the way of so many hops.
+        """Whether packets are swallowed on the route, which has so many hops.
 
         Nodes with fewer hops come to this conclusion sooner. So the node next to the relay takes
         another next hop first, and the nodes behind it need not.
@@ -49,11 +49,11 @@ class Swallowing:
         return self._answers and self._unanswered >= max(LEAST_UNANSWERED, hops)
 
     def another_next_hop(self, hops: int) -> None:
-        """The way is another one now, and has to prove itself soon."""
+        """The route has changed, and must soon prove that it works."""
         self._unanswered = max(0, hops - LEAST_UNANSWERED)
 
     def give_up(self) -> None:
-        """Another gateway, or no next hop does better, so it is the gateway that is silent."""
+        """Stop suspecting: there is another gateway, or it is silent over every next hop."""
         self._answers = False
         self._unanswered = 0
 
@@ -66,11 +66,11 @@ class Detours:
         self._until_s: dict[int, float] = {}  # by neighbour
 
     def avoid(self, neighbour: int, until_s: float) -> None:
-        """No answer came over this neighbour."""
+        """Avoid this neighbour until then: no answer came over it."""
         self._until_s[neighbour] = until_s
 
     def avoid_none(self) -> None:
-        """All are as good as each other."""
+        """Forget all: none is better than the others."""
         self._until_s.clear()
 
     def avoids(self, neighbour: int, now_s: float) -> bool:

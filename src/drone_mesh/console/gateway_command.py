@@ -39,7 +39,7 @@ class GatewayFeed:
         self._uptime_s = 0.0
 
     def ask(self) -> None:
-        """Poll once. If the gateway does not answer, the page says so."""
+        """Poll once. If the gateway does not answer, the page shows that."""
         try:
             answer = self._client.mesh(self._seen)
             mesh, more = real_mesh(answer)

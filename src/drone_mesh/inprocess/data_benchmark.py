@@ -89,7 +89,7 @@ def reuse_distance(settings: RadioSettings) -> int:
 
 
 def bound_kbit_s(settings: RadioSettings, hops: int) -> float:
-    """What the air allows: a packet and its acknowledgement at a time in each neighbourhood.
+    """The upper bound: one packet and its acknowledgement at a time in each neighbourhood.
 
     On k hops each packet is sent k times. The first node may send again while the one at the
     reuse distance does.

@@ -79,7 +79,7 @@ class ShortestPath(ChildTableTree):
         return len(self.get_set_of_children())
 
     def empty(self) -> bool:
-        """Whether there is no neighbour."""
+        """Whether there are no neighbours."""
         return not self.get_set_of_children()
 
     def gateway_lost(self, gateway: int) -> bool:

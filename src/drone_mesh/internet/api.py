@@ -104,7 +104,7 @@ class NodeRoute(BaseModel):
     heard_s_ago: Optional[float] = Field(description="Seconds since it was heard; null: never.")
 
 
-class NodeReports(BaseModel):
+class NodeRoutes(BaseModel):
     """All nodes known to the gateway, except itself."""
 
     gateway: int
@@ -144,9 +144,9 @@ def make_api(
         )
 
     @app.get("/nodes", dependencies=guards, responses=refusals)
-    async def nodes() -> NodeReports:
+    async def nodes() -> NodeRoutes:
         """The nodes known to the gateway, and its routes to them."""
-        return await desk.ask(_report_nodes)
+        return await desk.ask(_routes_of)
 
     @app.post(
         "/DroneMovement/{id}/{latitude}/{longitude}/{height}",
@@ -237,14 +237,14 @@ def make_api(
     return app
 
 
-def _report_nodes(gateway: IGatewayCommands, now_s: float) -> NodeReports:
-    return NodeReports(
+def _routes_of(gateway: IGatewayCommands, now_s: float) -> NodeRoutes:
+    return NodeRoutes(
         gateway=gateway.get_node_id(),
-        nodes=[_report_node(node, now_s) for node in gateway.get_known_nodes()],
+        nodes=[_route_of(node, now_s) for node in gateway.get_known_nodes()],
     )
 
 
-def _report_node(node: KnownNode, now_s: float) -> NodeRoute:
+def _route_of(node: KnownNode, now_s: float) -> NodeRoute:
     heard = math.isfinite(node.heard_s)
     return NodeRoute(
         id=node.node_id,

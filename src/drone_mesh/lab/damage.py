@@ -46,7 +46,7 @@ class Damage(NamedTuple):
 
 
 def trial(name: str, threat: Threat, seed: int) -> Damage:
-    """One attack: on a mesh without a key, with one, or with one by a captured node."""
+    """One attack with this threat, or the same time without one."""
     attack = ATTACKS[name]
     shared = attack is invented_ids  # where an answer to an absent node costs airtime
     radio = "shared" if shared else "disc"

@@ -108,9 +108,9 @@ class Stranger(IMeshNetwork):
             self.network.nodes[node_id].receiver = Tap(self.network, node_id, self.record)
 
     def swallow_as_relay(self) -> None:
-        """Run the mesh software in a relay, or beside the mesh if it has a key that this has not.
+        """Turn the router on most routes into a relay that swallows.
 
-        A relay that was captured is the router on most of the routes to a gateway.
+        In a mesh with a key, a radio without that key runs the mesh software beside the mesh.
         """
         if self.mute:
             return
@@ -172,10 +172,10 @@ class Stranger(IMeshNetwork):
         """Ignored."""
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
-        """Does not care."""
+        """Ignored."""
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
-        """Does not care."""
+        """Ignored."""
 
     def on_antenna_registered(self, now_s: float) -> None:
-        """Does not care."""
+        """Ignored."""

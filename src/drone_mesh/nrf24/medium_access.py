@@ -1,30 +1,29 @@
 """When a node may use the shared channel, and how long it tries to deliver a packet.
 
-The chip hears no carrier before it sends (RPD notices only neighbours within a fraction of the
-range), so that the channel is ALOHA: what keeps it from collapsing are the senders' own rules.
-Those rules are here, apart from chips, threads and clocks; the driver and the fast model of the
-air (`inprocess.shared_air`) both follow this one implementation.
+The chip cannot sense the carrier before it sends (RPD notices only neighbours within a fraction of
+the range), so the channel is ALOHA: only the rules of the senders keep it from collapsing. This
+module has those rules, without chips, threads and clocks. The driver and the fast model of the air
+(`inprocess.shared_air`) both use it.
 
-1. Tries are bounded, and the pauses between them are random and double with each try (binary
-   exponential back-off; Metcalfe and Boggs, Ethernet, 1976). A fixed number of tries at a fixed
-   distance, as the chip makes by itself, keeps two senders colliding with each other.
-2. The pauses of a node that sees its first tries fail are longer from the start, and so is the
-   distance between its packets. That is what keeps ALOHA stable (Lam and Kleinrock, 1975: the
-   retransmission rate must fall as the backlog grows). The node judges by its own failures, as
-   no carrier sense is at hand.
-3. What many would do at the same moment gets a random delay: broadcasts, and answers to one
-   (RFC 5148, jitter).
+1. The number of tries is bounded. The pauses between them are random and double with each try
+   (binary exponential back-off; Metcalfe and Boggs, Ethernet, 1976). With retransmissions at a
+   fixed distance, as the chip makes them by itself, two senders would collide again and again.
+2. A node whose first tries fail makes longer pauses from the start, and leaves more time between
+   its packets. This keeps ALOHA stable (Lam and Kleinrock, 1975: the retransmission rate must
+   fall as the backlog grows). Without carrier sense, a node can judge only by its own failures.
+3. Packets that many nodes would send at the same moment get a random delay: broadcasts, and
+   answers to one (RFC 5148, jitter).
 4. A node leaves a gap after each of its packets, so that a burst of them (a check of all
    neighbours) does not occupy the channel as a block.
 5. Users' packets for one receiver follow each other in trains, without the gap between them: a pair
    that is alone gets most of the channel. Trains get shorter as the channel gets busier, and stop
-   when a packet of the mesh waits. A node that hears a train waits for its end, and the sender
-   leaves time for that: so an answer gets through, and a relay takes its turn. For a relay the end
-   is a packet (see trains.py), and a pause is none: the sender was interrupted, and if the relay
-   sent on what it has, it would disturb the rest, which it cannot hear while it sends.
-   What waits in a back-off for the node that sent the train goes after it: that node listens then.
-6. Each receiver has a line of its own: waiting for one of them does not delay the others. A
-   receiver that let a packet fail and was not heard since gets fewer tries for the next one.
+   when a packet of the mesh waits. A node that hears a train sends only after its end, and the
+   sender then pauses, so that answers get through and relays get their turn. For a relay a train
+   ends with a packet (see trains.py). A pause does not end it: the sender was interrupted, and a
+   relay that forwarded its packets now would not hear the rest of the train. Packets in a back-off
+   for the sender of the train are sent right after it, because that node listens then.
+6. Each receiver has its own queue, so that waiting for one does not delay the others. A receiver
+   that did not acknowledge a packet, and was not heard since, gets fewer tries for the next one.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class Priority(enum.IntEnum):
 
 
 class InTrain(enum.Enum):
-    """What a packet that is heard says of the train that it belongs to."""
+    """What an overheard packet shows about its train."""
 
     NO = "no"  # it belongs to none
     PERHAPS = "perhaps"  # another packet may follow at once
@@ -58,7 +57,7 @@ class InTrain(enum.Enum):
 
 
 class Fate(enum.Enum):
-    """What became of a packet with a try."""
+    """The outcome of one try."""
 
     WAITS = "waits"  # there will be another try
     DELIVERED = "delivered"  # acknowledged, or, if a broadcast, sent
@@ -89,8 +88,8 @@ _STILL_THERE_S = 5.0  # our choice: a node that was heard so lately is believed 
 class MediumAccess:
     """The packets that one node wants to send, and when it may try which of them.
 
-    Belongs to one thread at a time. `due` says what to try now; the result of the try goes to
-    `tried`.
+    Belongs to one thread at a time. `due` selects the packet to try now; the result of the try goes
+    to `tried`.
     """
 
     def __init__(self, rules: AccessRules, rng: random.Random) -> None:
@@ -154,7 +153,7 @@ class MediumAccess:
     def heard(
         self, sender: int, now_s: float, *, broadcast: bool, train: InTrain = InTrain.NO
     ) -> None:
-        """A packet came in; `train`: what it says of the train that it belongs to."""
+        """A packet came in; `train`: what it shows about its train."""
         self._silent.discard(sender)
         self._heard_s[sender] = now_s
         if train is not InTrain.NO:
@@ -193,7 +192,7 @@ class MediumAccess:
         return max(first_s, self._free_s, self._yields_until_s)
 
     def due(self, now_s: float) -> OutgoingPacket | None:
-        """The packet to try now. It stays in its line until `tried` says otherwise."""
+        """The packet to try now. It stays in its queue until `tried` removes it."""
         if not self._waiting or now_s < max(self._free_s, self._yields_until_s):
             return None
         ready = [line[0] for line in self._lines.values() if line[0].not_before_s <= now_s]
@@ -257,12 +256,15 @@ class MediumAccess:
         return Fate.WAITS
 
     def figures(self) -> dict[str, Any]:
-        """Packets by what became of them, and the state of the queue, as in RadioStatistics."""
+        """Packets by outcome, and the state of the queue, as in RadioStatistics."""
         return {**self._counts, "waiting": self._waiting, "contention": self.contention}
 
     @property
     def patience(self) -> float:
-        """For how many check periods the mesh should not probe again what works; see rule 6."""
+        """For how many check periods the mesh should not probe again what works.
+
+        0 on a quiet channel, and more as the node's own tries fail more often.
+        """
         return self.rules.most_patience * min(1.0, self.contention / self.rules.busy_at)
 
     def retransmits(self) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""Trains on the air: what a packet says of the packets that its sender sends after it."""
+"""Trains on the air: whether the sender of a packet is about to send more."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drone_mesh.nrf24.medium_access import InTrain
 
 
 def place_in_train(payload: bytes, receiver: int) -> InTrain:
-    """What `receiver` learns from a packet about the train that it belongs to."""
+    """What a packet shows `receiver` about its train."""
     _creator, _from, kind, _to, addressee = messages.header(payload)
     if not messages.is_data(payload) or addressee == BROADCAST:
         return InTrain.NO

@@ -36,7 +36,7 @@ _POLL_S = 100e-6
 
 
 class Sent(NamedTuple):
-    """What became of one packet."""
+    """The outcome of one packet."""
 
     acknowledged: bool
     retransmits: int
@@ -109,7 +109,7 @@ class BenchRadio:
         self._ce.value = True
 
     def use(self, settings: RadioSettings) -> None:
-        """Go on with these settings. RadioError if the chip does not have them."""
+        """Use these settings from now on. RadioError if the chip does not have them."""
         self.settings = settings
         self._registers = settings.registers(self.node_id)
         self.set_up()

@@ -77,7 +77,7 @@ def measure_range(
 
 
 def _wait_for_partner(radio: BenchRadio, to: int) -> None:
-    """Send until a packet arrives, which need not happen: it may still be changing its rate."""
+    """Send until a packet is acknowledged, for a limited time: `to` may be changing its rate."""
     until_s = radio.runtime.now_s() + CHANGE_WITHIN_S
     address, payload = radio.settings.node_address(to), _payload(radio.node_id, to)
     while radio.runtime.now_s() < until_s:
@@ -212,7 +212,7 @@ def _follow(radio: BenchRadio, request: _RateRequest) -> str:
 
 
 def _request_in(payload: bytes | None, me: int) -> _RateRequest | None:
-    """What a packet of the measurement asks for; None: it is no such packet, or not for me."""
+    """The request in a packet of the measurement; None: another packet, or not for `me`."""
     if payload is None or len(payload) != PAYLOAD_BYTES:
         return None
     _, from_, kind, to, _ = messages.header(payload)

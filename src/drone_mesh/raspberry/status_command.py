@@ -36,6 +36,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"raspberry_status: {error}", file=sys.stderr)
         return 1
     except (AttributeError, KeyError, TypeError):
-        print(f"raspberry_status: {url}: this is no node of the mesh", file=sys.stderr)
+        print(f"raspberry_status: {url}: not a node of the mesh", file=sys.stderr)
         return 1
     return 0

@@ -94,5 +94,8 @@ def summarise(nodes: Sequence[NodeStatus], troubles: Sequence[Trouble]) -> Summa
 
 
 def all_connected(troubles: Sequence[Trouble]) -> bool:
-    """Whether every node that is on is connected; nodes that are switched off do not count."""
+    """Whether every node that is on is connected.
+
+    Nodes that are switched off do not count; a silent one counts as not connected.
+    """
     return all(trouble.severity <= Severity.WARN for trouble in troubles)

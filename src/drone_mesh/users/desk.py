@@ -91,7 +91,7 @@ class Sending:
             self._call_when_over()
 
     def _call_when_over(self) -> None:
-        """Call `when_over` once, whichever comes last: the end, or that it was asked for."""
+        """Call the function of `when_over` once it was given and the sending is over."""
         with self._lock:
             call = self._when_over if self._handed_in.is_set() and self.is_over else None
             if call is not None:

@@ -1,4 +1,4 @@
-"""Asks an HTTP server for JSON; whatever goes wrong is one line."""
+"""Requests JSON from an HTTP server; each failure is described in one line."""
 
 from __future__ import annotations
 

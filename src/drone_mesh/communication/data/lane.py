@@ -49,7 +49,7 @@ class Lane:
     ) -> None:
         """`room`: bytes of a body; `ended` is called with the last state of each message.
 
-        `hint` says what may be the reason if a message does not arrive.
+        `hint` returns a possible reason why messages do not arrive.
         """
         self._seal = seal
         self._hint = hint

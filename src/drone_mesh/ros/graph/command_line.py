@@ -22,7 +22,7 @@ class NoMaster(MeshError):
 
 
 def require_master() -> None:
-    """Raises NoMaster, which says what address was tried and what to do."""
+    """Raises NoMaster, which names the address that was tried and the remedy."""
     if not rosgraph.is_master_online():
         uri = os.environ.get("ROS_MASTER_URI", "ROS_MASTER_URI (not set)")
         raise NoMaster(

@@ -223,7 +223,7 @@ class FlyActions:
 
 
 def _order(drone: int, goal: Location) -> None:
-    """Order a drone as anyone does. Raises _Refused."""
+    """Order a drone through the DroneManager, as users do. Raises _Refused."""
     request = RequestDroneFlightRequest(
         drone, goal.latitude, goal.longitude, whole_metres(goal.height)
     )
