@@ -13,6 +13,7 @@ from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import MeshExecutor, Work
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
@@ -22,7 +23,8 @@ from drone_mesh.raspberry.node_changes import NodeChanges
 from drone_mesh.raspberry.node_status import node_status
 from drone_mesh.raspberry.options import Options
 from drone_mesh.users.desk import UsersDesk
-from drone_mesh.users.local_socket import local_socket
+from drone_mesh.users.local_socket import LocalSocket
+from drone_mesh.users.socket_path import socket_path
 
 ALIVE_WITHIN_S = 20.0  # our choice: two check periods, less than systemd's watchdog waits
 
@@ -63,7 +65,12 @@ class RadioNode:
             check_s = options.timing.check_period_s
             self._changes = NodeChanges(radio.node_id, check_s, self.events.observe)
         self.users = UsersDesk(radio.node_id, self._slot.submit)
-        self._socket = local_socket(self.users)
+        self._socket: LocalSocket | None = None
+        self.why_no_socket = ""  # why mesh_ping and the other commands cannot reach this node
+        try:
+            self._socket = LocalSocket(self.users, socket_path(radio.node_id))
+        except ConfigurationError as error:
+            self.why_no_socket = str(error)
         self._internet = None if make_internet is None else make_internet(self)
         antenna: IWirelessCommunication = self._antenna
         if options.keys is not None:

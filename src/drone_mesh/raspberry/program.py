@@ -32,6 +32,7 @@ from drone_mesh.raspberry.options import Hardware, Options
 from drone_mesh.raspberry.service_manager import ServiceManager
 from drone_mesh.raspberry.shared_air import MoveRadio, joining_node, serving_node
 from drone_mesh.stopping import StopRequest
+from drone_mesh.users.local_socket import warn_of_unreachable
 
 if TYPE_CHECKING:
     from drone_mesh.internet.status import StatusServer
@@ -95,6 +96,9 @@ def _run(options: Options, request: StopRequest) -> None:
         else:
             nodes = [_real_node(options)]
         stack.callback(_stop, nodes)
+        warn_of_unreachable(
+            {node.radio.node_id: node.why_no_socket for node in nodes if node.why_no_socket}
+        )
         if options.keys is None:
             _log.warning(
                 "no key: every radio in range can take part in this mesh and order its drones to "

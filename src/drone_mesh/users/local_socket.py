@@ -22,11 +22,12 @@ import socketserver
 import stat
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, Mapping
 
+from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.errors import ConfigurationError, MessageRefused
 from drone_mesh.users.desk import UsersDesk
-from drone_mesh.users.socket_path import is_served, socket_path
+from drone_mesh.users.socket_path import is_served
 
 MOST_REQUEST_BYTES = 4096  # our choice: a message of 1,024 bytes in base64 takes 1,400
 MOST_CLIENTS = 32  # our choice
@@ -70,20 +71,19 @@ class LocalSocket:
             self.path.unlink()
 
 
-def local_socket(desk: UsersDesk) -> LocalSocket | None:
-    """The socket of a node in its default place; None, with a warning, if it cannot be created.
+def warn_of_unreachable(reasons: Mapping[int, str]) -> None:
+    """Log one line about the nodes of this program that have no socket; `reasons` by node.
 
     The commands are a convenience: a node works without them.
     """
-    try:
-        return LocalSocket(desk, socket_path(desk.node_id))
-    except ConfigurationError as error:
+    if reasons:
+        nodes = ids_in_words(sorted(reasons))
         _log.warning(
-            "node %d: mesh_ping, mesh_send and the other commands cannot reach it: %s",
-            desk.node_id,
-            error,
+            "mesh_ping, mesh_send and the other commands cannot reach node%s %s: %s",
+            "s" * (len(reasons) > 1),
+            nodes,
+            reasons[min(reasons)],
         )
-        return None
 
 
 class _Server(socketserver.ThreadingUnixStreamServer):

@@ -136,6 +136,20 @@ def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c(tmp_path):
         assert trace.read_bytes().startswith(bytes.fromhex("0a0d0d0a"))  # pcapng
 
 
+def test_a_second_program_with_the_same_nodes_says_so_in_one_line():
+    lines = [f"--emulated 3 --port {free_port()}".split() for _ in range(2)]
+    with Program("raspberry_gateway", *lines[0]) as first:
+        first.wait_for("node 2: started")
+        with Program("raspberry_gateway", *lines[1]) as second:
+            second.wait_for(
+                "cannot reach nodes 0..2: .*node-0.sock: another program already runs a node"
+            )
+            second.wait_for("node 2: started")
+            assert second.end(signal.SIGTERM)[0] == 0
+            assert second.said.count("mesh_ping") == 1
+        first.end(signal.SIGTERM)
+
+
 def test_an_emulated_gateway_sends_an_order_over_several_hops_and_ends_on_sigterm():
     port = free_port()
     line = f"--emulated 4 --port {port} --check-period 2"

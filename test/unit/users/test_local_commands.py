@@ -14,7 +14,7 @@ from users_rig import UsersRig
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.users import listen_command, ping_command, send_command, trace_command
 from drone_mesh.users.local_client import LocalClient
-from drone_mesh.users.local_socket import LocalSocket, local_socket
+from drone_mesh.users.local_socket import LocalSocket, warn_of_unreachable
 from drone_mesh.users.socket_path import socket_path
 
 
@@ -168,13 +168,20 @@ def test_only_the_user_of_the_node_may_open_its_socket(rig):
     assert socket_path(0).parent.stat().st_mode & 0o777 == 0o700
 
 
-def test_two_programs_cannot_serve_the_same_node_and_the_second_goes_on_without(rig, caplog):
+def test_two_programs_cannot_serve_the_same_node(rig):
     with pytest.raises(
         ConfigurationError, match="another program already runs a node with this id"
     ):
         LocalSocket(rig.desks[0], socket_path(0))
-    assert local_socket(rig.desks[0]) is None
-    assert "node 0: mesh_ping, mesh_send and the other commands cannot reach it" in caplog.text
+
+
+def test_one_line_names_all_nodes_that_the_commands_cannot_reach(caplog):
+    warn_of_unreachable({})
+    assert caplog.messages == []
+    warn_of_unreachable({2: "socket two", 0: "socket zero", 1: "socket one"})
+    warn_of_unreachable({4: "socket four"})
+    what = "mesh_ping, mesh_send and the other commands cannot reach"
+    assert caplog.messages == [f"{what} nodes 0..2: socket zero", f"{what} node 4: socket four"]
 
 
 def test_a_socket_that_a_dead_program_left_is_replaced(rig, tmp_path):
