@@ -14,12 +14,11 @@ from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
+from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
-MAX_DRONES = MAX_NODE_ID + 1
 MIN_REAL_TIME_FACTOR = 0.001  # our choice: one step of the world in 10 s
 MAX_REAL_TIME_FACTOR = 1000.0  # our choice: above it the clock moves in too large steps
 MAX_SEED = 2**32 - 1

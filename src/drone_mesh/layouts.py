@@ -98,7 +98,7 @@ class Layouts:
         return [Order(*item) for item in sorted(self._cases[case].items(), reverse=True)]
 
 
-def read_places(text: str, name: str = "the file") -> list[Order]:
+def read_layout(text: str, name: str = "the file") -> list[Order]:
     """The orders of a layout file with one case, by descending id.
 
     Raises ConfigurationError: `name`, line and what is wrong.

@@ -8,7 +8,7 @@ import pytest
 
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.layouts import Layouts, UnknownCase, read_places
+from drone_mesh.layouts import Layouts, UnknownCase, read_layout
 
 SHIPPED = Path(__file__).parents[2] / "config" / "casus.yaml"
 
@@ -164,7 +164,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 
 
 def test_a_layout_is_read_from_text_from_the_highest_id_down():
-    orders = read_places("cases:\n  7:\n    1: [1, 2, 3]\n    4: [5, 6, 0]\n")
+    orders = read_layout("cases:\n  7:\n    1: [1, 2, 3]\n    4: [5, 6, 0]\n")
     assert [order.node_id for order in orders] == [4, 1]
     assert orders[1].goal == Location(latitude=2.0, longitude=1.0, height=3.0)
 
@@ -179,4 +179,4 @@ def test_a_layout_is_read_from_text_from_the_highest_id_down():
 )
 def test_a_text_that_is_no_layout_is_refused(text, why):
     with pytest.raises(ConfigurationError, match=why):
-        read_places(text)
+        read_layout(text)

@@ -12,7 +12,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError, MeshError
-from drone_mesh.layouts import MAX_CASE, Order, read_places
+from drone_mesh.layouts import MAX_CASE, Order, read_layout
 
 MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here
@@ -160,7 +160,7 @@ class ReadPlaces(_Request):
     def places(self) -> list[Place]:
         """Parse the file. Raises OrderRefused, which names the invalid line."""
         try:
-            return places_of(read_places(self.text))
+            return places_of(read_layout(self.text))
         except ConfigurationError as error:
             raise OrderRefused(str(error)) from error
 

@@ -57,10 +57,10 @@ def draw_places(
 
 def rows_of_file(path: Path) -> list[list[float]]:
     """The positions in a file as numbers: id, x, y, 1 for a gateway. Raises ConfigurationError."""
-    return [[float(p.node_id), p.x, p.y, float(p.gateway)] for p in read_places(path)]
+    return [[float(p.node_id), p.x, p.y, float(p.gateway)] for p in read_start_points(path)]
 
 
-def read_places(path: Path) -> list[StartPoint]:
+def read_start_points(path: Path) -> list[StartPoint]:
     """A CSV file with the header id,x,y,role; role is gateway or router."""
     try:
         with path.open(encoding="utf-8", newline="") as file:

@@ -26,8 +26,9 @@ from drone_mesh.nrf24.registers import (
 from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
+from drone_mesh.nrf24.transceiver import POWER_UP_S
 
-POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms [DS Table 16]
+TEST_TYPE = 255  # of packets of the field tools: a type that no node processes
 RPD_VALID_S = 250e-6  # settling 130 us and 40 us of signal [DS 6.4], and some room
 SWITCH_S = 505e-6  # an acknowledgement that is being sent must not be cut off
 SEND_WITHIN_S = 95e-3  # the longest transaction takes 87.1 ms

@@ -11,7 +11,7 @@ from drone_mesh.communication.messages import MessageType
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import IrqPin
 from drone_mesh.nrf24.registers import Register
-from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.bench_radio import TEST_TYPE, BenchRadio
 
 Lines = Iterator[str]
 
@@ -23,7 +23,6 @@ BAND_END = 83  # the licence-free band ends at 2483.5 MHz
 WIFI = ((1, 12), (6, 37), (11, 62))  # Wi-Fi channel and its middle, as a channel of the radio
 MOST_NODES = ((50, "250k"), (101, "1M"), (254, "2M"))  # docs/performance.md, "The shared channel"
 _RATES_IN_WORDS = ", ".join(f"{rate} for up to {most}" for most, rate in MOST_NODES)
-USERS_DATA = 255  # a type that no node processes
 PATTERNS = (bytes(5), b"\xff" * 5, b"\x55" * 5, b"\xaa\x55\xaa\x55\xaa")
 
 
@@ -164,4 +163,4 @@ _HEADER = ("creator", "from_", "to", "forward")
 
 
 def _probe(to: int = 254) -> bytes:
-    return bytes((253, 253, USERS_DATA, to, to)).ljust(PAYLOAD_BYTES, b"\0")
+    return bytes((253, 253, TEST_TYPE, to, to)).ljust(PAYLOAD_BYTES, b"\0")

@@ -16,11 +16,10 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.emulator.measured import measured_losses
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.settings import DataRate, RadioSettings, TxPower
-from drone_mesh.raspberry.bench_radio import SWITCH_S, BenchRadio
+from drone_mesh.raspberry.bench_radio import SWITCH_S, TEST_TYPE, BenchRadio
 
 Lines = Iterator[str]
 
-USERS_DATA = 255  # a type that no node processes
 RETRANSMITS = 15
 CONFIRM_WITHIN_S = 0.3  # our choice: a confirmation takes at most 0.09 s on the air
 CHANGE_WITHIN_S = 0.5  # our choice: writing the registers takes 6 ms, on a busy machine longer
@@ -217,7 +216,7 @@ def _request_in(payload: bytes | None, me: int) -> _RateRequest | None:
         return None
     _, from_, kind, to, _ = messages.header(payload)
     what, rate, hold_s = _BODY.unpack_from(payload, messages.HEADER_BYTES)
-    if kind != USERS_DATA or to != me or rate >= len(_RATES):
+    if kind != TEST_TYPE or to != me or rate >= len(_RATES):
         return None
     if what not in (_FOLLOW, _FOLLOWING, _RETURN):
         return None
@@ -225,7 +224,7 @@ def _request_in(payload: bytes | None, me: int) -> _RateRequest | None:
 
 
 def _payload(from_: int, to: int, body: bytes = b"") -> bytes:
-    head = bytes((from_, from_, USERS_DATA, to, to))
+    head = bytes((from_, from_, TEST_TYPE, to, to))
     return (head + body).ljust(PAYLOAD_BYTES, b"\0")
 
 

@@ -7,10 +7,10 @@ import pybullet
 from drone_mesh.air.box import Box
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.world.body import GRAVITY_M_S2
 from drone_mesh.world.interfaces import World
 from drone_mesh.world.static_box import add_static_box
 
-GRAVITY_M_S2 = -9.81  # along z
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # unit quaternion, pybullet's order x y z w
 KINEMATIC = 0.0  # physics never moves a body of mass 0
 
@@ -28,7 +28,7 @@ class BulletWorld(World):
             raise ConfigurationError("pybullet has no room for another world: close one first")
         self._shapes: dict[Vector, int] = {}  # by size
         pybullet.setTimeStep(self.tick_s, physicsClientId=self.client)
-        pybullet.setGravity(0.0, 0.0, GRAVITY_M_S2, physicsClientId=self.client)
+        pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, physicsClientId=self.client)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self.client)
         self.ground = pybullet.createMultiBody(KINEMATIC, plane, physicsClientId=self.client)
 
