@@ -188,7 +188,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         default=40,
         help="number of messages of 1024 bytes in each case (default 40)",
     )
-    parser.add_argument("--seed", type=int, default=1, help="(default 1)")
+    parser.add_argument(
+        "--seed", type=int, default=1, help="seed of all random choices (default %(default)s)"
+    )
     parser.add_argument("--hops", type=int, help="run only the cases with this number of hops")
     parser.add_argument("--rate", choices=DATA_RATES, help="run only the cases with this rate")
     parsed = parser.parse_args(arguments)

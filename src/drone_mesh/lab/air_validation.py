@@ -73,9 +73,10 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="drone_mesh.lab.air_validation",
         description="Runs the same meshes on emulated chips and on the fast model, and prints a "
-        "table in Markdown: means over the seeds, chips / model. The exit status is 1 if a row "
-        f"disagrees: share by {SHARE_POINTS:g} points, time to all connected by "
-        f"{100 * CONNECTED_PART:g} %, frames or collided share by {100 * FRAMES_PART:g} %.",
+        "table in Markdown: means over the seeds, chips / model. The exit status is 1 if "
+        f"chips and model differ in a row: by more than {SHARE_POINTS:g} points in the share, "
+        f"{100 * CONNECTED_PART:g} % in the time to all connected, or {100 * FRAMES_PART:g} % in "
+        "the frames or the collided share.",
     )
     parser.add_argument("--nodes", type=int, nargs="+", default=SIZES, help="sizes of the meshes")
     parser.add_argument(

@@ -53,8 +53,9 @@ def main(argv: list[str] | None = None) -> int:
         prog="drone_mesh.lab.cut_vertices",
         description="Kills every cut vertex of random layouts once and prints how far the drones "
         "fly: total / longest / drones that moved, as means, with distances in units of the range. "
-        "For comparison it prints the same for ideal information, if all drones may move, and if "
-        "only the drones cut off from the gateway move, as they do here.",
+        "For comparison it prints the same figures for a planner with ideal information: one that "
+        "may move all drones, and one that moves only the drones cut off from the gateway, as the "
+        "strategies do.",
     )
     parser.add_argument("--drones", type=int, nargs="+", default=[20, 50, 100], choices=LAYOUTS,
         help="sizes of the meshes (default: all)",

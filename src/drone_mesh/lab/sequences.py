@@ -91,14 +91,18 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         "clock: cut vertices and shares of nodes are killed, also in negotiations and in flight, "
         "and the gateway is switched off and moved. Prints how the repair handled them.",
     )
-    parser.add_argument("--runs", type=int, default=100, help="number of sequences (%(default)s)")
-    parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
+    parser.add_argument(
+        "--runs", type=int, default=100, help="number of sequences (default: %(default)s)"
+    )
+    parser.add_argument("--first", type=int, default=0, help="first seed (default: %(default)s)")
     parser.add_argument(
         "--repair",
         default=DEFAULT_REPAIR,
-        help="repair strategy: a name, or package.module:Class (%(default)s)",
+        help="repair strategy: a name, or package.module:Class (default: %(default)s)",
     )
-    parser.add_argument("--workers", type=int, default=1, help="processes (%(default)s)")
+    parser.add_argument(
+        "--workers", type=int, default=1, help="number of processes (default: %(default)s)"
+    )
     parser.add_argument(
         "--csv",
         type=Path,

@@ -30,7 +30,10 @@ def parser_for(command: str, description: str) -> argparse.ArgumentParser:
     )
     parser.add_argument("--node", type=node_id, help="id of the node on this machine to use")
     parser.add_argument(
-        "--socket", type=Path, metavar="PATH", help="socket of the node, if not the usual one"
+        "--socket",
+        type=Path,
+        metavar="PATH",
+        help="socket of the node (default: the one that --node names)",
     )
     return parser
 

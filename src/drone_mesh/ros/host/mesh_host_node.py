@@ -88,10 +88,11 @@ def share_of_host(fleet: FactoryConfiguration, drones: PresentDrones) -> range:
 
 
 def main() -> None:
-    """Virtual Raspberry Pis outside the world's process, perhaps on another machine.
+    """Runs the nodes of some drones outside the world's process, also on another machine.
 
-    Parameters (private): ~first and ~last (int): the ids to host; or ~index and ~hosts (int):
-    host part ~index (from 1) of ~hosts equal parts of all drones.
+    Parameters (private): either ~first and ~last (int), the ids of the drones; or ~hosts and
+    ~index (int): the drones are divided into ~hosts equal parts, and this program runs the nodes
+    of part ~index, 1..~hosts.
     """
     prepare_node(main.__doc__)
     rospy.init_node("mesh_host", disable_signals=True)

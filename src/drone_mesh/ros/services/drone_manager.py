@@ -51,8 +51,8 @@ class DroneManager:
     Publishes:  /gateway (RequestGatewayDroneFlight)
     Subscribes: /gateway/answers (FlightOrderAnswer)
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
-                (Casus), both also under their last names alone; /DroneManager/orderLayout
-                (OrderLayout)
+                (Casus), also as /requestDroneMovement and /SetToCasus;
+                /DroneManager/orderLayout (OrderLayout)
     """
 
     # The layouts, the only state, never change, so the handlers may run in parallel.

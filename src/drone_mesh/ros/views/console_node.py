@@ -133,11 +133,11 @@ def layout_offers(layouts: Layouts) -> list[LayoutOffer]:
 
 
 def main() -> None:
-    """The web console: shows and controls the mesh in a browser.
+    """Runs the web console, which shows and controls the mesh in a browser.
 
     Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
-    (str): password of the console; if none is given, an address that other machines can reach
-    gets a random one; ~demo (str): "repair" shows a repair as soon as a page is open;
+    (str): password of the console; without it, a random one is made and printed if other machines
+    can reach the address; ~demo (str): "repair" shows a repair as soon as a page is open;
     ~recording (str): path of the bag that is played; its page takes no orders.
     /DroneManager/casus (str): the file of the layouts.
     """

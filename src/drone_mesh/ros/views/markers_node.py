@@ -30,7 +30,7 @@ class MeshMarkers:
     """Shows the mesh in rviz.
 
     Subscribes: /mesh/state (MeshState)
-    Publishes:  /mesh/markers (MarkerArray), /tf (TFMessage); both at most as often as the state
+    Publishes:  /mesh/markers (MarkerArray), /tf (TFMessage); both at most once per state
     """
 
     # The subscriber's thread does the work; the other threads of rospy only announce newcomers.

@@ -41,7 +41,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Plays a recorded run as if it ran now, for rviz, the console and your own "
         "nodes. Skips the recorded clock, because rosbag publishes its own: with both, time "
         "would jump backwards.",
-        epilog="The space bar pauses. Exit code: 2 unusable bag or no free master, otherwise that "
+        epilog="The space bar pauses. Exit code: 2: unusable bag or no free master, otherwise that "
         "of rosbag play.",
     )
     parser.add_argument("bag", type=Path, help="the bag of the recorded run")

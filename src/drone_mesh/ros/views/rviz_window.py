@@ -16,8 +16,8 @@ def main() -> None:
     """Entry point of nodes/rviz_window."""
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh rviz_window",
-        description="Start rviz. Without a screen, say so in one line.",
-        epilog="Exit code: 2 no screen, otherwise that of rviz.",
+        description="Starts rviz; without a screen, prints one line and ends.",
+        epilog="Exit code: 2: no screen, otherwise that of rviz.",
     )
     parser.add_argument("-d", dest="config", metavar="FILE", help="configuration file of rviz")
     parser.parse_args(rospy.myargv()[1:])

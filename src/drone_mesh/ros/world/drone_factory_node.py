@@ -14,11 +14,12 @@ from drone_mesh.world.bullet_world import BulletWorld
 
 
 def main() -> None:
-    """The world, the drones in it, and by default their Raspberry Pis.
+    """Runs the world, the drones in it, and by default the nodes on the drones.
 
-    Parameters (private): all keys of config/factory.yaml, each overriding the file; ~config, that
-    file; ~hosts (int, 1): 1 = the nodes run in this process, otherwise in others. It also checks
-    the file in /DroneManager/casus.
+    Parameters (private): ~config (str): the configuration file, config/factory.yaml by default;
+    every key of that file: a parameter with its name overrides the file; ~hosts (int, 1): 1: the
+    nodes run in this process; any other number: they run in other processes. The program also
+    checks the layout file that /DroneManager/casus names.
     """
     prepare_node(main.__doc__)
     rospy.init_node("DroneFactory", disable_signals=True)
