@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Tuple
+from typing import Hashable, Tuple
 
 from drone_mesh.communication.timing import CIRCULATION_S
 
@@ -20,17 +20,19 @@ class CirculationGuard:
     """
 
     def __init__(self) -> None:
-        self._passages: dict[bytes, _Passage] = {}
-        self._clear_up_s = -math.inf  # when passages that are too old are forgotten
+        # Two tables in turns, so that old passages are forgotten without a search for them.
+        self._passages: dict[Hashable, _Passage] = {}
+        self._earlier: dict[Hashable, _Passage] = {}
+        self._turn_s = -math.inf  # when the earlier ones are forgotten
 
     def came_round(
-        self, identity: bytes, came_from: int, now_s: float, hops: int = 0
+        self, identity: Hashable, came_from: int, now_s: float, hops: int = 0
     ) -> int | None:
         """The next hop of the packet's first passage, if it now comes from another neighbour.
 
         A heartbeat counts its hops: only with more `hops` than before has it come round.
         """
-        passage = self._passages.get(identity)
+        passage = self._passages.get(identity) or self._earlier.get(identity)
         if passage is None:
             return None
         first_from, went_to, at_s, first_hops = passage
@@ -39,14 +41,12 @@ class CirculationGuard:
         return None if now_s - at_s >= CIRCULATION_S else went_to
 
     def passed(
-        self, identity: bytes, came_from: int, went_to: int, now_s: float, hops: int = 0
+        self, identity: Hashable, came_from: int, went_to: int, now_s: float, hops: int = 0
     ) -> None:
         """The packet was handed on. The first passage is the one that counts."""
-        passages = self._passages
-        if now_s >= self._clear_up_s:
-            self._clear_up_s = now_s + CIRCULATION_S
-            for old in [p for p, first in passages.items() if now_s - first[2] >= CIRCULATION_S]:
-                del passages[old]
-        first = passages.get(identity)
+        if now_s >= self._turn_s:
+            self._turn_s = now_s + CIRCULATION_S
+            self._passages, self._earlier = {}, self._passages
+        first = self._passages.get(identity) or self._earlier.get(identity)
         if first is None or now_s - first[2] >= CIRCULATION_S:
-            passages[identity] = (came_from, went_to, now_s, hops)
+            self._passages[identity] = (came_from, went_to, now_s, hops)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import abc
 import math
+import struct
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines, Due
@@ -98,10 +99,11 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """Learn from a packet, then process or forward it. Bad packets are dropped."""
         self._deadlines.now_s = now_s
-        if len(payload) != PAYLOAD_BYTES:
+        try:
+            creator, from_, kind, to, forward = messages.header(payload)
+        except struct.error:  # cheaper than a look at the length of each packet
             self._drop(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}", payload)
             return
-        creator, from_, kind, to, forward = messages.header(payload)
         me = self._node_id
         if creator > MAX_NODE_ID or from_ > MAX_NODE_ID or from_ == me or forward > BROADCAST:
             self._drop("bad ids", payload)

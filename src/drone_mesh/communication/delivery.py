@@ -53,6 +53,7 @@ class Delivery:
         self._reported_s: dict[int, float] = {}  # shared medium: when each was announced
         self._gave_up: set[int] = set()  # neighbours that took no packets, though heard
         self._strangers = Strangers()
+        self._known = self._strangers.known  # looked at for each packet
         self._announced = RateLimit(REPEATS)
         self._missing_to_report: deque[tuple[int, int, int]] = deque()
         self._reporting = False
@@ -66,14 +67,13 @@ class Delivery:
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
         """
-        strangers = self._strangers
-        if to not in strangers.known and strangers.ignores(to, self._deadlines.now_s):
+        if to not in self._known and self._strangers.ignores(to, self._deadlines.now_s):
             self._ignore(to)
             return False
         if self._shared:
             return self._hand_over(payload, to)
-        antenna, transmissions, attempts = self._antenna, failures, self._attempts
-        while failures < attempts or failures < self._most_attempts(payload):
+        antenna, transmissions = self._antenna, failures
+        while failures < self._attempts or failures < self._most_attempts(payload):
             taken = antenna.send_message_to(payload)
             transmissions += antenna.transmissions_of_last_send()
             if taken:
@@ -95,7 +95,7 @@ class Delivery:
 
     def delivered(self, to: int, tries: int) -> None:
         """The antenna has delivered a packet that it had queued."""
-        self._strangers.known.add(to)
+        self._known.add(to)
         self._routing.sent(to, True, tries)
 
     def undelivered(self, payload: bytes, tries: int) -> bool:
@@ -160,7 +160,8 @@ class Delivery:
 
     def _sent(self, to: int, transmissions: int) -> None:
         self.total_sent += 1
-        self._strangers.known.add(to)
+        if to not in self._known:
+            self._known.add(to)
         self._routing.sent(to, True, transmissions)
 
     # Lost nodes ------------------------------------------------------------------------------

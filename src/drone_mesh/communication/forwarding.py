@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from typing import Hashable, Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.circulation import CirculationGuard
@@ -51,8 +51,12 @@ class Forwarding:
         if creator == self._node_id:
             self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
             return
-        identity = messages.identity(payload)
-        hops = messages.heartbeat_body(payload)[2] if kind == _HEARTBEAT else 0
+        identity: Hashable
+        if kind == _HEARTBEAT:  # of most packets, so without their bytes
+            know_gateway, gateway, hops = messages.heartbeat_body(payload)
+            identity = (creator, forward, know_gateway, gateway)
+        else:
+            identity, hops = messages.identity(payload), 0
         went_to = self._circulation.came_round(identity, from_, now_s, hops)
         if went_to is not None:
             self._drop_circulating(payload, went_to, now_s)
@@ -61,7 +65,7 @@ class Forwarding:
         for _attempt in (1, 2):
             directions = routing.directions(forward, from_, creator)
             to = directions[0] if directions else NO_ROUTE
-            if to in (NO_ROUTE, from_):
+            if to == from_ or to == NO_ROUTE:
                 self.stranded(payload, now_s)
                 if to == from_:
                     self._delivery.came_back(forward, from_)

@@ -324,8 +324,10 @@ class GatewayPlace(NamedTuple):
 
 # Read for each packet: none of these costs a call of a Python function.
 
-header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct("<5B").unpack_from
-"""Creator, from, type, to and forward of a packet."""
+header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct(
+    f"<{HEADER_BYTES}B{BODY_BYTES}x"
+).unpack
+"""Creator, from, type, to and forward of a packet. Raises struct.error unless there are 32 bytes."""
 
 
 hop: Callable[[bytes], tuple[int, int]] = struct.Struct("<xBxB").unpack_from
@@ -399,14 +401,16 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
 
     None for a heartbeat that has reached MAX_HOPS.
     """
+    kind = payload[_TYPE]
     forwarded = bytearray(payload)
     forwarded[_FROM] = from_
     forwarded[_TO] = to
-    if payload[_TYPE] == _HEARTBEAT:
-        if payload[_HEARTBEAT_HOPS] >= MAX_HOPS:
+    if kind == _HEARTBEAT:
+        hops = payload[_HEARTBEAT_HOPS]
+        if hops >= MAX_HOPS:
             return None
-        forwarded[_HEARTBEAT_HOPS] += 1
-    elif payload[_TYPE] == ROUTE_RECORD and payload[ROUTE_RECORD_AT] < MOST_RECORDED:
+        forwarded[_HEARTBEAT_HOPS] = hops + 1
+    elif kind == ROUTE_RECORD and payload[ROUTE_RECORD_AT] < MOST_RECORDED:
         forwarded[ROUTE_RECORD_AT] += 1
         forwarded[ROUTE_RECORD_AT + forwarded[ROUTE_RECORD_AT]] = from_
     return bytes(forwarded)

@@ -8,8 +8,12 @@ import math
 from collections import deque
 from typing import Any, Callable, Tuple
 
-Event = Tuple[float, int, Callable[[Any], None], Any]
+Event = Tuple[float, float, Callable[[Any], None], Any]
 """Time, sequence number among events of the same time, function, argument."""
+
+
+def _never(_argument: Any) -> None:
+    """The function of an event that never comes."""
 
 
 class VirtualClock:
@@ -17,7 +21,8 @@ class VirtualClock:
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        self._events: list[Event] = []  # a heap
+        # A heap. Its last event never comes: so there is a first one, without a look at the length.
+        self._events: list[Event] = [(math.inf, math.inf, _never, None)]
         # Events requested in order of time, like most packets; cheaper than the heap.
         self._line: deque[Event] = deque()
         self._line_ends_s = -math.inf
@@ -37,22 +42,24 @@ class VirtualClock:
 
     def next_event_s(self) -> float:
         """The time of the next event; infinity if none is planned."""
-        first = [events[0][0] for events in (self._events, self._line) if events]
-        return min(first, default=math.inf)
+        at_s = self._events[0][0]
+        return min(at_s, self._line[0][0]) if self._line else at_s
 
     def run_until(self, until_s: float) -> None:
         """Process all events up to and including `until_s`."""
         events, line = self._events, self._line
         pop, pop_line = heapq.heappop, line.popleft
         while True:
-            if line and (not events or line[0] < events[0]):
-                if line[0][0] > until_s:
+            if line and line[0] < events[0]:
+                at_s, _order, function, argument = line[0]
+                if at_s > until_s:
                     break
-                at_s, _order, function, argument = pop_line()
-            elif events and events[0][0] <= until_s:
-                at_s, _order, function, argument = pop(events)
+                pop_line()
             else:
-                break
+                at_s, _order, function, argument = events[0]
+                if at_s > until_s or function is _never:
+                    break
+                pop(events)
             if at_s > self.now_s:
                 self.now_s = at_s
             function(argument)

@@ -142,10 +142,12 @@ class InProcessAir:
         from_, to = hop(payload)
         if self._flying and (from_ in self._flying or to in self._flying):
             other = self._heard_by(from_, self._places((to,))).get(to)
-        else:
-            links = self._links.get(from_)
-            other = links.get(to) if links else None
-        return other is not None and self._hand_over(payload, other)
+            return other is not None and self._hand_over(payload, other)
+        try:
+            other = self._links[from_][to]
+        except KeyError:  # rarely: most packets are for a neighbour
+            return False
+        return self._hand_over(payload, other)
 
     def broadcast(self, payload: bytes, node: int) -> None:
         """Hand a packet to each antenna in range of `node`, with its id in byte 3."""
