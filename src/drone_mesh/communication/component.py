@@ -230,7 +230,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     def _process(self, payload: bytes, creator: int, from_: int, kind: int) -> None:
         if kind == MessageType.LOCATION:
-            location = messages.LocationMessage.from_payload(payload).location
+            location = messages.place_in(payload)
             self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
             if creator == from_ and messages.addressee(payload) == BROADCAST:
                 self._on_goal(creator, location)

@@ -11,7 +11,7 @@ from typing import Callable, NamedTuple
 
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.messages import Message, MessageType
+from drone_mesh.communication.messages import MessageType, packet
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
@@ -111,8 +111,8 @@ class GatewayConnection:
         its_gateway = self._parts.neighbours.gateway_of(to)
         if its_gateway == NO_ROUTE:
             its_gateway = self.gateway
-        packet = self._parts.heartbeat(to, its_gateway, connected, self.gateway)
-        if not self._parts.delivery.send(packet, to) or its_gateway != self.gateway:
+        heartbeat = self._parts.heartbeat(to, its_gateway, connected, self.gateway)
+        if not self._parts.delivery.send(heartbeat, to) or its_gateway != self.gateway:
             return False
         self._tried = to
         return True
@@ -122,8 +122,8 @@ class GatewayConnection:
         to, self._detour = self._detour, NO_ROUTE
         if to == NO_ROUTE:
             return False
-        packet = self._parts.heartbeat(to, self.gateway, connected, self.gateway)
-        if not self._parts.delivery.send(packet, to):
+        heartbeat = self._parts.heartbeat(to, self.gateway, connected, self.gateway)
+        if not self._parts.delivery.send(heartbeat, to):
             return False
         self._tried = to
         return True
@@ -307,9 +307,7 @@ class GatewayConnection:
     def ask_for_place(self, node: int) -> None:
         """Request the place of `node`, along the route to it."""
         me = self._parts.node_id
-        self._parts.delivery.send_own(
-            Message(me, me, MessageType.REQUESTLOCATION, node, node).to_payload()
-        )
+        self._parts.delivery.send_own(packet(MessageType.REQUESTLOCATION, me, me, node, node))
 
     def _prefer(self, gateway: int) -> None:
         if gateway != self.gateway:

@@ -67,17 +67,21 @@ class Delivery:
         `failures`: attempts that failed before this call; `came_from`: the neighbour to inform
         first if `to` turns out to be lost.
         """
-        if to not in self._known and self._strangers.ignores(to, self._deadlines.now_s):
+        is_known = to in self._known
+        if not is_known and self._strangers.ignores(to, self._deadlines.now_s):
             self._ignore(to)
             return False
         if self._shared:
-            return self._hand_over(payload, to)
+            return self._hand_over(payload)
         antenna, transmissions = self._antenna, failures
         while failures < self._attempts or failures < self._most_attempts(payload):
             taken = antenna.send_message_to(payload)
             transmissions += antenna.transmissions_of_last_send()
             if taken:
-                self._sent(to, transmissions)
+                self.total_sent += 1
+                if not is_known:
+                    self._known.add(to)
+                self._routing.sent(to, True, transmissions)
                 return True
             failures += 1
         self._routing.sent(to, False, transmissions)
@@ -87,14 +91,14 @@ class Delivery:
     def _most_attempts(self, payload: bytes) -> int:
         return self._attempts * (DATA_PERSISTENCE if messages.is_data(payload) else 1)
 
-    def _hand_over(self, payload: bytes, to: int) -> bool:
+    def _hand_over(self, payload: bytes) -> bool:
         """Have the antenna queue a packet; what becomes of it is known later."""
         taken = self._antenna.send_message_to(payload)
         self.total_sent += taken
         return taken
 
     def delivered(self, to: int, tries: int) -> None:
-        """The antenna has delivered a packet that it had queued."""
+        """The antenna has delivered a packet, one of a batch or of its queue."""
         self._known.add(to)
         self._routing.sent(to, True, tries)
 
@@ -152,17 +156,12 @@ class Delivery:
         packets = [messages.addressed(payload, other) for other in direct]
         for other, packet, taken in zip(direct, packets, self._antenna.send_messages(packets)):
             if taken:
-                self._sent(other, 1)
+                self.total_sent += 1
+                self.delivered(other, 1)
             elif not self.send(packet, other, failures=1):
                 self.send_own(packet)
         for other in set(others).difference(direct):
             self.send_own(messages.addressed(payload, other))
-
-    def _sent(self, to: int, transmissions: int) -> None:
-        self.total_sent += 1
-        if to not in self._known:
-            self._known.add(to)
-        self._routing.sent(to, True, transmissions)
 
     # Lost nodes ------------------------------------------------------------------------------
 

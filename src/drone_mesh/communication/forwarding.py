@@ -65,7 +65,7 @@ class Forwarding:
         for _attempt in (1, 2):
             directions = routing.directions(forward, from_, creator)
             to = directions[0] if directions else NO_ROUTE
-            if to == from_ or to == NO_ROUTE:
+            if to in (NO_ROUTE, from_):
                 self.stranded(payload, now_s)
                 if to == from_:
                     self._delivery.came_back(forward, from_)

@@ -9,8 +9,8 @@ from typing import Callable
 from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.frames import CommonFrame
-from drone_mesh.communication.interfaces import BROADCAST, IMeshDebugInfo
-from drone_mesh.communication.messages import IntroduceMessage, MessageType
+from drone_mesh.communication.interfaces import IMeshDebugInfo
+from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.parts import NodeParts
 
 AFTER_POWER_S = 0.2  # our choice: the medium must register the antenna first
@@ -45,8 +45,7 @@ class Introduction:
         """Send PRESENT to each node in range. On a shared channel, repeat a search ever later."""
         parts, node = self._parts, self._node
         hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
-        me = parts.node_id
-        payload = IntroduceMessage(me, me, BROADCAST, BROADCAST, hops, connected).to_payload()
+        payload = messages.present(parts.node_id, hops, connected)
         room = messages.EXTENSION_ROOM[MessageType.PRESENT]
         room -= parts.antenna.reserved_bytes(MessageType.PRESENT)
         extension = parts.routing.extension(MessageType.PRESENT, room)

@@ -17,7 +17,7 @@ import struct
 from dataclasses import dataclass
 from typing import Callable, ClassVar, Iterable, Mapping, NamedTuple, Union
 
-from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import PacketError
 
@@ -109,11 +109,6 @@ class LocationMessage:
         return cls(
             creator, from_, to, forward, location.latitude, location.longitude, height, time_s
         )
-
-    @property
-    def location(self) -> Location:
-        """The place in the message."""
-        return Location(self.latitude, self.longitude, self.height)
 
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
@@ -271,6 +266,10 @@ _ORDER_NUMBER = struct.Struct("<H")
 _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
+_PRESENT = int(MessageType.PRESENT)
+_NEW_PRESENT = struct.Struct(
+    f"<{HEADER_BYTES}B{IntroduceMessage.BODY.format[1:]}{BODY_BYTES - IntroduceMessage.BODY.size}x"
+)
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
 _NEW_HEARTBEAT = struct.Struct(
@@ -327,7 +326,7 @@ class GatewayPlace(NamedTuple):
 header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct(
     f"<{HEADER_BYTES}B{BODY_BYTES}x"
 ).unpack
-"""Creator, from, type, to and forward of a packet. Raises struct.error unless there are 32 bytes."""
+"""Creator, from, type, to and forward of 32 bytes. Raises struct.error for another length."""
 
 
 hop: Callable[[bytes], tuple[int, int]] = struct.Struct("<xBxB").unpack_from
@@ -385,6 +384,16 @@ def addressed(payload: bytes, other: int) -> bytes:
 def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: bytes = b"") -> bytes:
     """The 32 bytes of header and body."""
     return (bytes((creator, from_, kind, to, forward)) + body).ljust(PAYLOAD_BYTES, b"\0")
+
+
+def place_in(location: bytes) -> Location:
+    """The place in a LOCATION, without the object: every tenth packet is one."""
+    return Location(*LocationMessage.BODY.unpack_from(location, HEADER_BYTES)[:3])
+
+
+def present(sender: int, hops: int, know_gateway: bool) -> bytes:
+    """The bytes of a new IntroduceMessage for every node in range, without the object."""
+    return _NEW_PRESENT.pack(sender, sender, _PRESENT, BROADCAST, BROADCAST, hops, know_gateway)
 
 
 def heartbeat(
@@ -447,7 +456,8 @@ def extended(payload: bytes, extension: bytes) -> bytes:
 
 def frame_digest(present: bytes) -> int:
     """The digest of its creator's origin in a PRESENT; 0: it has none."""
-    return int(_FRAME_DIGEST.unpack_from(present, _FRAME_DIGEST_AT)[0])
+    digest: int = _FRAME_DIGEST.unpack_from(present, _FRAME_DIGEST_AT)[0]
+    return digest
 
 
 def with_frame_digest(present: bytes, digest: int) -> bytes:

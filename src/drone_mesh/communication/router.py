@@ -19,9 +19,9 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.messages import (
     GatewayPlace,
-    LocationMessage,
     MessageType,
     MovementNegotiationMessage,
+    place_in,
 )
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.repair import ConnectionRepair
@@ -180,8 +180,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if self._antenna.reserved_bytes(MessageType.LOCATION):
             return
         if creator == self._connection.gateway:
-            location = LocationMessage.from_payload(payload).location
-            self.places.gateway_is_at(location, self._deadlines.now_s)
+            self.places.gateway_is_at(place_in(payload), self._deadlines.now_s)
 
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
