@@ -17,8 +17,8 @@ def main() -> None:
     """Runs the world, the drones in it, and by default the nodes on the drones.
 
     Parameters (private): ~config (str): the configuration file, config/factory.yaml by default;
-    every key of that file: a parameter with its name overrides the file; ~hosts (int, 1): 1: the
-    nodes run in this process; any other number: they run in other processes. The program also
+    every key of that file: a parameter with its name overrides the file; ~hosts (int, 1): with 1
+    the nodes run in this process, with any other number in other processes. The program also
     checks the layout file that /DroneManager/casus names.
     """
     prepare_node(main.__doc__)
