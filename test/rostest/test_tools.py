@@ -185,8 +185,9 @@ class ToolsTest(unittest.TestCase):
         )
         self.assertEqual(finished.returncode, 0, finished.stderr)
         page = (self.folder / "run.html").read_text(encoding="utf-8")
-        self.assertTrue("<td>2 off</td>" in page, "the page does not tell the cause of the loss")
-        self.assertIn("flight decided", (self.folder / "events.csv").read_text(encoding="utf-8"))
+        events = (self.folder / "events.csv").read_text(encoding="utf-8")
+        self.assertTrue("<td>2 off</td>" in page, f"the page lacks the cause of the loss: {events}")
+        self.assertIn("flight decided", events)
 
     def test_4_what_is_no_bag_is_refused_in_one_line(self) -> None:
         nonsense = self.folder / "nonsense.bag"
