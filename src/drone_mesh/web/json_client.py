@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import urllib.error
 import urllib.request
@@ -14,6 +15,10 @@ class NoAnswer(MeshError):
     """The server does not answer, refuses, or sends no JSON; the text gives details."""
 
 
+# An answer that ends too early, or that is not HTTP, is an HTTPException.
+_FAILURES = (OSError, ValueError, http.client.HTTPException)
+
+
 def ask_json(
     url: str, within_s: float, token: str = "", method: str = "GET", body: bytes | None = None
 ) -> Any:
@@ -21,24 +26,25 @@ def ask_json(
 
     For a refusal the text is the server's own reason (the field `detail`), if it gives one.
     """
-    request = urllib.request.Request(url, body, method=method)
-    if body is not None:
-        request.add_header("Content-Type", "application/json")
-    if token:
-        request.add_header("Authorization", f"Bearer {token}")
     try:
+        request = urllib.request.Request(url, body, method=method)
+        if body is not None:
+            request.add_header("Content-Type", "application/json")
+        if token:
+            request.add_header("Authorization", f"Bearer {token}")
         with urllib.request.urlopen(request, timeout=within_s) as answer:
             return json.load(answer)
     except urllib.error.HTTPError as error:
-        raise NoAnswer(_reason(error)) from error
-    except (OSError, ValueError) as error:
+        raise NoAnswer(_reason(error, url)) from error
+    except _FAILURES as error:
         # The text of a URLError wraps its reason in "<urlopen error ...>".
-        raise NoAnswer(f"no answer from {url}: {getattr(error, 'reason', error)}") from error
+        reason = " ".join(str(getattr(error, "reason", error)).split())
+        raise NoAnswer(f"no answer from {url}: {reason}") from error
 
 
-def _reason(error: urllib.error.HTTPError) -> str:
+def _reason(error: urllib.error.HTTPError, url: str) -> str:
     try:
         with error:
             return str(json.load(error)["detail"])
-    except (ValueError, KeyError, TypeError):
-        return str(error)
+    except (*_FAILURES, KeyError, TypeError):
+        return f"{url}: {error}"
