@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import pytest
 
 from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.lane import Lane
+from drone_mesh.communication.data.outgoing import OutgoingMessage
+from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.train import FIRST_LENGTH, LEAST_LENGTH, MOST_LENGTH, Train
 from drone_mesh.inprocess import Network
 
@@ -83,6 +88,33 @@ def test_a_silent_receiver_does_not_stop_best_effort(chain):
     chain.power(0, False)
     tickets = [chain.send(3, 0, bytes(1024), reliable=False) for _ in range(4)]
     assert chain.run_until(lambda: all(ticket.final for ticket in tickets), 60.0)
+
+
+def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
+    lane = Lane(to=0, session=7, room=27, ended=lambda _state: None)
+    lane.relayed(True)
+    for number in (1, 2, 3):
+        ticket = Ticket(number, to=0, port=5, size=1024, reliable=False)
+        lane.add(OutgoingMessage(ticket, bytes(1024), now_s=0.0))
+    arrived = Counter()  # by message, as bits
+
+    def length_of_train(lost):
+        """Send a train whose last fragment gets lost if `lost`, and answer it."""
+        sent = []
+        while True:
+            packet = lane.next_packet(0.0)
+            lane.left(packet, 0.0)
+            if packet.kind == packets.POLL:
+                break
+            sent.append((packet.message.head.number, packet.kind - packets.FRAGMENTS.start))
+        for number, index in sent[:-1] if lost else sent:
+            arrived[number] |= 1 << index
+        poll = packets.poll_of(packet.body)
+        has = arrived[poll.number]
+        lane.answered(packets.Ack(7, poll.nonce, poll.number, has, newest=0, done=0), 0.1)
+        return len(sent)
+
+    assert [length_of_train(lost) for lost in (True, True, False, False)] == [32, 16, 8, 16]
 
 
 def test_a_train_grows_with_answers_and_is_halved_without():
