@@ -41,8 +41,8 @@ def _parser() -> argparse.ArgumentParser:
         description="Plays a recorded run as if it ran now, for rviz, the console and your own "
         "nodes. Skips the recorded clock, because rosbag publishes its own: with both, time "
         "would jump backwards.",
-        epilog="The space bar pauses. Exit code: 2: unusable bag or no free master, otherwise that "
-        "of rosbag play.",
+        epilog="The space bar pauses. Exit code: that of rosbag play; 2: unusable bag or no free "
+        "master.",
     )
     parser.add_argument("bag", type=Path, help="the bag of the recorded run")
     parser.add_argument(

@@ -17,7 +17,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh rviz_window",
         description="Starts rviz; without a screen, prints one line and ends.",
-        epilog="Exit code: 2: no screen, otherwise that of rviz.",
+        epilog="Exit code: that of rviz; 2: no screen.",
     )
     parser.add_argument("-d", dest="config", metavar="FILE", help="configuration file of rviz")
     parser.parse_args(rospy.myargv()[1:])
