@@ -81,17 +81,22 @@ def read_mapping_text(text: str, path: str | Path, limited: bool = True) -> Yaml
 
 def _read_text(path: str | Path, limited: bool) -> str:
     try:
-        # Opening a pipe waits for its writer, and a device may never end.
-        status = Path(path).stat()
-        if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
-            raise ConfigurationError(f"{path}: not a regular file")
-        if limited and status.st_size > MAX_FILE_BYTES:
-            raise ConfigurationError(f"{path}: larger than {MAX_FILE_BYTES} bytes")
+        if limited:
+            _check_size(Path(path))
         return Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise ConfigurationError(f"{path}: not a text file in UTF-8") from error
+
+
+def _check_size(path: Path) -> None:
+    status = path.stat()
+    # Opening a pipe waits for its writer, and a device may never end.
+    if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
+        raise ConfigurationError(f"{path}: not a regular file")
+    if status.st_size > MAX_FILE_BYTES:
+        raise ConfigurationError(f"{path}: larger than {MAX_FILE_BYTES} bytes")
 
 
 class _Loader(yaml.SafeLoader):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import threading
 from pathlib import Path
 from typing import Any, Iterator
 
@@ -292,6 +294,15 @@ def test_every_key_refuses_what_is_of_another_type_or_out_of_range(
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="No such file"):
         load_experiment(tmp_path / "none.yaml")
+
+
+def test_an_experiment_may_come_from_a_pipe(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_text, args=(GOOD,), daemon=True)
+    writer.start()
+    assert len(load_experiment(pipe).cells) == 6
+    writer.join()
 
 
 def test_places_come_from_a_file_beside_the_experiment(tmp_path: Path) -> None:
