@@ -32,7 +32,7 @@ TEST_TYPE = 255  # of packets of the field tools: a type that no node processes
 RPD_VALID_S = 250e-6  # settling 130 us and 40 us of signal [DS 6.4], and some room
 SWITCH_S = 505e-6  # an acknowledgement that is being sent must not be cut off
 SEND_WITHIN_S = 95e-3  # the longest transaction takes 87.1 ms
-LEAST_POLLS = 50  # our choice: on a busy machine the time may pass while this process waits
+LEAST_POLLS = 50  # our choice: on a busy machine the time may pass while this process is paused
 _POLL_S = 100e-6
 
 
@@ -44,7 +44,7 @@ class Sent(NamedTuple):
 
 
 class NeitherSentNorFailed(RadioError):
-    """The chip took a payload and did nothing: it never saw CE high."""
+    """The chip took a payload but did not send it: CE never went high."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -53,7 +53,7 @@ class NeitherSentNorFailed(RadioError):
 
 
 class BenchRadio:
-    """Set up as a node would be, from start to close."""
+    """A radio with the registers of a node, from `set_up` to `close`."""
 
     def __init__(
         self, spi: SpiDevice, ce: CePin, node_id: int, settings: RadioSettings, runtime: Runtime
@@ -95,7 +95,7 @@ class BenchRadio:
         return wrong[0].name if wrong is not None else ""
 
     def hears_carrier(self, channel: int) -> bool:
-        """Whether there is more than -64 dBm on a channel now (RPD)."""
+        """Whether a signal of more than -64 dBm is on a channel now (RPD)."""
         self._ce.value = False
         self.link.write_byte(Register.RF_CH, channel)
         self._ce.value = True
@@ -110,7 +110,7 @@ class BenchRadio:
         self._ce.value = True
 
     def use(self, settings: RadioSettings) -> None:
-        """Use these settings from now on. RadioError if the chip does not have them."""
+        """Use these settings from now on. Raises RadioError if the chip does not support them."""
         self.settings = settings
         self._registers = settings.registers(self.node_id)
         self.set_up()
@@ -128,7 +128,7 @@ class BenchRadio:
         self._transmit(Command.W_TX_PAYLOAD_NO_ACK, address, payload, 0, keep_flags)
 
     def clear_flags(self) -> None:
-        """Let the IRQ pin go."""
+        """Clear all flags, which releases the IRQ pin."""
         self.link.write_byte(Register.STATUS, STATUS_FLAGS)
 
     def receive(self) -> bytes | None:

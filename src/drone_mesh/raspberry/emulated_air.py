@@ -18,8 +18,7 @@ from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
-# Distance between columns: 0.7 of the distance at which one frame in four is lost (0 dBm, path loss
-# exponent 2.7). The next column is in range, the one after it is not.
+# Distance between columns: 0.7 of the distance at which one frame in four is lost (0 dBm, path
 # loss exponent 2.7). The next column is in range, the one after it is not.
 COLUMN_M = {DataRate.KBPS_250: 70.0, DataRate.MBPS_1: 32.0, DataRate.MBPS_2: 25.0}
 MOST_COLUMNS = 4  # of routers; over more hops, collisions delay the gateway's answers too long

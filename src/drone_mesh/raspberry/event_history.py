@@ -38,7 +38,7 @@ class EventHistory:
         self.others(event)
 
     def since(self, number: int, started_s: float) -> list[dict[str, Any]]:
-        """Events after this number, oldest first, as JSON values; times relative to the start."""
+        """Events after this number, oldest first, as JSON values; times since `started_s`."""
         with self._lock:
             kept = list(self._kept)
         return [

@@ -26,12 +26,12 @@ from drone_mesh.users.desk import UsersDesk
 from drone_mesh.users.local_socket import LocalSocket
 from drone_mesh.users.socket_path import socket_path
 
-ALIVE_WITHIN_S = 20.0  # our choice: two check periods, less than systemd's watchdog waits
+ALIVE_WITHIN_S = 20.0  # our choice: two check periods, shorter than WatchdogSec of the units
 
 _log = logging.getLogger(__name__)
 
 MakeInternet = Callable[["RadioNode"], IInternetConnection]
-"""Creates the internet connection of a gateway from its node, whose component comes later."""
+"""Creates the internet connection of a gateway, before the node has its component."""
 
 
 class RadioNode:
@@ -50,8 +50,8 @@ class RadioNode:
     ) -> None:
         """Takes ownership of radio and engine. Raises what `make_internet` raises.
 
-        `events` is shared by the nodes of one program, which report their events themselves; a
-        gateway without it derives those of its routers from what it hears of them.
+        `events` is shared by the nodes of one program: each reports its own events. Without it, a
+        gateway derives the events of its routers from their packets.
         """
         self.radio = radio
         self.engine = engine
@@ -114,7 +114,7 @@ class RadioNode:
         }
 
     def check_others(self) -> None:
-        """Have a gateway report what changed at its routers; to be called periodically."""
+        """Have a gateway report changes at its routers; to be called periodically."""
         if self._changes is not None:
             self._slot.submit(self._note_changes)
 

@@ -1,4 +1,4 @@
-"""NodeChanges: events of other nodes, derived from what their gateway hears."""
+"""NodeChanges: events of other nodes, derived from the packets that their gateway receives."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class _Seen:
 
 
 class NodeChanges:
-    """Compares what a gateway knows of its routers with the call before. One thread."""
+    """Compares a gateway's knowledge of its routers with that of the previous call. One thread."""
 
     def __init__(self, gateway: int, check_period_s: float, observer: MeshObserver) -> None:
         """`observer` is called with each event; the event's node is the router."""

@@ -96,7 +96,7 @@ def _line(name: str, value: object) -> str:
 
 
 def _neighbour(neighbour: dict[str, Any]) -> str:
-    """When it was heard, and how well packets reach it; "-" if no packet was sent to it."""
+    """One row: when it was heard, and the quality of its link; "-" if no packet was sent to it."""
     tries, delivered = neighbour["tries_per_packet"], neighbour["delivered"]
     quality = ("-", "-") if tries is None else (f"{tries:.2f}", f"{delivered:.0%}")
     heard = f"{neighbour['heard_s_ago']:g} s ago"

@@ -70,8 +70,8 @@ class Options:
     trace: Path | None  # file for the frames on the emulated air
     log_level: str
     gateway: bool
-    http: HttpSettings | None  # a router has it only if asked for
-    keys: MeshKey | NodeKeys | None = None  # None: nothing is sealed
+    http: HttpSettings | None  # None: a router without --http
+    keys: MeshKey | NodeKeys | None = None  # None: packets are not sealed
     mqtt: MqttOptions | None = None
 
 

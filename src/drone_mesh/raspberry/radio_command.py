@@ -77,7 +77,7 @@ def _listen(radio: BenchRadio, ended: Callable[[], bool], file: Path | None) -> 
 
 
 def _report(radio: BenchRadio, irq: IrqPin | None, options: argparse.Namespace) -> Iterator[str]:
-    """Check and scan, and what this machine is, into one file."""
+    """Write the output of check and scan, and a description of this machine, to one file."""
     file: Path = options.file
     lines = [
         f"drone_mesh {version()}",
@@ -109,7 +109,7 @@ def _report(radio: BenchRadio, irq: IrqPin | None, options: argparse.Namespace) 
 
 def _radio_in_words(options: argparse.Namespace) -> str:
     if options.emulated:
-        return "emulated: nothing here is about a real chip"
+        return "emulated: these results are not about a real chip"
     bus, device = options.spi
     irq = "not connected" if options.irq is None else f"GPIO{options.irq}"
     return f"on SPI {bus}.{device} at {options.spi_hz} Hz, CE GPIO{options.ce}, IRQ {irq}"
@@ -192,16 +192,24 @@ def _parser() -> argparse.ArgumentParser:
         "--nodes",
         type=whole(1, MAX_NODE_ID + 1),
         default=USUAL_NODES,
-        help="size of the mesh, which decides the suggested rate (default: %(default)s)",
+        help="number of nodes in the mesh, for the suggested rate (default: %(default)s)",
     )
     reach = tools.add_parser("range", help="measure the loss to a node at each power, as CSV")
     reach.add_argument(
         "--to", type=whole(0, MAX_NODE_ID), required=True, help="id of the other node"
     )
     reach.add_argument(
-        "--packets", type=whole(1, 100_000), default=1000, help="per power (default: %(default)s)"
+        "--packets",
+        type=whole(1, 100_000),
+        default=1000,
+        help="number of packets at each power (default: %(default)s)",
     )
-    reach.add_argument("--distance", type=float, help="metres, for a comparison with 2019")
+    reach.add_argument(
+        "--distance",
+        type=float,
+        metavar="METRES",
+        help="distance to the other node: also print the loss measured in 2019 at about it",
+    )
     reach.add_argument(
         "--all-rates",
         action="store_true",
@@ -211,10 +219,15 @@ def _parser() -> argparse.ArgumentParser:
         "answer", help="acknowledge the packets of 'range --all-rates', at each of its rates"
     )
     ear = tools.add_parser("listen", help="print packets to all nodes and to --id, decoded")
-    ear.add_argument("--seconds", type=float, default=float("inf"), help="(default: until Ctrl-C)")
     ear.add_argument(
-        "--pcapng", type=Path, metavar="FILE", help="also write what arrives to FILE, for Wireshark"
+        "--seconds",
+        type=float,
+        default=float("inf"),
+        help="time to listen (default: until Ctrl-C)",
     )
-    report = tools.add_parser("report", help="save check and scan in one file, to send to us")
+    ear.add_argument(
+        "--pcapng", type=Path, metavar="FILE", help="also write the packets to FILE, for Wireshark"
+    )
+    report = tools.add_parser("report", help="save check and scan in one file, for a bug report")
     report.add_argument("file", type=Path, help="text file to write")
     return parser

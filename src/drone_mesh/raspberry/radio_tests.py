@@ -1,4 +1,4 @@
-"""The field tools' work: check a radio, scan the band, listen. Output is lines."""
+"""The field tools: check a radio, scan the band, listen. Each yields lines of output."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PATTERNS = (bytes(5), b"\xff" * 5, b"\x55" * 5, b"\xaa\x55\xaa\x55\xaa")
 
 
 def check(radio: BenchRadio, irq: IrqPin | None) -> Lines:
-    """Wiring, SPI, registers, CE, supply, IRQ. RadioError for what makes a radio unusable."""
+    """Test wiring, SPI, registers, CE, supply, IRQ. Raises RadioError if the radio is unusable."""
     radio.set_up()
     yield "ok   registers: written and read back"
     radio.stand_by()  # addresses may be written in no other state
@@ -68,7 +68,7 @@ def _check_irq(radio: BenchRadio, irq: IrqPin) -> str:
     fell = irq.wait_low(0.1)
     radio.clear_flags()
     return (
-        "ok   IRQ: falls when a packet was sent"
+        "ok   IRQ: falls after a packet was sent"
         if fell
         else "FAIL IRQ: never falls: check the wiring"
     )
@@ -77,7 +77,7 @@ def _check_irq(radio: BenchRadio, irq: IrqPin) -> str:
 def scan(radio: BenchRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
     """How often each channel carried a signal of more than -64 dBm, and the quietest channels.
 
-    The last line has the options for a mesh of so many nodes.
+    The last line gives the options for a mesh of this many nodes.
     """
     radio.set_up()
     heard = [0] * CHANNELS
@@ -97,12 +97,12 @@ def scan(radio: BenchRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
 
 
 def rate_for(nodes: int) -> str:
-    """The slowest rate, with the longest range, at which so many nodes connect within 20 s."""
+    """The slowest rate (the longest range) at which this many nodes connect within 20 s."""
     return next(rate for most, rate in MOST_NODES if nodes <= most)
 
 
 def quietest(heard: list[int], count: int) -> list[int]:
-    """The channels with the least traffic on themselves and their neighbours, apart from Wi-Fi."""
+    """The channels with the least traffic around them; of equal ones, those farthest from Wi-Fi."""
 
     def traffic(channel: int) -> tuple[int, int]:
         near = heard[max(0, channel - 2) : channel + 3]
@@ -121,7 +121,10 @@ def listen(
     ended: Callable[[], bool],
     keep: Callable[[bytes], None] = lambda _payload: None,
 ) -> Lines:
-    """What arrives at the broadcast address and at this node's own, decoded; `keep` gets it too."""
+    """Decode the packets that arrive at the broadcast address and at this node's own address.
+
+    `keep` also gets each of them, as bytes.
+    """
     radio.set_up()
     started_s = radio.runtime.now_s()
     while not ended():

@@ -1,8 +1,8 @@
-"""The range measurement: loss at each rate and power. The far end follows the announced rate.
+"""The range measurement: loss at each rate and power. The far end changes to the announced rate.
 
-A node never changes its rate because of a packet. Only `answer` does, and a person starts it. It
-returns to its own rate when the measuring end asks for it, and after `hold_s` without a packet. The
-announcement and its confirmation use the rate that both ends were started with, at full power.
+A node never changes its rate because of a packet. Only `answer` does, which a person starts. It
+returns to its own rate when the measuring end requests it, and after `hold_s` without a packet. The
+announcement and its confirmation use the rate with which both ends were started, at full power.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ JOIN_WITHIN_S = 3.0  # our choice: seven announcements
 FAILED_PACKET_S = 0.06  # 16 frames at 250 kbit/s take 48 ms
 LONGEST_HOLD_S = 600  # our choice
 
-_BODY = struct.Struct("<5sBH")  # what it is, rate as an index, hold_s
+_BODY = struct.Struct("<5sBH")  # kind of request, index of the rate, hold_s
 _FOLLOW, _FOLLOWING, _RETURN = b"RANGE", b"MOVED", b"ENDED"
 _RATES = tuple(DataRate)
 
@@ -48,7 +48,7 @@ def measure_range(
 ) -> Lines:
     """CSV: packets, losses and retransmissions at each rate and power, to a node that is running.
 
-    At another rate than that of `radio`, `answer` must run at the far end; RadioError otherwise.
+    Rates other than that of `radio` need `answer` at the far end; raises RadioError without it.
     """
     radio.set_up()
     base = radio.settings
@@ -100,7 +100,7 @@ def _measured(radio: BenchRadio, to: int, packets: int) -> str:
 
 
 class _Partner:
-    """The far end, from the side that measures."""
+    """The far end, as seen by the end that measures."""
 
     def __init__(self, radio: BenchRadio, node_id: int, hold_s: int) -> None:
         self._radio = radio
@@ -110,7 +110,7 @@ class _Partner:
         self._may_be_away = False
 
     def bring_to(self, rate: DataRate) -> None:
-        """Return when it has confirmed that it goes to this rate. RadioError if it does not."""
+        """Wait until it has confirmed the change to this rate. Raises RadioError if it does not."""
         radio, runtime = self._radio, self._radio.runtime
         patience_s = JOIN_WITHIN_S + (self._hold_s if self._may_be_away else 0.0)
         until_s = runtime.now_s() + patience_s
@@ -121,13 +121,13 @@ class _Partner:
             if self._confirms(rate):  # also without an acknowledgement: that may have been lost
                 self._may_be_away = True
                 return
-            self.send_back(rate)  # it may have gone there, and the confirmation was lost
+            self.send_back(rate)  # it may have changed its rate, and the confirmation was lost
             if runtime.now_s() >= until_s:
                 break
         raise RadioError(self._complaint(heard, rate))
 
     def send_back(self, rate: DataRate) -> None:
-        """Ask it to return now; otherwise it returns by itself after its time."""
+        """Ask it to return now; if the request is lost, it returns after `hold_s`."""
         self._radio.use(dataclasses.replace(self._base, data_rate=rate))
         self._may_be_away = not self._send(_RETURN, rate)
 
@@ -194,7 +194,7 @@ def answer(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
 
 
 def _follow(radio: BenchRadio, request: _RateRequest) -> str:
-    """Confirm and go to the rate; stay if the chip does not have it."""
+    """Confirm, and change to the rate; keep the present one if the chip does not support it."""
     base = radio.settings
     there = dataclasses.replace(base, data_rate=request.rate)
     try:

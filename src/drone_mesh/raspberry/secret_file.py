@@ -10,7 +10,7 @@ from drone_mesh.errors import ConfigurationError
 def read_secret(path: Path, what: str) -> str:
     """The text of the file, without white space around it. Raises ConfigurationError.
 
-    `what` it should hold, for the error.
+    `what`: the expected content, named in the error.
     """
     try:
         secret = path.read_text(encoding="utf-8").strip()

@@ -50,8 +50,8 @@ def serving_node(
     _log.info("emulated air: others join it with --emulated-air %s:%d", host, port)
     if not is_loopback(host):
         _log.warning(
-            "emulated air: it has no password, so whoever can reach port %d can join this mesh and "
-            "listen to it",
+            "emulated air: it has no password, so anyone who can reach port %d can join this mesh "
+            "and listen to it",
             port,
         )
     place = _place(options)

@@ -187,7 +187,7 @@ def test_a_report_holds_checks_scan_and_machine(tmp_path, capsys):
     file = tmp_path / "report.txt"
     assert main(["--emulated", "30", "report", str(file)]) == 0
     text = file.read_text(encoding="utf-8")
-    assert "radio emulated: nothing here is about a real chip" in text
+    assert "radio emulated: these results are not about a real chip" in text
     assert "== check\nok   registers" in text
     assert "125 2525 MHz" in text
     assert "Python" in text
