@@ -53,7 +53,7 @@ class HttpInternet(IInternetConnection):
         return self._server.url
 
     def connect(self, commands: IGatewayCommands) -> None:
-        """Answer requests, from the reports of `commands`, until `disconnect`; only once."""
+        """Answer requests through `commands` until `disconnect`. Call it only once."""
         self._desk.open(commands)
         self._server.start()
         _log.info("gateway %d: orders over HTTP at %s/docs", commands.get_node_id(), self.url)

@@ -60,8 +60,8 @@ class _Unacknowledged:
 class MqttInternet(IInternetConnection):
     """The MQTT connection of a gateway.
 
-    Threads: paho's, which calls `_on_...`; one that publishes states and resubmits messages for
-    which the mesh had no room; the node's, which calls `observe`, `_received` and message
+    Three threads use it: paho's calls `_on_...`; its own publishes states, and resubmits messages
+    that the full queue of the mesh refused; the node's calls `observe`, `_received` and message
     callbacks. All may use paho's client.
     """
 
@@ -73,9 +73,9 @@ class MqttInternet(IInternetConnection):
         ca_file: Path | None = None,
         sends: bool = True,
     ) -> None:
-        """`submit` runs a function on the node's thread; `sends`: forward what is published on tx.
+        """`submit` runs a function on the node's thread; `sends`: send messages published on tx.
 
-        If several gateways use one broker, only one of them should forward. Raises
+        If several gateways use one broker, only one of them should send these. Raises
         ConfigurationError for a file that cannot be read.
         """
         self._submit = submit
@@ -256,7 +256,7 @@ class MqttInternet(IInternetConnection):
         _log.info("MQTT: connected to %s, mesh %s", self._broker.url, self._broker.mesh)
         if self._sends:
             client.subscribe([(topic, QOS) for topic in self._topics.all_tx])
-        self._submit(lambda _now_s: self._states.clear())  # the will may have replaced them
+        self._submit(lambda _now_s: self._states.clear())  # the last will may have replaced them
 
     def _on_connect_fail(self, _client: mqtt.Client, _userdata: Any) -> None:
         error = sys.exc_info()[1]  # paho calls this from its error handler

@@ -3,9 +3,8 @@
     drone_mesh/<mesh>/<node>/rx[/<port>]   a message that the gateway received from that node
     drone_mesh/<mesh>/<node>/tx[/<port>]   publish here to send a message to that node
     drone_mesh/<mesh>/<node>/state         retained: JSON, the node's state as known to the gateway
-        drone_mesh/<mesh>/<node>/event         JSON: outcome of a message for that node ("state"),
-    or an
-                                               event of that node ("event")
+    drone_mesh/<mesh>/<node>/event         JSON: outcome of a message for that node ("state"), or an
+                                           event of that node ("event")
 
 `rx` and `tx` carry only the bytes of the message; port 0 has no level of its own. <node> is an id,
 for `tx` also "all".

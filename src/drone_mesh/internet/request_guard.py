@@ -66,7 +66,7 @@ class RequestGuard:
         status, reason = refusal
         self.refused[status] += 1
         if status == 413 and "expect" not in Headers(scope=scope):
-            # A client that is still sending would get a reset instead of the answer.
+            # If the client is still sending, it would get a reset instead of the answer.
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(_discard_body(receive), BODY_WITHIN_S)
         response = JSONResponse({"detail": reason}, status, headers={"Connection": "close"})

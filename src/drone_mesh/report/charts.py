@@ -49,7 +49,7 @@ def timeline_figure(story: RunStory) -> str:
 
 
 def with_gaps(values: Iterable[float | None]) -> list[float]:
-    """The values of a line, which has a gap where there is none: matplotlib draws no NaN."""
+    """The values of a line, with NaN in place of None: there matplotlib leaves a gap."""
     return [math.nan if value is None else value for value in values]
 
 
@@ -97,7 +97,7 @@ def _mark_events(axes: Axes, story: RunStory) -> None:
 def grouped(
     events: Sequence[EventRecord], word: str, close_s: float
 ) -> Iterator[tuple[float, str]]:
-    """Yield (time, text): one label for all events within so many seconds, oldest first."""
+    """Yield (time, text), oldest first: one label for all events within `close_s` seconds."""
     rest = list(events)
     while rest:
         first_s = rest[0].stamp_s

@@ -56,8 +56,8 @@ def phases_of(outage: Outage, end_s: float) -> list[tuple[float, float, str, str
         stop_s = getattr(outage, attribute)
         if stop_s is None and attribute != "connected_s":
             continue
-        # A node that did not fly had nothing to reconnect after, and a node that a neighbour drew
-        # into a negotiation had no emergency of its own: both were waiting.
+        # A node that did not fly has no landing before its reconnection, and a node that joined a
+        # neighbour's negotiation has no emergency of its own: both count as waiting.
         if attribute == "connected_s" and outage.landed_s is None:
             name, colour = PHASES[0][1:] if outage.decided_s is None else PHASES[2][1:]
         elif attribute == "decided_s" and outage.emergency_s is None:

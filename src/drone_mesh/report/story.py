@@ -32,7 +32,7 @@ class RunStory:
 
 
 def tell_story(states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> RunStory:
-    """Both oldest first. Raises NothingRecorded if there is no state."""
+    """The story of these states and events, oldest first. Raises NothingRecorded without states."""
     records = list(events)
     outages = find_outages(records)
     real = [outage for outage in outages if not outage.switched_off and not _is_blip(outage)]

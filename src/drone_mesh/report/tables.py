@@ -43,7 +43,7 @@ def key_numbers(story: RunStory) -> list[tuple[str, str]]:
 
 
 def outages_in_words(story: RunStory) -> str:
-    """How many nodes had an outage, had none, and had one that did not end."""
+    """The number of nodes with an outage, without one, and with one that did not end."""
     present = {node.id for node in story.after.nodes}
     without = len(present - {outage.node for outage in story.outages})
     nodes = len({outage.node for outage in story.outages})
@@ -77,7 +77,7 @@ def repair_rows(story: RunStory) -> list[dict[str, str]]:
 
 
 def repairs_left(story: RunStory) -> list[tuple[int, str]]:
-    """Each node with something left to repair at the end, and its own description of it."""
+    """Each node whose repair was not finished at the end, and its own description of it."""
     return [(node.id, node.repair) for node in story.after.nodes if node.repair]
 
 

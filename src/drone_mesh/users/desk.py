@@ -50,7 +50,7 @@ class Sending:
         return ticket.state is not TicketState.GIVEN_UP
 
     def in_words(self, waited_s: float) -> str:
-        """The ticket in words, and that the message is still on its way."""
+        """The ticket in words; if the message is still on its way, that too."""
         ticket = self.ticket()
         if waited_s > 0 and not ticket.final:
             return f"{ticket}; not delivered within {waited_s:g} s, the node keeps trying"
@@ -67,12 +67,12 @@ class Sending:
         return self._ended.is_set() or (self._handed_in.is_set() and self._ticket is None)
 
     def when_over(self, call: WhenOver) -> None:
-        """Call `call` once, with the ticket or the refusal; on this thread or the node's."""
+        """Call `call` with the ticket or refusal once it is over; on this or the node's thread."""
         self._when_over = call
         self._call_when_over()
 
     def hand_in(self, transport: Transport, now_s: float) -> None:
-        """On the node's thread."""
+        """Pass the message to the node's transport; called on the node's thread."""
         to, payload, port, reliable = self._arguments
         try:
             ticket = transport.send(to, payload, now_s, port=port, reliable=reliable)
@@ -91,7 +91,7 @@ class Sending:
             self._call_when_over()
 
     def _call_when_over(self) -> None:
-        """Call the function of `when_over` once it was given and the sending is over."""
+        """Call the function of `when_over` once it is set and the sending is over."""
         with self._lock:
             call = self._when_over if self._handed_in.is_set() and self.is_over else None
             if call is not None:
@@ -117,7 +117,7 @@ class Listener:
             return None
 
     def put(self, message: ReceivedMessage) -> None:
-        """On the node's thread."""
+        """Add a message; called on the node's thread."""
         if self._port not in (None, message.port):
             return
         while True:
@@ -135,11 +135,11 @@ class Listener:
 class UsersDesk:
     """Sends, listens and requests echoes on behalf of other threads. Any thread may use it.
 
-    What it submits to the node runs there; a lock guards the receivers.
+    The functions that it submits run on the node's thread; a lock guards the receivers.
     """
 
     def __init__(self, node_id: int, submit: Submit) -> None:
-        """Call `open` once the node has its transport."""
+        """It serves nothing until `open` is called with the node's transport."""
         self.node_id = node_id
         self._submit = submit
         self._transport: Transport | None = None

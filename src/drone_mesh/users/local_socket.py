@@ -192,7 +192,7 @@ class _Client(socketserver.StreamRequestHandler):
 
 
 def _prepare(path: Path) -> None:
-    """Create the folder for this user alone; remove a socket that no program serves any more."""
+    """Create the folder, for this user only; remove a socket that no program serves any more."""
     folder = path.parent
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -25,10 +25,10 @@ class AccessDenied(MeshError):
 
 @dataclass(frozen=True)
 class Access:
-    """The rules of one server. Without a token it answers only loopback names.
+    """The rules of one server. Without a token it answers only to loopback names.
 
-    With a token it answers `names`, if there are any, and all numeric addresses, which cannot be
-    rebound; without names, any name.
+    With a token it answers to `names` and to all numeric addresses, which cannot be rebound. If
+    `names` is empty, it answers to any name.
     """
 
     token: str | None = None
@@ -63,7 +63,7 @@ class Access:
 def access_for(bind_address: str, token: str, names: Iterable[str] = ()) -> Access:
     """The rules for a server that listens on this address; an empty token means none.
 
-    `names`: host names that it answers besides numeric addresses; none: any name, with a token.
+    `names`: host names that it answers to besides numeric addresses; none: any, with a token.
     """
     if token and len(token) < SHORTEST_TOKEN:
         raise ConfigurationError(f"token: must have at least {SHORTEST_TOKEN} characters")

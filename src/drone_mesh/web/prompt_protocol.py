@@ -14,8 +14,8 @@ MOST_SILENT = 32  # our choice: connections without a request; the oldest makes 
 class PromptProtocol(H11Protocol):
     """Closes a connection whose request does not arrive in time; others are left alone.
 
-    Silent connections cannot use up the places of others: there are always fewer of them than
-    uvicorn's `limit_concurrency` allows. Belongs to the server's event loop.
+    Silent connections cannot lock other clients out: there are always fewer of them than uvicorn's
+    `limit_concurrency` allows. Belongs to the server's event loop.
     """
 
     def __init__(self, *args: Any, **settings: Any) -> None:
