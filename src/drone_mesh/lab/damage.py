@@ -87,7 +87,7 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
 def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> float:
     """The share of powered routers whose packets would not arrive at a gateway.
 
-    `swallow`: nodes that drop what they should forward; they do not count.
+    `swallow`: nodes that drop packets for other nodes; they do not count.
     """
     routers = [n for n, node in network.nodes.items() if not node.is_gateway and n not in swallow]
     powered = [n for n in routers if network.nodes[n].antenna.powered]

@@ -15,7 +15,7 @@ Places = Dict[int, Location]
 Flown = Dict[int, float]  # node -> metres
 
 MOVES = 2  # of `inward` towards one place
-ROUNDING_M = 1e-9  # two drones that move to half the range on opposite sides are in reach
+ROUNDING_M = 1e-9  # drones at half the range on opposite sides of a point are in range
 
 
 def without(points: Sequence[Point], dead: int) -> Places:
@@ -40,7 +40,7 @@ def cut_off(places: Places, range_m: float, root: int) -> frozenset[int]:
 
 
 def nearest(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
-    """The nearest neighbour of the hole, in `acting`, takes it; those it leaves repeat that."""
+    """The nearest drone of `acting` moves into the hole; its own place is then the next hole."""
     places = dict(places)
     flown: Flown = {}
     while cut_off(places, range_m, 0):
@@ -54,7 +54,7 @@ def nearest(places: Places, hole: Location, range_m: float, acting: AbstractSet[
 
 
 def inward(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
-    """Neighbours of the dead node, in `acting`, move in; the others follow."""
+    """The drones of `acting` beside the dead node move towards the hole; the others follow."""
     now = dict(places)
     flown: Flown = {}
     first = [n for n in acting if hole.distance_m(places[n]) < range_m]

@@ -71,7 +71,7 @@ def summary(rows: list[SequenceOutcome], repair: str) -> str:
         f"  living drones at rest within 0.5 m of each other: {share('stacked')}",
         f"  a connected drone flew:                           {share('flew_connected')}",
         f"  a drone that cannot fly was sent:                 {share('flew_grounded')}",
-        f"  cut off for good though able and knowing a way:   {share('unexplained')}",
+        f"  cut off at the end, but able to fly to a gateway: {share('unexplained')}",
         f"  a heartbeat reached the limit of hops:            {share('endless')}",
         f"  nodes that were cut off:                          {cut_off}",
         f"  connected again within 120 s:                     {healed}"

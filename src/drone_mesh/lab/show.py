@@ -54,12 +54,11 @@ def explain_hash(results: Results, shown: Replay) -> str:
         return f"event hash {shown.event_hash}: reproduces the run in {results.folder}"
     now = code_version()
     why = (
-        f"the row is of code {row['code']}, this is {now}"
+        f"the row was computed by code {row['code']}, this is {now}"
         if row["code"] != now
-        else "the code is the same: is it deterministic? a technique that draws random numbers "
-        "itself, or reads a clock, is not"
+        else "the code is the same: does a technique draw its own random numbers, or read a clock?"
     )
-    return f"another run: event hash {shown.event_hash}, the row has {row['event_hash']}; {why}"
+    return f"a different run: event hash {shown.event_hash}, the row has {row['event_hash']}; {why}"
 
 
 def show_run(options: argparse.Namespace) -> int:

@@ -58,7 +58,7 @@ class Tap(IMeshNetwork):
 
 
 class Hole(Tap):
-    """A node of the mesh that forwards heartbeats and drops what else is for other nodes."""
+    """A node of the mesh that forwards heartbeats and drops all other packets for other nodes."""
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         _creator, _from, kind, _to, forward = header(payload)
@@ -76,8 +76,8 @@ class Stranger(IMeshNetwork):
         self.network = network
         self.mute = False  # True: it does nothing
         self.record: list[RecordedPacket] = []
-        self.heard: list[bytes] = []  # on its own address
-        self.swallows: set[int] = set()  # nodes that drop what they should forward
+        self.heard: list[bytes] = []  # packets to its own address
+        self.swallows: set[int] = set()  # nodes that drop packets for other nodes
         self.on_packet: Callable[[bytes], None] = self.heard.append
         drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda _started: None, "")
         self._receiver: IMeshNetwork = self

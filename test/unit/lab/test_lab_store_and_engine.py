@@ -572,7 +572,7 @@ def test_show_says_why_it_is_another_run(
     row = read_rows(runs)[0]
     runs.write_text(runs.read_text().replace(f"{row['event_hash']},{row['code']}", "0,older"))
     assert lab("show", tmp_path / "out", row["run"]) == 1
-    assert "the row is of code older" in capsys.readouterr().out
+    assert "the row was computed by code older" in capsys.readouterr().out
 
 
 def test_an_unknown_run_is_named(bench: Callable[..., Path], tmp_path: Path) -> None:

@@ -135,7 +135,7 @@ def outages(run: RunRecord) -> float:
     return float(len(run.gaps()))
 
 
-@metric("s", "median length of these outages; one that lasts counts up to the end", better="less")
+@metric("s", "median length of these outages; one without end counts up to the end", better="less")
 def outage_median_s(run: RunRecord) -> float:
     lengths = _outage_lengths(run)
     return statistics.median(lengths) if lengths else 0.0

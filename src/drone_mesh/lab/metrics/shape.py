@@ -41,7 +41,10 @@ def hops_max_after(run: RunRecord) -> float:
 
 
 @metric(
-    "ratio", "route in use by shortest path, mean of the served routers at the end", better="less"
+    "ratio",
+    "hops of the route in use divided by those of the shortest path, mean of the served routers at "
+    "the end",
+    better="less",
 )
 def stretch(run: RunRecord) -> float:
     shortest = run.end.graph.hops_from(sorted(run.gateways))
@@ -56,7 +59,9 @@ def degree_after(run: RunRecord) -> float:
 
 
 @metric(
-    "share", "ground within range of a drone at the end, by that before the fault", better="more"
+    "share",
+    "ground within range of a drone at the end, relative to that before the fault",
+    better="more",
 )
 def coverage(run: RunRecord) -> float:
     before = _before(run)
