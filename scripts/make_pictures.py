@@ -70,13 +70,13 @@ def running(*command: str) -> Iterator[subprocess.Popen[bytes]]:
         process.wait(timeout=30)
 
 
-def everybody_stands_connected(state: MeshState) -> bool:
+def all_stand_connected(state: MeshState) -> bool:
     return len(state.nodes) == ROUTERS + 1 and all(
         node.connected and not len(node.path) for node in state.nodes if node.on
     )
 
 
-def somebody_flies(state: MeshState) -> bool:
+def a_drone_flies(state: MeshState) -> bool:
     return any(len(node.path) for node in state.nodes)
 
 
@@ -106,17 +106,17 @@ def take_screen(name: str) -> None:
 
 def take_pictures(browser: Browser, folder: Path) -> None:
     controls, watch = RosControls(), Watch()
-    watch.wait_for("all connected", everybody_stands_connected)
+    watch.wait_for("all connected", all_stand_connected)
     with running("roslaunch", "drone_mesh", "record.launch", f"bag:={folder}/run"):
         watch.wait_for("the recorder", lambda _state: any(folder.glob("*.active")))
         controls.speed(False, FAST)
         controls.layout(CASE)
-        watch.wait_for("the drones on their way", somebody_flies)
-        watch.wait_for("all connected in their places", everybody_stands_connected)
-        everybody_settled_s = watch.time_s + ROUNDS_S
-        watch.wait_for("some rounds", lambda _state: watch.time_s >= everybody_settled_s)
+        watch.wait_for("the drones on their way", a_drone_flies)
+        watch.wait_for("all connected in their places", all_stand_connected)
+        settled_until_s = watch.time_s + ROUNDS_S
+        watch.wait_for("some rounds", lambda _state: watch.time_s >= settled_until_s)
         controls.power(LOST_ROUTER, False)
-        watch.wait_for("the repair flies", somebody_flies)
+        watch.wait_for("the repair flies", a_drone_flies)
         controls.speed(True, 0.0)
         time.sleep(SETTLE_S)
         take_screen("rviz.png")
@@ -124,7 +124,7 @@ def take_pictures(browser: Browser, folder: Path) -> None:
         take_page(browser, console, "console.png", False, "#nodes tr[data-condition=flying]")
         subprocess.run(["rosrun", "drone_mesh", "snapshot", PICTURES / "world.png"], check=True)
         controls.speed(False, FAST)
-        watch.wait_for("all connected again", everybody_stands_connected)
+        watch.wait_for("all connected again", all_stand_connected)
         time.sleep(SETTLE_S)
     (bag,) = folder.glob("*.bag")
     page = folder / "report.html"

@@ -56,7 +56,7 @@ class InProcessMesh:
         return carried, [Dot(*p[:3], (now_s - p.at_s) * scale) for p in sample]
 
     def run(self, stop: threading.Event) -> None:
-        """Let time pass until told to stop."""
+        """Let time pass until `stop` is set."""
         before = time.monotonic()
         while not stop.wait(STEP_S):
             now = time.monotonic()

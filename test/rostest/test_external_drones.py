@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""drones:=external: a node of somebody else flies the drones, and the world shows them."""
+"""drones:=external: a node outside this package flies the drones, and the world shows them."""
 
 from __future__ import annotations
 

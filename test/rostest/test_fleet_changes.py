@@ -28,7 +28,7 @@ class FleetChangesTest(unittest.TestCase):
         self.nodes = {node.id: node for node in state.nodes}
 
     def names_of(self, node_id: int) -> list[str]:
-        """The topics and services of one drone that somebody offers or listens to.
+        """The topics and services of one drone that another ROS node offers or subscribes to.
 
         Not its packets: the simulator keeps that topic open for a drone that comes back.
         """

@@ -70,7 +70,7 @@ class SimulatorTest(unittest.TestCase):
         self.assertEqual(self.b.wait_for_packet(packet(1, 2), "the packet did not arrive"), sent)
         self.assertEqual(self.far.heard, [])
 
-    def test_who_is_out_of_range_or_unknown_is_not_reached(self) -> None:
+    def test_a_node_out_of_range_or_unknown_is_not_reached(self) -> None:
         self.assertFalse(self.a.send(packet(1, 3)))
         self.assertFalse(self.a.send(packet(1, 77)))
         self.assertFalse(self.a.send(packet(77, 1)))
@@ -130,7 +130,7 @@ class SimulatorTest(unittest.TestCase):
             receiver.kill()
             receiver.wait()
 
-    def test_only_who_has_listened_before_can_lose_a_packet(self) -> None:
+    def test_only_a_node_that_has_listened_before_can_lose_a_packet(self) -> None:
         late = Stranger(8, "/stranger_late", (1.0, 1.0, 0.1))
         late.subscriber.unregister()
         late.announce((1.0, 1.0, 0.1), "/stranger_late")

@@ -71,7 +71,7 @@ class StrayMessagesTest(unittest.TestCase):
         )
         self.assertEqual(self.log.failures(), [])
 
-    def test_two_who_disagree_about_a_topic_leave_it_open_in_the_end(self) -> None:
+    def test_two_announcers_that_disagree_about_a_topic_leave_it_open_in_the_end(self) -> None:
         def announce_for_ever(topic: str) -> subprocess.Popen[bytes]:
             info = f"{{nodeID: 2, sub: {topic}, 'on': true}}"
             command = ["rostopic", "pub", "-r", "500", "/WirelessSignalSimulator"]

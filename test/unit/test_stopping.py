@@ -68,7 +68,7 @@ def test_it_works_in_a_program_with_a_thousand_open_sockets():
             os.close(descriptor)
 
 
-def test_closing_it_ends_the_wait_of_those_who_ask_later():
+def test_closing_it_ends_waits_that_start_later():
     request = StopRequest()
     request.close()
     request.make()

@@ -7,7 +7,7 @@ from drone_mesh.communication.routing_interfaces import IRoutingEssentials
 
 
 class RecordingEssentials(IRoutingEssentials):
-    """Node 1 with gateway 0. Neighbours in `gone` take no packet, which `technique` is told."""
+    """Node 1 with gateway 0. Neighbours in `gone` take no packet; `technique` gets the result."""
 
     def __init__(self, node_id=1, gateway=0, technique=None, gone=()):
         self.node_id = node_id

@@ -1,4 +1,4 @@
-"""What a routing technique is told of and may do, seen at the component that it serves."""
+"""The calls that a routing technique gets and may make, seen at the component that it serves."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drone_mesh.errors import PacketError
 
 
 class Talkative(ChildTableTree):
-    """Keeps what it is told; adds bytes; sends two ways."""
+    """Records the calls that it gets, adds bytes, and sends over two neighbours."""
 
     def __init__(self):
         super().__init__()

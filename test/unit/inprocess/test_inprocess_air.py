@@ -48,7 +48,7 @@ class Field:
         return [(node, payload[3]) for node, payload in heard]
 
 
-def test_links_are_those_of_the_places_whoever_comes_flies_or_is_cut_off():
+def test_links_are_those_of_the_places_after_a_drone_comes_flies_or_is_cut_off():
     rng = random.Random(7)
     field = Field(max_distance_m=9.0)
     air = field.air

@@ -73,7 +73,7 @@ def test_centering_flies_to_the_mean_of_all() -> None:
     assert moves.tolist() == [[0.5, 0.0], [-0.5, 0.0]]
 
 
-def test_home_moves_only_who_has_no_path_to_the_gateway() -> None:
+def test_home_moves_only_drones_without_a_path_to_the_gateway() -> None:
     moves = IDEAL_RULES["home"](swarm([(0, 0), (5, 0), (0, 20)], parts=np.array([0, 0, 1])))
     assert moves.tolist() == [[0, 0], [0, 0], [0, -0.5]]
 

@@ -298,7 +298,7 @@ def test_after_a_train_there_is_time_for_an_answer():
     assert node.next_try_s >= 1.0 + RULES.train_gap_s > 1.0 + RULES.train_pause_s
 
 
-def test_who_hears_a_train_waits_for_its_end_but_not_for_ever():
+def test_a_node_that_hears_a_train_waits_for_its_end_but_not_for_ever():
     node = loaded(0, control=1)
     now_s = 1.0
     node.heard(5, now_s, broadcast=False, train=InTrain.PERHAPS)

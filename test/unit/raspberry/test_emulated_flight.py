@@ -139,7 +139,7 @@ def test_layout_202_without_node_1_is_repaired_by_drones_that_really_fly(kind: A
         place, goal = mesh.engines[2].get_location(), LAYOUT_202[1]
         assert place.latitude == pytest.approx(goal.latitude, abs=1.2)
         assert place.longitude == pytest.approx(goal.longitude, abs=1.2)
-        for node_id in flown:  # they hover: nobody ordered them to land
+        for node_id in flown:  # they hover: no order to land was given
             height_m = LIMITS.layer_height_m(node_id)
             assert mesh.engines[node_id].get_location().height == pytest.approx(height_m, abs=1.0)
             assert mesh.engines[node_id].vehicle.body.armed

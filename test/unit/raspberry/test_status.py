@@ -192,7 +192,7 @@ def test_systemd_is_told_when_it_is_ready_alive_and_stopping(tmp_path: Path):
 
 def test_without_a_service_manager_and_with_one_that_is_gone_nothing_happens(tmp_path: Path):
     ServiceManager({}).ready()
-    ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "gone")}).alive("nobody reads this")
+    ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "gone")}).alive("no reader")
 
 
 def worst_stop_s(seed: int) -> tuple[float, State]:

@@ -32,7 +32,7 @@ def test_a_drone_that_was_added_belongs_to_the_host_that_was_chosen():
     assert drones.of_host("/b", range(2, 4)) == {1: R}
 
 
-def test_a_drone_that_was_added_without_a_host_is_for_whoever_is_started_for_it():
+def test_a_drone_that_was_added_without_a_host_goes_to_the_host_that_is_started_for_it():
     drones = PresentDrones({0: G, 8: R}, {8: ""})
     assert drones.of_host("/a", range(2)) == {0: G}
     assert drones.of_host("/mesh_host_8_8", range(8, 9)) == {8: R}

@@ -1,4 +1,4 @@
-"""A mesh in process, and the desks of its nodes, driven by whoever hands something in."""
+"""A mesh in process, and the desks of its nodes, driven by each call to a desk."""
 
 from __future__ import annotations
 

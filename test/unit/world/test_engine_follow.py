@@ -1,4 +1,4 @@
-"""A drone that somebody else flies."""
+"""A drone that an engine outside the world flies."""
 
 from __future__ import annotations
 

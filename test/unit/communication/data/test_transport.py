@@ -79,13 +79,13 @@ def test_a_reliable_message_waits_for_a_route_and_then_arrives(network):
 
 
 def test_without_a_route_it_is_given_up_at_the_end_of_its_life_with_the_reason(network):
-    ticket = network.send(3, 77, b"nobody")
+    ticket = network.send(3, 77, b"unreachable")
     network.run_for(LIFETIME_S + 1.0)
     assert str(ticket) == "message 1 to node 77: given up: no route to node 77 for 240 s"
 
 
 def test_without_a_route_best_effort_is_given_up_at_once(network):
-    ticket = network.send(3, 77, b"nobody", reliable=False)
+    ticket = network.send(3, 77, b"unreachable", reliable=False)
     assert (ticket.state, ticket.reason) == (TicketState.GIVEN_UP, "no route to node 77")
 
 
