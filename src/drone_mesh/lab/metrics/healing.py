@@ -47,7 +47,7 @@ def t_total_s(run: RunRecord) -> float:
 @metric(
     "s",
     "t_total_s, or observed_s if not healed; "
-    "only to compare with published tables that average such caps in",
+    "only for comparison with published means that include such runs",
 )
 def t_capped_s(run: RunRecord) -> float:
     total_s = t_total_s(run)
