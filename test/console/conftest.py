@@ -87,6 +87,9 @@ class ConsoleProcess:
         return int(code)
 
 
+WAIT_WITHIN_S = 30.0  # for as long as the page itself waits for the answer to an order
+
+
 @pytest.fixture(scope="session")
 def nursery() -> Iterator[Nursery]:
     nursery = Nursery()
@@ -174,7 +177,9 @@ class Visit:
         """A cell of the table."""
         return self.page.inner_text(f"#nodes tr[data-id='{node}'] td:nth-child({column})")
 
-    def wait_for(self, what: str, condition: Callable[[], bool], within_s: float = 10.0) -> None:
+    def wait_for(
+        self, what: str, condition: Callable[[], bool], within_s: float = WAIT_WITHIN_S
+    ) -> None:
         deadline_s = time.monotonic() + within_s
         while not condition():
             assert time.monotonic() < deadline_s, f"timed out: {what}, waited {within_s:g} s"
@@ -195,9 +200,16 @@ class Visit:
 
     def wait_for_toasts(self, *texts: str) -> None:
         """Wait until exactly these have been shown since `undo_next`."""
-        self.wait_for(
-            f"the toasts {texts}", lambda: self.page.evaluate("window.toastTexts") == list(texts)
-        )
+        shown: list[str] = []
+
+        def all_shown() -> bool:
+            shown[:] = self.page.evaluate("window.toastTexts")
+            return shown == list(texts)
+
+        try:
+            self.wait_for(f"the toasts {texts}", all_shown)
+        except AssertionError as error:
+            raise AssertionError(f"{error}\nthese came: {shown}") from error
 
     def wait_for_drones(self, count: int) -> None:
         self.wait_for(f"{count} drones on the map", lambda: self.drawn("drones") == count)

@@ -46,7 +46,7 @@ def test_a_drag_can_be_sent_at_once(page):
     order = page.page.locator("#node-facts div:has(dt:text-is('Latest order')) dd")
     page.wait_for("the order is followed", lambda: "under way" in order.inner_text())
     page.page.select_option("#speed", "5")
-    page.wait_for("its end", lambda: "arrived" in order.inner_text(), 20.0)
+    page.wait_for("its end", lambda: "arrived" in order.inner_text())
 
 
 def test_a_layout_can_be_undone_before_it_leaves_or_be_sent_at_once(page):
@@ -124,9 +124,7 @@ def test_several_drones_are_moved_together(page):
     page.page.keyboard.up("Shift")
     page.answer_held("#held-now")
     drag(page, 17, 27.0, 15.0)
-    page.wait_for(
-        "both fly", lambda: all(page.row(n, STATE) == "flying" for n in (16, 17)), within_s=15.0
-    )
+    page.wait_for("both fly", lambda: all(page.row(n, STATE) == "flying" for n in (16, 17)))
     page.wait_for("the outcome", lambda: "ordered 2 of 2" in page.page.inner_text("#toasts"))
 
 

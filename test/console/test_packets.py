@@ -51,7 +51,7 @@ def page(start_console, visit) -> Visit:
 
 
 def test_packets_run_along_links_in_the_colours_of_the_legend(page):
-    page.wait_for("dots", lambda: drawn(page) > 0, within_s=20.0)
+    page.wait_for("dots", lambda: drawn(page) > 0)
     page.page.evaluate(RECORD)
     page.wait_for("more of them", lambda: page.page.evaluate("dots.length") > 200, 20.0)
     dots = page.page.evaluate("dots.slice(0, 200)")
@@ -67,7 +67,7 @@ def test_packets_run_along_links_in_the_colours_of_the_legend(page):
 
 
 def test_dots_can_be_switched_off_and_there_are_none_in_the_past(page):
-    page.wait_for("dots", lambda: drawn(page) > 0, within_s=20.0)
+    page.wait_for("dots", lambda: drawn(page) > 0)
     page.page.click("#show-packets")
     page.wait_for("no legend", lambda: not page.page.is_visible("#packets-legend"))
     carried = page.page.get_attribute("#packets", "data-carried")
@@ -90,4 +90,4 @@ def test_with_reduced_motion_there_are_no_dots_until_they_are_switched_on(start_
     page.wait_for_drones(18)
     assert not page.page.is_checked("#show-packets")
     page.page.click("#show-packets")
-    page.wait_for("dots", lambda: drawn(page) > 0, within_s=20.0)
+    page.wait_for("dots", lambda: drawn(page) > 0)

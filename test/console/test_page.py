@@ -75,11 +75,10 @@ def test_switching_a_node_off_by_click_turns_it_grey_and_the_routes_change(page)
     page.wait_for(
         "those behind 2 found other routes",
         lambda: all(page.row(node, NEXT) not in ("2", "–") for node in behind),
-        within_s=20.0,
     )
     page.wait_for("16 routes again", lambda: page.drawn("route-links") == 16)
     page.page.click("#power")
-    page.wait_for("2 is back", lambda: page.row(2, STATE) == "connected", within_s=20.0)
+    page.wait_for("2 is back", lambda: page.row(2, STATE) == "connected")
 
 
 def test_a_drag_sends_the_drone_there(page):
@@ -94,7 +93,6 @@ def test_a_drag_sends_the_drone_there(page):
     page.wait_for(
         "17 arrived",
         lambda: page.row(17, STATE) != "flying" and abs(float(page.row(17, 10)) - 27.0) < 0.2,
-        within_s=15.0,
     )
     page.wait_for("its y", lambda: abs(float(page.row(17, 11)) - 9.0) < 0.2)
 
@@ -438,7 +436,6 @@ def test_charts_have_several_times_and_no_false_start(page):
             int(page.page.get_attribute(f"#chart-{name}", "data-ticks") or 0) >= 2
             for name in ("share", "rate", "hops")
         ),
-        within_s=20.0,
     )
 
 
@@ -455,7 +452,6 @@ def test_on_a_phone_the_selected_node_its_switch_and_its_close_button_stay_on_th
     page.wait_for(
         "17 is lost",
         lambda: page.page.inner_text("#node-condition") == "not connected to a gateway",
-        within_s=20.0,
     )
     assert page.page.locator("#node-facts dt:text-is('Last gateway')").is_visible()
     fallback = page.page.locator("#node-facts div:has(dt:text-is('Fallback position')) dd")

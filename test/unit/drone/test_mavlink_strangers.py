@@ -81,7 +81,7 @@ def test_mavsdk_arms_takes_off_goes_somewhere_and_lands(mavsdk_ground_station) -
         wait_for("armed", telemetry.armed)
         action.takeoff()
         wait_for("it hovers", lambda: telemetry.position().relative_altitude_m > 2.4)
-        assert telemetry.landed_state() == LandedState.IN_AIR
+        wait_for("it reports that", lambda: telemetry.landed_state() == LandedState.IN_AIR)
         goal = ORIGIN.to_earth(Location(20.0, -15.0, 12.0))
         action.goto_location(*goal, 0.0)
         wait_for("it is there", lambda: telemetry.position().absolute_altitude_m > 14.9)
