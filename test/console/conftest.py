@@ -133,7 +133,7 @@ ANSWER_HELD = """(button) => {
     observer.disconnect();
     window.heldText = document.querySelector("#held-text").textContent;
     if (button.length > 1) document.querySelector(button).click();
-    else document.dispatchEvent(new KeyboardEvent("keydown", { key: button, bubbles: true }));
+    else document.body.dispatchEvent(new KeyboardEvent("keydown", { key: button, bubbles: true }));
   }).observe(held, { attributes: true });
 }"""
 UNDO_TOAST = """() => {

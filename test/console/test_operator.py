@@ -50,12 +50,12 @@ def test_a_drag_can_be_sent_at_once(page):
 
 
 def test_a_layout_can_be_undone_before_it_leaves_or_be_sent_at_once(page):
+    page.undo_next()
     page.answer_held("z")
     page.page.click("#layout-form button")
     assert page.wait_for_held() == "Layout 0: 17 drones will leave"
     page.wait_for("the offer is gone", lambda: not page.page.is_visible("#held"))
     page.answer_held("#held-now")
-    page.undo_next()
     page.page.select_option("#layout", "100")
     page.page.click("#layout-form button")
     page.wait_for_toasts("ordered layout 100")

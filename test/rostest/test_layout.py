@@ -20,7 +20,7 @@ LONGEST_FLIGHT_S = 30.0
 
 
 class LayoutTest(unittest.TestCase):
-    def test_each_drone_flies_to_its_place_and_is_connected_again(self) -> None:
+    def test_1_each_drone_flies_to_its_place_and_is_connected_again(self) -> None:
         rospy.init_node("test_layout")
         log = LogWatch()
         mesh = MeshWatch(18)
@@ -31,7 +31,7 @@ class LayoutTest(unittest.TestCase):
         mesh.wait("all connected after the landing", 60, mesh.connected)
         self.assertEqual(log.failures(), [])
 
-    def test_a_subscriber_that_comes_late_still_gets_the_goal(self) -> None:
+    def test_2_a_subscriber_that_comes_late_still_gets_the_goal(self) -> None:
         """The engine's connection may take a second more than the order."""
         goal = rospy.wait_for_message("/Drones/13/goal", Location, WALL_LIMIT_S)
         self.assertEqual((goal.longitude, goal.latitude, goal.height), (9.0, 7.0, 0))
