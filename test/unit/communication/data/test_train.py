@@ -40,26 +40,28 @@ def left_node(network, node):
     return kinds
 
 
+def lengths_of_trains(chain, count, reliable):
+    """The fragments in each train, while node 3 sends so many messages of 1,024 bytes."""
+    kinds = left_node(chain, 3)
+    for _ in range(count):
+        chain.send(3, 0, bytes(1024), reliable=reliable)
+    assert chain.run_until(lambda: len(chain.received.get(0, [])) == count, 30.0)
+    trains = "".join("P" if kind == packets.POLL else "f" for kind in kinds).split("P")
+    return [len(train) for train in trains]
+
+
 @pytest.mark.parametrize("reliable", [True, False])
 def test_behind_relays_no_more_than_a_train_leaves_without_an_answer(chain, reliable):
-    kinds = left_node(chain, 3)
-    for _ in range(4):
-        chain.send(3, 0, bytes(1024), reliable=reliable)
-    assert chain.run_until(lambda: len(chain.received.get(0, [])) == 4, 30.0)
-    trains = "".join("P" if kind == packets.POLL else "f" for kind in kinds).split("P")
-    assert len(trains[0]) == FIRST_LENGTH
-    assert max(map(len, trains)) <= MOST_LENGTH
-    assert sum(map(len, trains)) == 4 * 40
+    lengths = lengths_of_trains(chain, 4, reliable)
+    assert lengths[0] == FIRST_LENGTH
+    assert max(lengths) <= MOST_LENGTH
+    assert sum(lengths) == 4 * 40
 
 
 @pytest.mark.parametrize("reliable", [True, False])
 def test_each_answered_train_is_followed_by_a_longer_one(chain, reliable):
-    kinds = left_node(chain, 3)
-    for _ in range(6):
-        chain.send(3, 0, bytes(1024), reliable=reliable)
-    assert chain.run_until(lambda: len(chain.received.get(0, [])) == 6, 30.0)
-    trains = "".join("P" if kind == packets.POLL else "f" for kind in kinds).split("P")
-    assert [len(train) for train in trains][:4] == [FIRST_LENGTH, 2 * FIRST_LENGTH, MOST_LENGTH, 64]
+    lengths = lengths_of_trains(chain, 6, reliable)
+    assert lengths[:4] == [FIRST_LENGTH, 2 * FIRST_LENGTH, MOST_LENGTH, 64]
 
 
 @pytest.mark.parametrize("reliable", [True, False])
