@@ -1,14 +1,46 @@
-"""SeenFloods: the fragments to all nodes that this node has already forwarded."""
+"""Flood: fragments to all nodes. Each node repeats each fragment once."""
 
 from __future__ import annotations
 
 from collections import OrderedDict
 
+from drone_mesh.communication import messages
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.ticket import TO_ALL
+from drone_mesh.communication.parts import NodeParts
+
 REMEMBERED_S = 5.0  # our choice: 256 messages to all need longer, so no number comes twice
 MOST_REMEMBERED = 1024  # messages of all senders together
 
 
-class SeenFloods:
+class Flood:
+    """Broadcasts the fragments of this node, and repeats those of other nodes."""
+
+    def __init__(self, parts: NodeParts) -> None:
+        self._parts = parts
+        self._seen = SeenFragments()
+
+    def send(self, fragment: bytes) -> None:
+        """Broadcast a fragment of this node."""
+        self._is_new(fragment)
+        self._parts.antenna.broadcast_message(fragment)
+
+    def repeat(self, fragment: bytes) -> bool:
+        """Broadcast a fragment of another node, unless it has arrived before (False)."""
+        if not self._is_new(fragment):
+            return False
+        onward = messages.next_hop(fragment, self._parts.node_id, TO_ALL)
+        if onward is not None:
+            self._parts.antenna.broadcast_message(onward)
+        return True
+
+    def _is_new(self, fragment: bytes) -> bool:
+        creator, _from, kind, _to, _forward = messages.header(fragment)
+        number, index = messages.body(fragment)[0], kind - packets.FRAGMENTS.start
+        return self._seen.is_new(creator, number, index, self._parts.now_s)
+
+
+class SeenFragments:
     """Remembers fragments by sender, message and index. Memory: MOST_REMEMBERED entries."""
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""One message of a lane, and the state of its fragments."""
+"""One message of an outbox, and the state of its fragments."""
 
 from __future__ import annotations
 

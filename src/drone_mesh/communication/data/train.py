@@ -10,7 +10,7 @@ MOST_LENGTH = 80  # our choice: two messages of 1,024 bytes; a relay forwards it
 
 
 class Train:
-    """The packets of one lane since its receiver's last answer, on a shared channel.
+    """The packets of one outbox since its receiver's last answer, on a shared channel.
 
     A relay cannot receive while it sends, and a sender hears only the first relay, so packets sent
     while earlier ones are under way collide with them. Therefore packets are sent in trains that

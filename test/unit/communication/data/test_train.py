@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 
 from drone_mesh.communication.data import packets
-from drone_mesh.communication.data.lane import Lane
+from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.train import FIRST_LENGTH, LEAST_LENGTH, MOST_LENGTH, Train
@@ -93,19 +93,19 @@ def test_a_silent_receiver_does_not_stop_best_effort(chain):
 
 
 def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
-    lane = Lane(to=0, session=7, room=27, ended=lambda _state: None)
-    lane.relayed(True)
+    outbox = Outbox(to=0, session=7, room=27, ended=lambda _state: None)
+    outbox.relayed(True)
     for number in (1, 2, 3):
         ticket = Ticket(number, to=0, port=5, size=1024, reliable=False)
-        lane.add(OutgoingMessage(ticket, bytes(1024), now_s=0.0))
+        outbox.add(OutgoingMessage(ticket, bytes(1024), now_s=0.0))
     arrived = Counter()  # by message, as bits
 
     def length_of_train(lost):
         """Send a train whose last fragment gets lost if `lost`, and answer it."""
         sent = []
         while True:
-            packet = lane.next_packet(0.0)
-            lane.left(packet, 0.0)
+            packet = outbox.next_packet(0.0)
+            outbox.left(packet, 0.0)
             if packet.kind == packets.POLL:
                 break
             sent.append((packet.message.head.number, packet.kind - packets.FRAGMENTS.start))
@@ -113,7 +113,7 @@ def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
             arrived[number] |= 1 << index
         poll = packets.poll_of(packet.body)
         has = arrived[poll.number]
-        lane.answered(packets.Ack(7, poll.nonce, poll.number, has, newest=0, done=0), 0.1)
+        outbox.answered(packets.Ack(7, poll.nonce, poll.number, has, newest=0, done=0), 0.1)
         return len(sent)
 
     assert [length_of_train(lost) for lost in (True, True, False, False)] == [32, 16, 8, 16]

@@ -138,8 +138,6 @@ def test_after_a_restart_of_the_sender_its_messages_are_not_taken_for_old_ones(n
     restarted.add_gateway(0, 0.0, 0.0)
     restarted.add_router(3, 6.0, 0.0)
     restarted.run_for(20.0)
-    transport = restarted.nodes[3].component.data
-    transport._session = 1 + network.nodes[3].component.data._session
     heard = []
     restarted.nodes[0].component.on_msg = lambda payload, now_s: heard.append(payload)
     restarted.send(3, 0, b"after")

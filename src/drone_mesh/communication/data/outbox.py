@@ -1,4 +1,4 @@
-"""Lane: the messages from this node to one destination.
+"""Outbox: the messages from this node to one destination.
 
 A message is cut into fragments. The receiver of a reliable one reports the fragments that it has in
 an ACK: when the message is complete, when its last fragment arrived but others are missing, and in
@@ -14,28 +14,16 @@ from collections import deque
 from typing import Callable, Iterator
 
 from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.congestion_window import CongestionWindow
+from drone_mesh.communication.data.fragmentation import Fragmentation, Seal, leave_plain
 from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
-from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Head, Poll
+from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
 from drone_mesh.communication.data.round_trip import RoundTrip
-from drone_mesh.communication.data.ticket import Ticket, TicketState, destination_in_words
+from drone_mesh.communication.data.ticket import TicketState, destination_in_words
 from drone_mesh.communication.data.train import Train
 
-FIRST_WINDOW = 32  # our choice, in fragments: less than a message of 1,024 bytes
-LEAST_WINDOW = 4
-MOST_WINDOW = 256  # our choice: six messages of 1,024 bytes
-MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
-NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
 
-Seal = Callable[[bytes, bytes], bytes]
-"""From the place and the payload of a message to the bytes to send."""
-
-
-def leave_plain(_place: bytes, payload: bytes) -> bytes:
-    """For a mesh without a key: the payload itself."""
-    return payload
-
-
-class Lane:
+class Outbox:
     """The messages from one node to one destination, in the order of submission."""
 
     def __init__(
@@ -51,19 +39,15 @@ class Lane:
 
         `hint` returns a possible reason why messages do not arrive.
         """
-        self._seal = seal
-        self._hint = hint
         self.to = to
-        self._ended = ended
         self._session = session
-        self._room = room
+        self._ended = ended
+        self._hint = hint
         self._waiting: deque[OutgoingMessage] = deque()
-        self._open: dict[int, OutgoingMessage] = {}  # by number, oldest first
-        self._number = 0
-        self._orders: dict[tuple[int, bool], int] = {}  # next place, by port and reliability
+        self._open: dict[int, OutgoingMessage] = {}  # under way, by number, oldest first
+        self._fragmentation = Fragmentation(session, room, seal, self._open)
+        self._window = CongestionWindow()
         self._round_trip = RoundTrip()
-        self._window = float(FIRST_WINDOW)
-        self._slow_start = True
         self._nonce = 0
         self._train: Train | None = None  # while relays share the channel with this node
         self._latest: OutgoingMessage | None = None  # message whose fragment left last
@@ -97,7 +81,7 @@ class Lane:
         """The next packet to send; call `left` once it was sent."""
         train = self._train
         if train is None:
-            return self._timely_poll(now_s) or self._fragment(now_s)
+            return self._timely_poll(now_s) or self._fragment()
         if train.waits:
             if now_s < self._train_due_s(train):
                 return None
@@ -109,7 +93,7 @@ class Lane:
             return poll
         if train.is_full and self._has_more():
             return self._end_of_train()
-        return self._fragment(now_s) or self._mark_of_end(train)
+        return self._fragment() or self._mark_of_end(train)
 
     def _timely_poll(self, now_s: float) -> DataPacket | None:
         """A POLL for a message whose ACK is late."""
@@ -118,20 +102,19 @@ class Lane:
                 return self._poll(message)
         return None
 
-    def _fragment(self, now_s: float) -> DataPacket | None:
+    def _fragment(self) -> DataPacket | None:
         """The next fragment; a POLL if the window is full."""
         in_flight, window = 0, math.inf
         if self._train is None:
-            in_flight, window = self._in_flight(), self._window
+            in_flight, window = self._in_flight(), self._window.size
         for message in self._open.values():
             if message.to_send and message.asked_s == math.inf:
                 if not message.ticket.reliable or in_flight < window:
-                    index = message.to_send[0]
-                    return DataPacket(packets.FRAGMENTS[index], self._body(message, index), message)
+                    return self._first_to_send(message)
                 if message.in_flight:
                     return self._poll(message)  # what of it arrived?
         if in_flight < window and self._may_open():
-            return self._opened(now_s)
+            return self._opened()
         return None
 
     def _has_more(self) -> bool:
@@ -194,7 +177,7 @@ class Lane:
             message = self._open[number]
             if message.asks == 1 and (message.nonce == 0 or message.nonce == ack.nonce):
                 self._round_trip.measured(now_s - message.asked_s)
-            self._grow(message.in_flight)
+            self._window.grow(message.in_flight)
             self._close(message, TicketState.DELIVERED)
         self._train_answered(ack, now_s)
 
@@ -214,7 +197,7 @@ class Lane:
             train.over(arrived)
 
     def due_s(self, now_s: float) -> float:
-        """When to check this lane next; infinity while nothing waits in it."""
+        """When to check this outbox next; infinity while nothing waits in it."""
         due_s = math.inf
         if self.is_idle:
             return due_s
@@ -265,60 +248,21 @@ class Lane:
     # One message ------------------------------------------------------------------------------
 
     def _may_open(self) -> bool:
-        """Whether the next message may start: the receiver remembers a bounded number of them."""
-        if not self._waiting or len(self._open) >= MOST_OPEN:
-            return False
-        if self._open and (self._number - next(iter(self._open))) & 0xFF >= NUMBER_SPAN:
-            return False
-        ticket = self._waiting[0].ticket
-        order = self._orders.get((ticket.port, ticket.reliable), 0)
-        return self._behind(ticket, order) <= packets.MOST_BEHIND
+        return bool(self._waiting) and self._fragmentation.may_open(self._waiting[0].ticket)
 
-    def _opened(self, now_s: float) -> DataPacket:
+    def _opened(self) -> DataPacket:
         message = self._waiting.popleft()
-        ticket, payload = message.ticket, message.payload
-        key = (ticket.port, ticket.reliable)
-        order = self._orders.get(key, 0)
-        message.sealed = self._seal(packets.place_of(self._session, ticket.port, order), payload)
-        check = packets.checksum(self._session, ticket.port, order, message.sealed)
-        message.head = Head(
-            self._number,
-            self._session,
-            ticket.port,
-            len(message.sealed),
-            ticket.reliable,
-            0,
-            order,
-            check,
-        )
-        self._orders[key] = (order + 1) & 0xFFFF
-        count = packets.count_of(len(message.sealed), self._room)
-        message.to_send.extend(range(count))
-        self._open[self._number] = message
-        self._number = (self._number + 1) & 0xFF
-        return DataPacket(packets.FRAGMENTS[0], self._body(message, 0), message)
+        self._open[self._fragmentation.begin(message).number] = message
+        return self._first_to_send(message)
 
-    def _behind(self, ticket: Ticket, order: int) -> int:
-        """From a place in the order of this port back to its oldest open message."""
-        behind = 0
-        for message in self._open.values():
-            head = message.head
-            if ticket.reliable and head is not None and head.reliable and head.port == ticket.port:
-                distance = (order - head.order) & 0xFFFF
-                behind = max(behind, distance if distance < 1 << 15 else 0)
-        return behind
-
-    def _body(self, message: OutgoingMessage, index: int) -> bytes:
-        head = message.head
-        assert head is not None
-        if index == 0:
-            head = head._replace(behind=self._behind(message.ticket, head.order))
-            return packets.first_body(head, message.sealed, self._room)
-        return packets.further_body(head.number, index, message.sealed, self._room)
+    def _first_to_send(self, message: OutgoingMessage) -> DataPacket:
+        index = message.to_send[0]
+        body = self._fragmentation.body(message, index)
+        return DataPacket(packets.FRAGMENTS[index], body, message)
 
     def _poll(self, message: OutgoingMessage) -> DataPacket:
         if message.asks >= 2:
-            self._window, self._slow_start = float(LEAST_WINDOW), True
+            self._window.on_silence()
             message.ticket.reason = f"no acknowledgement yet{self._hint()}"
         return self._asking(message)
 
@@ -351,14 +295,13 @@ class Lane:
         if message.asks == 1:
             self._round_trip.measured(now_s - message.asked_s)
         lost = message.sent & ~ack.has
-        self._grow(bin(ack.has & message.sent & ~message.known).count("1"))
+        self._window.grow(bin(ack.has & message.sent & ~message.known).count("1"))
         message.known = ack.has
         message.sent &= ack.has
         message.asked_s, message.asks = math.inf, 0
         message.ticket.reason = ""
         if lost:
-            self._slow_start = False
-            self._window = max(float(LEAST_WINDOW), self._window / 2)
+            self._window.on_loss()
             again = [index for index in range(len(packets.FRAGMENTS)) if lost >> index & 1]
             message.to_send.extendleft(reversed(again))
 
@@ -373,11 +316,7 @@ class Lane:
         else:
             del self._open[message.head.number]
 
-    # Window and timeout -----------------------------------------------------------------------
-
-    def _grow(self, arrived: int) -> None:
-        self._window += arrived if self._slow_start else arrived / self._window * 4
-        self._window = min(self._window, float(MOST_WINDOW))
+    # Timeouts ---------------------------------------------------------------------------------
 
     def _train_due_s(self, train: Train) -> float:
         return train.asked_s + self._round_trip.timeout_s(max(0, train.asks - 1))

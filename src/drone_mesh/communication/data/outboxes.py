@@ -1,0 +1,168 @@
+"""Outboxes: the messages from this node, and which of their packets leaves next.
+
+The outboxes of all destinations take turns. Packets are sent a few at a time, so that the mesh's
+own are handled in between. Messages for the gateway follow it: when the node has another one, they
+move to its outbox.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import random
+from collections import OrderedDict
+from typing import Callable
+
+from drone_mesh.communication.data.echo import SendPacket
+from drone_mesh.communication.data.outbox import Outbox
+from drone_mesh.communication.data.outgoing import OutgoingMessage
+from drone_mesh.communication.data.packets import Ack
+from drone_mesh.communication.data.ticket import (
+    TO_ALL,
+    TO_GATEWAY,
+    TicketState,
+    destination_in_words,
+)
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.parts import NodeParts
+
+BURST = 8  # our choice: packets sent before others get their turn
+ROUTE_PERIOD_S = 0.5  # our choice: how often an outbox without a route looks for one
+
+
+class Outboxes:
+    """The outboxes of one node, by destination."""
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        rng: random.Random,
+        my_gateway: Callable[[], int],
+        room: int,
+        send_packet: SendPacket,
+        ended: Callable[[TicketState], None],
+        hint: Callable[[], str],
+    ) -> None:
+        """`room`, `ended` and `hint` as for Outbox; `my_gateway`: its id, or NO_ROUTE."""
+        self._parts = parts
+        self._rng = rng
+        self._my_gateway = my_gateway
+        self._room = room
+        self._send_packet = send_packet
+        self._ended = ended
+        self._hint = hint
+        self._session: int | None = None
+        self._outboxes: OrderedDict[int, Outbox] = OrderedDict()  # the next one to send is first
+        self._for_gateway: list[OutgoingMessage] = []  # wait until there is one
+
+    def __len__(self) -> int:
+        """Messages waiting or under way."""
+        return len(self._for_gateway) + sum(map(len, self._outboxes.values()))
+
+    def add(self, message: OutgoingMessage) -> None:
+        """Add a message for the destination of its ticket."""
+        if message.ticket.to == TO_GATEWAY:
+            self._for_gateway.append(message)
+        else:
+            self._outbox(message.ticket.to).add(message)
+
+    def answered(self, by: int, ack: Ack) -> None:
+        """Process an ACK of a receiver."""
+        outbox = self._outboxes.get(by)
+        if outbox is not None:
+            outbox.answered(ack, self._parts.now_s)
+
+    def send(self) -> float:
+        """Send what may be sent now; returns when to call it again, or infinity."""
+        now_s, antenna = self._parts.now_s, self._parts.antenna
+        if not self._outboxes and not self._for_gateway:
+            return math.inf
+        self._follow_gateway()
+        left = min(BURST, antenna.data_room())
+        idle = 0
+        while left > 0 and idle < len(self._outboxes):
+            to, outbox = next(iter(self._outboxes.items()))
+            self._outboxes.move_to_end(to)
+            if self._send_one(outbox, now_s):
+                left, idle = left - 1, 0
+            else:
+                idle += 1
+        soon_s = now_s + antenna.medium.data_pause_s
+        again_s = soon_s if left <= 0 else math.inf
+        for to, outbox in self._outboxes.items():
+            outbox.expire(now_s, self._direction(to) != NO_ROUTE)
+            due_s = outbox.due_s(now_s)
+            again_s = min(again_s, due_s if due_s > now_s else soon_s)  # it could not leave
+        if self._for_gateway:
+            again_s = min(again_s, now_s + ROUTE_PERIOD_S)
+        return again_s
+
+    def unreachable(self, to: int) -> str:
+        """Why nothing can be sent to `to` now, in words."""
+        if to == TO_GATEWAY:
+            return f"this node knows no gateway{self._hint()}"
+        return f"no route to {destination_in_words(to)}{self._hint()}"
+
+    def _send_one(self, outbox: Outbox, now_s: float) -> bool:
+        """Send one packet of an outbox; False if it has none now."""
+        if outbox.is_idle or now_s < outbox.not_before_s:
+            return False
+        if outbox.to != TO_ALL and not self._may_reach(outbox, now_s):
+            return False
+        if self._parts.antenna.medium.shared and outbox.to != TO_ALL:
+            outbox.relayed(self._direction(outbox.to) != outbox.to)
+        packet = outbox.next_packet(now_s)
+        if packet is None:
+            return False
+        if self._send_packet(packet.kind, outbox.to, packet.body):
+            outbox.left(packet, now_s)
+            return True
+        if self._direction(outbox.to) == NO_ROUTE:
+            self._may_reach(outbox, now_s)
+        else:
+            outbox.not_before_s = now_s + self._parts.antenna.medium.data_pause_s
+        return False
+
+    def _may_reach(self, outbox: Outbox, now_s: float) -> bool:
+        """Whether there is a route. If not, retry later and give up unreliable messages."""
+        if self._parts.antenna.on() and self._direction(outbox.to) != NO_ROUTE:
+            return True
+        outbox.not_before_s = now_s + ROUTE_PERIOD_S
+        outbox.hindered(self.unreachable(outbox.to))
+        return False
+
+    def _direction(self, to: int) -> int:
+        return to if to == TO_ALL else self._parts.routing.get_direction_to_node(to)
+
+    def _follow_gateway(self) -> None:
+        """Move messages for the gateway to the one that this node uses now."""
+        gateway = self._my_gateway()
+        if gateway == NO_ROUTE:
+            self._give_up_without_gateway()
+            return
+        waiting, self._for_gateway = self._for_gateway, []
+        for to, outbox in self._outboxes.items():
+            if to not in (gateway, TO_ALL):
+                waiting += outbox.take(TO_GATEWAY)
+        for message in waiting:
+            self._outbox(gateway).add(message)
+
+    def _give_up_without_gateway(self) -> None:
+        now_s = self._parts.now_s
+        reason = self.unreachable(TO_GATEWAY)
+        for message in list(self._for_gateway):
+            message.ticket.reason = reason
+            if now_s >= message.expires_s or not message.ticket.reliable:
+                self._for_gateway.remove(message)
+                message.ticket.becomes(TicketState.GIVEN_UP, reason)
+                self._ended(TicketState.GIVEN_UP)
+
+    def _outbox(self, to: int) -> Outbox:
+        if self._session is None:
+            self._session = self._rng.randrange(1 << 16)
+        outbox = self._outboxes.get(to)
+        if outbox is None:
+            seal = functools.partial(self._parts.antenna.seal_message, self._parts.node_id, to)
+            outbox = Outbox(to, self._session, self._room, self._ended, seal, self._hint)
+            self._outboxes[to] = outbox
+        return outbox
