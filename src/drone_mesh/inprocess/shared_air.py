@@ -17,7 +17,7 @@ from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
-from drone_mesh.nrf24.medium_access import ALL_NODES, OutgoingPacket
+from drone_mesh.nrf24.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.nrf24.settings import RadioSettings
 
 

@@ -20,8 +20,8 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import PacketInbox
 from drone_mesh.nrf24.link_quality import LinkQuality, Quality
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import ALL_NODES, Priority
 from drone_mesh.nrf24.pace import medium_of
+from drone_mesh.nrf24.packet_queue import ALL_NODES, Priority
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.nrf24.sender import Sender
 from drone_mesh.nrf24.settings import BROADCAST_PIPE

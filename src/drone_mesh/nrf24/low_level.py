@@ -12,8 +12,9 @@ from drone_mesh.nrf24.access_rules import AccessRules
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch
-from drone_mesh.nrf24.medium_access import Fate, MediumAccess, OutgoingPacket, Priority
+from drone_mesh.nrf24.medium_access import Fate, MediumAccess
 from drone_mesh.nrf24.pace import access_rules
+from drone_mesh.nrf24.packet_queue import OutgoingPacket, Priority
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice

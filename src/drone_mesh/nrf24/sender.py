@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Callable
 
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import ALL_NODES, Fate, InTrain, OutgoingPacket, Priority
+from drone_mesh.nrf24.medium_access import Fate
+from drone_mesh.nrf24.packet_queue import ALL_NODES, OutgoingPacket, Priority
 from drone_mesh.nrf24.runtime import Runtime, Task
+from drone_mesh.nrf24.yielding import InTrain
 
 
 class Sender:

@@ -7,7 +7,8 @@ from drone_mesh.communication.messages import is_data
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.inprocess import Network
 from drone_mesh.nrf24.access_rules import AccessRules
-from drone_mesh.nrf24.medium_access import MediumAccess, Priority
+from drone_mesh.nrf24.medium_access import MediumAccess
+from drone_mesh.nrf24.packet_queue import Priority
 
 
 @pytest.fixture
