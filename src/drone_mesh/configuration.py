@@ -20,7 +20,7 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
 MIN_REAL_TIME_FACTOR = 0.001  # our choice: one step of the world in 10 s
-MAX_REAL_TIME_FACTOR = 1000.0  # our choice: above it the clock moves in too large steps
+MAX_REAL_TIME_FACTOR = 1000.0  # our choice: above it the steps of the clock are too large
 MAX_SEED = 2**32 - 1
 RANDOM_SEED = "random"  # requests a new seed although the file has a fixed one
 
@@ -46,7 +46,7 @@ class FactoryConfiguration:
     flight: Literal["kinematic", "dynamic"] = Field("kinematic")  # dynamic: physics moves drones
     wind_x: float = Field(0.0, ge=-20, le=20, description="metres per second")
     wind_y: float = Field(0.0, ge=-20, le=20, description="metres per second")
-    shape: Literal["quadrocopter", "box"] = Field("quadrocopter")  # what drones are drawn as
+    shape: Literal["quadrocopter", "box"] = Field("quadrocopter")  # how drones are drawn
     real_time_factor: float = Field(
         1.0,
         description=(

@@ -20,7 +20,7 @@ class LocationUnknown(MeshError):
 
 
 class ConfigurationError(MeshError):
-    """A parameter or a file is invalid. The message names it and what is allowed: show it, stop."""
+    """A parameter or a file is invalid. Show the message, which says what is allowed, and stop."""
 
 
 @contextlib.contextmanager

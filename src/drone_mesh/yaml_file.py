@@ -100,7 +100,7 @@ def _check_size(path: Path) -> None:
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader that refuses duplicate keys, of which SafeLoader uses the last; with limits."""
+    """SafeLoader with limits, which refuses duplicate keys (SafeLoader would use the last one)."""
 
     def __init__(self, text: str, limited: bool) -> None:
         super().__init__(text)

@@ -53,7 +53,7 @@ class ObstaclesTest(unittest.TestCase):
     @staticmethod
     def _is_refused(events: list[tuple[int, str, str]]) -> bool:
         return any(
-            (node, kind) == (0, "order refused") and "obstacles leave no way" in detail
+            (node, kind) == (0, "order refused") and "no path past the obstacles" in detail
             for node, kind, detail in events
         )
 

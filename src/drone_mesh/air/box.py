@@ -46,8 +46,7 @@ class Box:
         )
 
     def chord(self, a: Vector, b: Vector) -> tuple[float, float] | None:
-        """The part of the segment a..b inside the box, as fractions of a..b; None if it misses the
-        box.
+        """The part of the segment a..b inside the box, as fractions of a..b; None: it misses it.
 
         Kay and Kajiya's slab test (SIGGRAPH 1986) in the frame of the box.
         """

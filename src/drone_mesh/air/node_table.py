@@ -56,11 +56,11 @@ class NodeTable:
         place = check_position(node_id, position)
         if sub:
             check_topic(node_id, sub)
-            self._antenna_speaks(node_id, place, sub, on)
+            self._apply_from_antenna(node_id, place, sub, on)
         else:
-            self._engine_speaks(node_id, place, on)
+            self._apply_from_engine(node_id, place, on)
 
-    def _antenna_speaks(self, node_id: int, position: Position, topic: str, on: bool) -> None:
+    def _apply_from_antenna(self, node_id: int, position: Position, topic: str, on: bool) -> None:
         known = self._nodes.get(node_id)
         if known is None:
             self._positions.setdefault(node_id, position)
@@ -68,7 +68,7 @@ class NodeTable:
         if known != Node(node_id, topic, on):
             self._set(Node(node_id, topic, on))
 
-    def _engine_speaks(self, node_id: int, position: Position, on: bool) -> None:
+    def _apply_from_engine(self, node_id: int, position: Position, on: bool) -> None:
         node = self._nodes.get(node_id)
         if not on:
             if node is not None and node.on:

@@ -12,7 +12,7 @@ from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 
 METRE_DB = 0.4  # dB per metre inside, the same source as brick
-NO_WAY = "obstacles leave no way there"  # reason for refusing a goal
+NO_PATH = "no path past the obstacles"  # reason for refusing a goal
 CLEARANCE_M = 0.5  # our choice: least distance between a flight and a box, above and beside it
 ABOVE_M = CLEARANCE_M + 1e-6  # height above a box at which a flight is just clear of it
 
@@ -93,8 +93,7 @@ class Obstacles:
     def _ways_round(
         self, start: Vector, goal: Vector, start_s: float, speed_m_s: float
     ) -> Iterator[FlightPath]:
-        """Flights at the usual height, and just above each higher box on the straight path;
-        lowest first."""
+        """Flights at the usual height and just above each higher box on the path, lowest first."""
         usual = FlightPath(start, goal, start_s, speed_m_s)
         lowest_m = max(usual.above_start[2], usual.above_goal[2])
         tops = {box.top_m + ABOVE_M for box in self._met(usual)}

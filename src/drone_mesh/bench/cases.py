@@ -47,7 +47,7 @@ class Case:
             raise ConfigurationError(
                 f"invalid size {text!r}: write DRONES/SPACING, such as 100/6 for 100 drones 6 m "
                 "apart, or DRONES/SPACING@FACTOR, such as 17/6@0 for 17 as fast as possible; +fly "
-                "behind it: physics moves the drones, and all of them fly"
+                "after it: physics moves the drones, and all of them fly"
             ) from None
 
     @property

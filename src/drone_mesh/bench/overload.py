@@ -39,8 +39,8 @@ class OverloadResult:
 def busy_loops(count: int) -> Iterator[None]:
     """`count` processes that loop without waiting.
 
-    Each has its own session; otherwise the kernel's autogroups would give all of them together the
-    share of one.
+    Each has its own session; otherwise the kernel's autogroups would give all of them together only
+    one share of the processor time.
     """
     command = [sys.executable, "-c", "while True: pass"]
     loops = [subprocess.Popen(command, start_new_session=True) for _ in range(count)]

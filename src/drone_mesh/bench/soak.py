@@ -15,7 +15,6 @@ SAMPLE_PERIOD_S = 60.0  # simulated
 WARM_UP_S = 600.0  # simulated; growth before this is ignored
 # Wall, after all are on. rospy closes a connection that was idle for 60 s; the master opens such
 # connections when nodes register.
-# connections when nodes register.
 IDLE_CONNECTIONS_CLOSED_S = 90.0
 MEMORY_TOLERANCE = 0.02  # our choice: normal variation of a Python program
 SAMPLE_WITHIN_S = 600.0  # wall

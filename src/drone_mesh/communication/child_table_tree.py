@@ -11,7 +11,7 @@ class ChildTableTree(IRoutingTechnique):
 
     def __init__(self) -> None:
         self._children: dict[int, set[int]] = {}
-        # The same table the other way round, and what follows from it: no packet has to search.
+        # The inverse of the table, and the next hops that follow from it: no lookup has to search.
         self._children_with: dict[int, set[int]] = {}
         self._next_hops: dict[int, int] = {}
         self._entries = 0  # grandchildren in all sets together

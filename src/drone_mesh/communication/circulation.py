@@ -20,7 +20,7 @@ class CirculationGuard:
     """
 
     def __init__(self) -> None:
-        # Two tables in turns, so that old passages are forgotten without a search for them.
+        # Two tables used in turn, so that old passages are forgotten without a search for them.
         self._passages: dict[Hashable, _Passage] = {}
         self._earlier: dict[Hashable, _Passage] = {}
         self._turn_s = -math.inf  # when the earlier ones are forgotten
@@ -30,7 +30,7 @@ class CirculationGuard:
     ) -> int | None:
         """The next hop of the packet's first passage, if it now comes from another neighbour.
 
-        A heartbeat counts its hops: only with more `hops` than before has it come round.
+        A heartbeat counts its hops, so it has come round only if it has more `hops` than before.
         """
         passage = self._passages.get(identity) or self._earlier.get(identity)
         if passage is None:
@@ -43,7 +43,7 @@ class CirculationGuard:
     def passed(
         self, identity: Hashable, came_from: int, went_to: int, now_s: float, hops: int = 0
     ) -> None:
-        """The packet was handed on. The first passage is the one that counts."""
+        """Record that the packet was forwarded. Only its first passage counts."""
         if now_s >= self._turn_s:
             self._turn_s = now_s + CIRCULATION_S
             self._passages, self._earlier = {}, self._passages

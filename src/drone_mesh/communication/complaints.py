@@ -8,7 +8,7 @@ import math
 from drone_mesh.communication.throttle import Throttle
 
 COMPLAINT_PERIOD_S = 30.0  # our choice: one line per reason and node in this time
-FOREIGN_FOR_S = 60.0  # our choice: a neighbour speaks several times in this time
+FOREIGN_FOR_S = 60.0  # our choice: a neighbour sends several packets in this time
 
 _log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ class Complaints:
         self.add(reason, payload.hex(), now_s)
 
     def foreign_neighbour(self, now_s: float) -> str:
-        """The latest reason of this kind; empty if it is a while ago."""
+        """The latest such reason; empty if it is older than FOREIGN_FOR_S."""
         reason, at_s = self._foreign
         return reason if now_s - at_s <= FOREIGN_FOR_S else ""
 

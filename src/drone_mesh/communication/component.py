@@ -40,7 +40,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     # Driven from outside ---------------------------------------------------------------------
 
     def start(self, now_s: float) -> None:
-        """Antenna on, debugging on if configured, introduce the node. The first check follows."""
+        """Start the antenna, and debugging if configured; schedule the first check; introduce."""
         self._deadlines.now_s = now_s
         self._antenna.start_antenna(self)
         if self._debug:
@@ -53,7 +53,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self._routing.start_routing(self)
 
     def stop(self) -> None:
-        """Antenna and debugging off; nothing is due from now on."""
+        """Stop the antenna and debugging; nothing is due from now on."""
         self._pilot.forget_flight()
         self._deadlines.clear()
         if self._debug:
@@ -62,7 +62,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     @property
     def deadlines(self) -> Deadlines:
-        """What is due when; `next_s` of it is `next_tick_s`, quicker for a host of many nodes."""
+        """What is due when. A host of many nodes reads its `next_s`: faster than `next_tick_s`."""
         return self._deadlines
 
     @property
@@ -101,7 +101,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self._deadlines.now_s = now_s
         try:
             creator, from_, kind, to, forward = messages.header(payload)
-        except struct.error:  # cheaper than a look at the length of each packet
+        except struct.error:  # cheaper than checking the length of each packet
             self._drop(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}", payload)
             return
         me = self._node_id
@@ -117,7 +117,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         if self._neighbours.heard(from_, now_s):
             self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
             self._on_neighbour_found(from_)
-        if creator == me:  # it came back and teaches no route
+        if creator == me:  # it came back, so it teaches no route
             self._routing.can_communicate_with_node(from_)
         elif not self._routing.learn(creator, from_, kind, payload):
             return
@@ -125,11 +125,11 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             kind == _PRESENT
             and creator == from_
             and not self._frame.heard(creator, payload)
-            and not self.complaints.foreign_neighbour(now_s)  # its digest is part of a seal
+            and not self.complaints.foreign_neighbour(now_s)  # its digest may be part of a seal
         ):
             self.complaints.add("another origin", f"that of node {creator}", now_s)
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
-            self._drop("a place from a node with another origin, or an unknown one", payload)
+            self._drop("a place from a node with another or an unknown origin", payload)
             return
         if forward != me and forward != BROADCAST:
             if kind == _HEARTBEAT:
@@ -147,7 +147,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         else:
             self._process(payload, creator, from_, kind)
 
-    _receive = on_msg  # for an on_msg above it: super() costs as much as a small packet
+    _receive = on_msg  # for an override of on_msg: super() costs as much as a small packet
 
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
         """A neighbour has received a packet; the routes learn from this."""

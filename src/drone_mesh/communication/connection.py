@@ -118,7 +118,7 @@ class GatewayConnection:
         return True
 
     def _sent_over_detour(self, connected: bool) -> bool:
-        """Send the heartbeat past a next hop that swallows; the answer changes the route."""
+        """Send the heartbeat around a next hop that swallows. The answer changes the route."""
         to, self._detour = self._detour, NO_ROUTE
         if to == NO_ROUTE:
             return False
@@ -131,9 +131,8 @@ class GatewayConnection:
     def answer_missed(self) -> None:
         """The gateway did not answer in time.
 
-        It is asked again if the medium is lossy, or if the heartbeat took a shortcut or a detour: a
-        neighbour over which no answer comes is avoided for a while, and the route in use still
-        works.
+        It is asked again if the medium is lossy, or if the heartbeat took a shortcut or a detour:
+        the route in use may still work. The neighbour that led to no answer is avoided for a while.
         """
         tried, self._tried = self._tried, NO_ROUTE
         if tried != NO_ROUTE:
@@ -222,18 +221,18 @@ class GatewayConnection:
         asked = self._look_for_swallowing()
         if self.proven(patience):
             return
-        self.ask_for_places(besides=asked)
+        self.ask_for_places(gateway_asked=asked)
         self.send_heartbeat()
 
-    def gateway_told_place(self) -> None:
-        """The preferred gateway itself answered where it is."""
+    def gateway_sent_place(self) -> None:
+        """The preferred gateway itself reported its place."""
         self._swallowing.answered()
 
     def _look_for_swallowing(self) -> bool:
-        """In a mesh with a key: see whether the way carries more than heartbeats.
+        """In a mesh with a key: check whether the route carries more than heartbeats.
 
-        True: the gateway was asked for its place. If that remains without an answer, the next
-        heartbeat goes over another neighbour.
+        True: the gateway was asked for its place. If no answers come, later heartbeats go through
+        another neighbour.
         """
         parts, now_s, next_hop = self._parts, self._parts.now_s, self.next_hop()
         sealed = parts.antenna.reserved_bytes(MessageType.LOCATION) > 0
@@ -248,7 +247,7 @@ class GatewayConnection:
                 next_hop,
                 self.gateway,
             )
-        if self._detours.avoids(next_hop, now_s):  # since now, or the route went back to it
+        if self._detours.avoids(next_hop, now_s):  # just now, or the route has returned to it
             self._detour = self._detours.nearest(next_hop, self.hops, now_s)
             if self._detour == NO_ROUTE:
                 self._swallowing.give_up()
@@ -262,16 +261,17 @@ class GatewayConnection:
         self.ask_for_place(self.gateway)
         return True
 
-    def ask_for_places(self, besides: bool = False) -> None:
+    def ask_for_places(self, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
 
-        `besides`: the gateway was asked a moment ago.
+        `gateway_asked`: the gateway was asked a moment ago.
         """
         next_hop = self.next_hop()
         places = self._parts.places
         age_s = self._parts.now_s - places.gateway_seen_s
         too_old = age_s >= (MAX_AGE_PERIODS - 1) * self._parts.timing.check_period_s
-        if not besides and (places.gateway is None or next_hop == self.gateway or too_old):
+        unsure = places.gateway is None or next_hop == self.gateway or too_old
+        if unsure and not gateway_asked:
             self.ask_for_place(self.gateway)
         if next_hop not in (self.gateway, NO_ROUTE):
             self.ask_for_place(next_hop)
@@ -297,7 +297,7 @@ class GatewayConnection:
         return medium.answer_s + medium.answer_per_hop_s * hops
 
     def _asks_a_neighbour(self) -> bool:
-        """Whether a neighbour was recently asked for its gateway; if not, ask it now."""
+        """Whether a neighbour was recently asked for its gateway. If not, one is asked now."""
         medium, now_s = self._parts.antenna.medium, self._parts.now_s
         if medium.shared and now_s - self._asked_neighbour_s < medium.answer_s:
             return True
@@ -315,10 +315,10 @@ class GatewayConnection:
                 self._parts.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self.gateway = gateway
             self._parts.places.forget_gateway()
-            self._swallowing.give_up()  # it may not know its place
+            self._swallowing.give_up()  # the new gateway may not know its place
 
     def _show(self) -> None:
-        """Report a change of the connection; do not wait for an answer longer than needed."""
+        """Report a change of the connection; cancel the wait for an answer that is not expected."""
         if self._states.link in (ConnectionState.SEARCHING, ConnectionState.CONNECTED):
             self._parts.deadlines.set(Due.ANSWER, math.inf)
         connected = self._states.connected

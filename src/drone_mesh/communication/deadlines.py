@@ -1,4 +1,4 @@
-"""The current time of a component, and when it must do what."""
+"""The current time of a component, and when each kind of work is due."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 
 
 class Due(enum.IntEnum):
-    """The things that a component may have to do at some time."""
+    """The kinds of work that a component schedules."""
 
     CHECK = 0  # the periodic check of routes and connection
     INTRODUCE = 1  # after the antenna came back
@@ -31,7 +31,7 @@ class Deadlines:
     def __init__(self) -> None:
         self.now_s = 0.0
         self._at_s = [math.inf] * len(Due)
-        self.next_s = math.inf  # the first of all
+        self.next_s = math.inf  # the earliest of all
 
     def set(self, due: Due, at_s: float) -> None:
         """Schedule `due` at `at_s`; infinity cancels it."""

@@ -51,9 +51,9 @@ class Delivery:
         self._report = report
         self._on_neighbour_lost = on_neighbour_lost
         self._reported_s: dict[int, float] = {}  # shared medium: when each was announced
-        self._gave_up: set[int] = set()  # neighbours that took no packets, though heard
+        self._gave_up: set[int] = set()  # neighbours that were heard but took no packets
         self._strangers = Strangers()
-        self._known = self._strangers.known  # looked at for each packet
+        self._known = self._strangers.known  # read for each packet
         self._announced = RateLimit(REPEATS)
         self._missing_to_report: deque[tuple[int, int, int]] = deque()
         self._reporting = False
@@ -92,21 +92,21 @@ class Delivery:
         return self._attempts * (DATA_PERSISTENCE if messages.is_data(payload) else 1)
 
     def _hand_over(self, payload: bytes) -> bool:
-        """Have the antenna queue a packet; what becomes of it is known later."""
+        """Have the antenna queue a packet; it reports the outcome later."""
         taken = self._antenna.send_message_to(payload)
         self.total_sent += taken
         return taken
 
     def delivered(self, to: int, tries: int) -> None:
-        """The antenna has delivered a packet, one of a batch or of its queue."""
+        """The antenna has delivered a packet from a batch or from its queue."""
         self._known.add(to)
         self._routing.sent(to, True, tries)
 
     def undelivered(self, payload: bytes, tries: int) -> bool:
-        """The antenna gave a packet up. Returns whether it takes another route.
+        """The antenna gave up a packet. Returns whether the packet takes another route.
 
-        A neighbour that was heard recently is not lost after one failure, because the channel may
-        be busy; after a second failure in a row it is.
+        A neighbour that was heard recently counts as lost only after two failures in a row, because
+        the channel may be busy.
         """
         to, other = messages.receiver(payload), messages.addressee(payload)
         self.total_sent -= 1

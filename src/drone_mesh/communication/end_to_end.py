@@ -2,8 +2,8 @@
 
 The hop seal shows that some node of the mesh sent a packet. This one shows the addressee which node
 created it: an order comes from a node that holds the mesh key, a place from the node itself. Its
-tag covers a nonce that the addressee announced, so that no packet outlives it, and a sequence
-number, so that none counts twice.
+tag covers a nonce that the addressee announced, so that a packet is valid only while the nonce is,
+and a sequence number, so that no packet counts twice.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from drone_mesh.errors import PacketError
 
 NEW_NONCE_AFTER_S = 5.0  # our choice: with the next heartbeat to a gateway
 NONCES = 3  # our choice: two heartbeats may be lost
-SAME_PACKET_S = 0.1  # our choice: tries and copies follow each other at once
+SAME_PACKET_S = 0.1  # our choice: retransmissions and copies follow at once
 ORDER_TAG_BYTES = 6
 TAG_BYTES = 4
 
@@ -33,7 +33,7 @@ _SEQUENCE_BYTES = 2
 _SEQUENCES = 2**16
 _NONCE_BYTES = 4
 _NONCE_AT = SEAL_AT - _SEQUENCE_BYTES - TAG_BYTES - _NONCE_BYTES
-_DIGEST_BYTES = 2  # of the frame of a PRESENT: it moves before the hop seal
+_DIGEST_BYTES = 2  # the frame digest of a PRESENT, which moves in front of the hop seal
 _DIGEST_AT = SEAL_AT - _DIGEST_BYTES
 _PRESENT_NONCE_AT = _DIGEST_AT - _NONCE_BYTES
 
@@ -44,9 +44,9 @@ _PRESENT = int(MessageType.PRESENT)
 _MISSING = int(MessageType.MISSING)
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
 _PLACES = (int(MessageType.LOCATION), int(MessageType.GATEWAY_PLACE))
-_REPORTS = range(64, 125)  # the others of the range are for meshes with a key
+_REPORTS = range(64, 125)  # 125..127 are sent only in a mesh with a key
 
-# As in seal.py: each takes the whole packet, of which only the first bytes get into the result.
+# As in seal.py: each takes the whole packet but keeps only its first bytes.
 _with_nonce = struct.Struct(f"<{_NONCE_AT}sI{PAYLOAD_BYTES - _NONCE_AT - _NONCE_BYTES}x").pack
 _without_nonce = struct.Struct(f"{_NONCE_AT}s{PAYLOAD_BYTES - _NONCE_AT}x").pack
 _present_with_nonce = struct.Struct(f"<{_PRESENT_NONCE_AT}sI{_DIGEST_BYTES}s{SEAL_BYTES}x").pack
@@ -59,10 +59,10 @@ _nonce_and_sequence = struct.Struct("<IH").pack
 
 
 class _Form:
-    """What the proofs of some types of packets are like."""
+    """The layout of the proof in some types of packets, and its key."""
 
     def __init__(self, tag_bytes: int, by_authority: bool) -> None:
-        """`by_authority`: over the addressee; otherwise the key is that of the pair."""
+        """`by_authority`: the key is the authority over the addressee, else the pair's."""
         self.tag_bytes = tag_bytes
         self.by_authority = by_authority
         self.at = at = _DIGEST_AT - tag_bytes  # where the proof starts
@@ -82,7 +82,7 @@ _FORMS = {
 
 
 def reserved_bytes(kind: int) -> int:
-    """How many of the 27 bytes behind the header both seals of such a packet take."""
+    """How many of the 27 bytes after the header the two seals of such a packet take together."""
     if kind == _PRESENT:
         return SEAL_BYTES + _NONCE_BYTES
     if kind == _HEARTBEAT:
@@ -216,7 +216,7 @@ class EndToEnd:
         return payload
 
     def _check(self, payload: bytes, form: _Form) -> None:
-        """Raises NotProven without a valid proof."""
+        """Raises NotProven unless the proof is valid."""
         creator = payload[_CREATOR]
         node = self._node_id if form.by_authority else creator
         state = self._states[form].get(node) or self._state(form, node)
@@ -226,7 +226,7 @@ class EndToEnd:
         for nonce in self._nonces:
             if compare_digest(_tag(state, nonce.value, sequence, what), tag):
                 if not _use(nonce.windows, creator, sequence):
-                    raise NotProven("a packet that came before")
+                    raise NotProven("a replayed packet")
                 return
         kind = payload[_TYPE]
         if kind == _HEARTBEAT:

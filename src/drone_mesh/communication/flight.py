@@ -46,7 +46,9 @@ class Pilot:
         self._deadlines = deadlines
         self._complaints = complaints
         self._flight: Flight | None = None
-        self._origin: Location | None = None  # of the flight; of several in a row: of the first
+        self._origin: Location | None = (
+            None  # where the flight started; of several in a row, the first
+        )
 
     @property
     def goal(self) -> Location | None:

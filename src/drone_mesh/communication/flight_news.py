@@ -13,7 +13,7 @@ class FlightNews:
     def __init__(self) -> None:
         self._quiet_until_s = -math.inf
         self._tries: dict[Location, float] = {}  # gateway's place -> when another may fly there
-        self._in_vain_s: dict[int, float] = {}  # node -> when it reported a vain flight there
+        self._in_vain_s: dict[int, float] = {}  # node -> when it reported a failed flight there
 
     def took_off(self, quiet_until_s: float) -> None:
         """A drone takes off: the others wait for its outcome until `quiet_until_s`."""

@@ -52,7 +52,7 @@ class Forwarding:
             self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
             return
         identity: Hashable
-        if kind == _HEARTBEAT:  # of most packets, so without their bytes
+        if kind == _HEARTBEAT:  # most packets; these four values are cheaper than their bytes
             know_gateway, gateway, hops = messages.heartbeat_body(payload)
             identity = (creator, forward, know_gateway, gateway)
         else:
@@ -69,7 +69,7 @@ class Forwarding:
                 self.stranded(payload, now_s)
                 if to == from_:
                     self._delivery.came_back(forward, from_)
-                elif lost != forward:  # otherwise its loss has informed all
+                elif lost != forward:  # otherwise the neighbours know already
                     self._delivery.report_missing(forward, first=from_)
                 return
             forwarded = messages.next_hop(payload, self._node_id, to)

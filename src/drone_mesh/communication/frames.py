@@ -2,8 +2,8 @@
 
 Drones whose coordinates have different origins must not fly to each other's places. Each node's
 PRESENT carries a digest of its origin; a place is accepted only from a neighbour with the same
-digest. As every neighbour does this, no place crosses the border between two frames, over any
-number of hops.
+digest. Every node does this, so no place crosses the border between two frames, over any number of
+hops.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class CommonFrame:
         self._of: dict[int, int] = {}  # neighbour -> its digest
 
     def heard(self, neighbour: int, present: bytes) -> bool:
-        """Take a neighbour's PRESENT; whether its frame is ours."""
+        """Record a neighbour's PRESENT; returns whether its frame is this node's."""
         self._of[neighbour] = digest = frame_digest(present)
         return digest == self.digest
 

@@ -58,7 +58,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._orders.on_own_reply = self._book.on_outcome
 
     def stop(self) -> None:
-        """Internet, antenna and debugging off."""
+        """Stop the internet connection, the antenna and debugging."""
         self._internet.disconnect()
         super().stop()
 
@@ -83,8 +83,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
-        """Send a drone to a place (metres). True: there was a route and the next hop took the
-        order.
+        """Send a drone to a place (metres). True: a next hop took the order.
 
         Raises GoalRefused for an invalid node id or place, or if its own drone cannot fly.
         """
@@ -93,7 +92,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             raise GoalRefused(f"invalid drone id {node_id}: must be 0..{MAX_NODE_ID}")
         check_goal(latitude, longitude, height)
         if height != int(height):
-            raise GoalRefused(f"height {height} m: an order gives whole metres")
+            raise GoalRefused(f"invalid height {height} m: must be in whole metres")
         goal = Location(latitude, longitude, height)
         number = self._book.enter(node_id, goal)
         if node_id != self._node_id:
@@ -141,9 +140,11 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
             self._book.on_reply(creator, reply)
 
     def _may_find(self, node: int) -> bool:
-        """Whether a search could find this node. A node that relays for others, and learns from
-        their
-        packets that it is connected, may send nothing to the gateway for minutes."""
+        """Whether a search could find this node.
+
+        A relay learns from the packets of others that it is connected, so it may send nothing to
+        the gateway for minutes.
+        """
         _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
         return self._antenna.medium.shared and self._deadlines.now_s - heard_s < SEARCH_WITHIN_S
 

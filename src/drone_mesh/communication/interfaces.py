@@ -25,7 +25,7 @@ class IMeshNetwork(abc.ABC):
 
     @abc.abstractmethod
     def on_msg(self, payload: bytes, now_s: float) -> None:
-        """Handle one packet from the air; handled when this returns. Any bytes are allowed."""
+        """Handle one packet from the air before returning. Any bytes are allowed."""
 
     @abc.abstractmethod
     def get_node_id(self) -> int:
@@ -96,10 +96,9 @@ class IGatewayCommands(abc.ABC):
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
-        """Send a drone to a place (metres). True: there was a route and the next hop took the
-        order.
+        """Send a drone to a place (metres). True: a next hop took the order.
 
-        The arrival is not reported back. Raises GoalRefused for an invalid order.
+        `get_orders` returns the outcome. Raises GoalRefused for an invalid order.
         """
 
     @abc.abstractmethod
@@ -128,7 +127,7 @@ class IWirelessCommunication(abc.ABC):
         return ChannelUse()
 
     def reserved_bytes(self, kind: int) -> int:
-        """How many of the 27 bytes behind the header of a packet the antenna itself needs."""
+        """How many of the 27 bytes after the header of a packet the antenna itself needs."""
         return 0
 
     def seal_message(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
@@ -148,7 +147,7 @@ class IWirelessCommunication(abc.ABC):
         return True
 
     def foreign_neighbour(self) -> str:
-        """What shows that a neighbour has another key or none; empty: nothing does."""
+        """Why a neighbour seems to have another key or none; empty: nothing points to that."""
         return ""
 
     def patience(self) -> float:

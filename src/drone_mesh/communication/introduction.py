@@ -42,7 +42,10 @@ class Introduction:
         self._is_answer = False  # the planned one answers a node that needs a gateway
 
     def broadcast(self) -> None:
-        """Send PRESENT to each node in range. On a shared channel, repeat a search ever later."""
+        """Send PRESENT to each node in range.
+
+        On a shared channel a node without a gateway repeats it, less and less often.
+        """
         parts, node = self._parts, self._node
         hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
         payload = messages.present(parts.node_id, hops, connected)
@@ -68,7 +71,7 @@ class Introduction:
         self.broadcast()
 
     def on_power(self, on: bool) -> None:
-        """The antenna was switched."""
+        """The antenna was switched on or off."""
         if on:
             self._plan(AFTER_POWER_S)
         else:

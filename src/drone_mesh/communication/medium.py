@@ -19,7 +19,7 @@ class Medium:
     * a node that looks for a gateway is answered by one PRESENT for all, after a random part of
       `answer_spread_s`, unless another node answered first (Trickle, RFC 6206: suppression);
     * a node that looks for a gateway searches again after `search_s`, and then after twice as long
-      each time (Trickle, RFC 6206), since no one acknowledges a broadcast;
+      each time (Trickle, RFC 6206), since broadcasts are not acknowledged;
     * a router asks one neighbour at a time for its gateway, for `answer_s`;
     * what is known to work is not probed in each round; see IWirelessCommunication.patience. A
       gateway's answer that a router forwards proves its own connection, too (the data-path
@@ -34,7 +34,7 @@ class Medium:
     answer_spread_s: float = 0.0
     search_s: float = 0.0
     missing_quiet_s: float = 0.0
-    silence_s: float = 0.0  # a neighbour heard since then is not lost by one undelivered packet
+    silence_s: float = 0.0  # a neighbour heard within this time survives one undelivered packet
     data_pause_s: float = 0.005  # between bursts of users' packets
 
 
@@ -43,7 +43,7 @@ UNDISTURBED = Medium()
 
 @dataclass(frozen=True)
 class ChannelUse:
-    """What one node does on a shared channel; all zero on another medium."""
+    """One node's use of a shared channel; all zero on other media."""
 
     airtime: float = 0.0  # share of the last second or more that the node's frames took
     tries: float = 0.0  # per packet with acknowledgement, since the start

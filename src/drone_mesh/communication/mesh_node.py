@@ -137,11 +137,11 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         return self._neighbours.heard_s()
 
     def get_route_to_gateway(self) -> int:
-        """The neighbour that leads to the preferred gateway; the own id for a gateway itself."""
+        """The neighbour that leads to the preferred gateway; a gateway returns its own id."""
         return self.get_direction_to(self.get_preferred_gateway())
 
     def get_direction_to(self, node: int) -> int:
-        """The neighbour that leads to `node`; the own id for the node itself."""
+        """The neighbour that leads to `node`; this node's own id for itself."""
         if node in (self._node_id, NO_ROUTE):
             return node
         return self._routing.get_direction_to_node(node)
@@ -209,7 +209,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
     # For the parts ---------------------------------------------------------------------------
 
     def _answer_search(self, gateway: int) -> bool:
-        """Send a heartbeat even if one is under way, which may have been lost without a route."""
+        """Send a heartbeat even if one is under way: that one may have been lost."""
         return self._delivery.send_own(messages.addressed(self._heartbeat(), gateway))
 
     def _heartbeat(self) -> bytes:

@@ -1,7 +1,7 @@
 """MessageSeal: users' messages, secret and authentic from end to end (docs/security.md).
 
 A synthetic IV (Rogaway and Shrimpton, 2006; RFC 5297): the tag over a message and its place is also
-the nonce of its encryption, so nothing has to be drawn or stored. The tag is keyed BLAKE2s (RFC
+the nonce of its encryption, so no nonce has to be drawn or stored. The tag is keyed BLAKE2s (RFC
 7693), the encryption AES-128 in counter mode (NIST SP 800-38A).
 """
 
@@ -16,7 +16,7 @@ from drone_mesh.communication.keys import Keys
 from drone_mesh.errors import ConfigurationError
 
 TAG_BYTES = 6
-ACK_TAG_BYTES = 3  # all that is left of a packet
+ACK_TAG_BYTES = 3  # all the room that is left in an ACK
 _KEY_BYTES = 16
 _BLOCK_BYTES = 16
 
@@ -53,7 +53,7 @@ class MessageSeal:
         return payload if hmac.compare_digest(_tag(key, context, payload), tag) else None
 
     def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
-        """Over the body of an ACK that `creator` sends to `to`."""
+        """The tag over the body of an ACK that `creator` sends to `to`."""
         key = self._keys.pair(creator, to)
         assert key is not None, "a node has its own keys"
         made = bytes((creator, to)) + body
@@ -72,7 +72,7 @@ def _tag(key: bytes, context: bytes, payload: bytes) -> bytes:
 
 
 def _aes_in_counter_mode() -> Encrypt:
-    # Imported here, because a mesh without a key needs no such library.
+    # Imported here, because a mesh without a key does not need this library.
     try:
         from cryptography.hazmat.primitives.ciphers import Cipher
         from cryptography.hazmat.primitives.ciphers.algorithms import AES
@@ -84,7 +84,7 @@ def _aes_in_counter_mode() -> Encrypt:
 
     def encrypted(key: bytes, nonce: bytes, text: bytes) -> bytes:
         own = hashlib.blake2s(key=key, digest_size=_KEY_BYTES, person=b"encrypt").digest()
-        first_block = nonce.ljust(_BLOCK_BYTES, b"\0")  # the counter is at its end
+        first_block = nonce.ljust(_BLOCK_BYTES, b"\0")  # its last bytes count the blocks
         cipher = Cipher(AES(own), CTR(first_block)).encryptor()
         return cipher.update(text) + cipher.finalize()
 

@@ -21,16 +21,16 @@ from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import PacketError
 
-_CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # places of the header bytes
+_CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # offsets of the header bytes
 HEADER_BYTES = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
 _BYTE = tuple(bytes((value,)) for value in range(256))
 _TWICE = tuple(bytes((value, value)) for value in range(256))
 TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
 REPORT_TYPES = range(64, 128)
-DATA_TYPES = range(128, 256)  # of users; their bodies are described in data/packets.py
-ROUTE_RECORD = 194  # the only packet of users to which forwarding nodes add their ids
-ROUTE_RECORD_AT = HEADER_BYTES + 2  # place of the number of ids, which follow
+DATA_TYPES = range(128, 256)  # users' data; data/packets.py describes their bodies
+ROUTE_RECORD = 194  # the only type of users' data to which forwarding nodes add their ids
+ROUTE_RECORD_AT = HEADER_BYTES + 2  # offset of the number of ids; the ids follow it
 MOST_RECORDED = 16
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
 
@@ -271,11 +271,11 @@ _NEW_PRESENT = struct.Struct(
     f"<{HEADER_BYTES}B{IntroduceMessage.BODY.format[1:]}{BODY_BYTES - IntroduceMessage.BODY.size}x"
 )
 _HEARTBEAT = int(MessageType.HEARTBEAT)
-_HEARTBEAT_HOPS = HEADER_BYTES + 2  # place of the hop count
+_HEARTBEAT_HOPS = HEADER_BYTES + 2  # offset of the hop count
 _NEW_HEARTBEAT = struct.Struct(
     f"<{HEADER_BYTES}B{HeartbeatMessage.BODY.format[1:]}{BODY_BYTES - HeartbeatMessage.BODY.size}x"
 )
-_EXTENSIONS = {  # the bytes behind a body that a routing technique may use
+_EXTENSIONS = {  # the bytes after a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
 }
@@ -297,7 +297,7 @@ class GatewayPlace(NamedTuple):
     age_s: float  # how long ago it was there
 
     def behind(self, payload: bytes) -> bytes:
-        """The same packet with this extension behind its body."""
+        """The same packet with this extension after its body."""
         body = self._body()
         at = _GATEWAY_PLACE_AT[payload[_TYPE]]
         return payload[:at] + body + payload[at + len(body) :]
@@ -321,7 +321,7 @@ class GatewayPlace(NamedTuple):
         return cls(gateway, Location(*place), age - 1.0)
 
 
-# Read for each packet: none of these costs a call of a Python function.
+# Used for each packet: none of these calls a Python function.
 
 header: Callable[[bytes], tuple[int, int, int, int, int]] = struct.Struct(
     f"<{HEADER_BYTES}B{BODY_BYTES}x"
@@ -387,7 +387,7 @@ def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: byt
 
 
 def place_in(location: bytes) -> Location:
-    """The place in a LOCATION, without the object: every tenth packet is one."""
+    """The place in a LOCATION, without creating the object: every tenth packet is one."""
     return Location(*LocationMessage.BODY.unpack_from(location, HEADER_BYTES)[:3])
 
 
@@ -399,7 +399,7 @@ def present(sender: int, hops: int, know_gateway: bool) -> bytes:
 def heartbeat(
     creator: int, from_: int, to: int, forward: int, know_gateway: bool, preferred_gateway: int
 ) -> bytes:
-    """The bytes of a new HeartbeatMessage, without the object: every fifth packet is one."""
+    """The bytes of a new HeartbeatMessage, without the object, as every fifth packet is one."""
     return _NEW_HEARTBEAT.pack(
         creator, from_, _HEARTBEAT, to, forward, know_gateway, preferred_gateway, 0
     )
@@ -433,17 +433,17 @@ def hops(payload: bytes) -> int:
 
 
 EXTENSION_ROOM: Mapping[int, int] = {kind: len(part) for kind, part in _EXTENSIONS.items()}
-"""The number of bytes behind the body that a routing technique may use, for types that have any."""
+"""The number of bytes after the body that a routing technique may use, for types that have any."""
 
 
 def extension(payload: bytes) -> bytes:
-    """The bytes behind the body of a PRESENT or HEARTBEAT; zero if no technique uses them."""
+    """The bytes after the body of a PRESENT or HEARTBEAT; zero if no technique uses them."""
     part = _EXTENSIONS[payload[_TYPE]]
     return payload[part.start : part.stop]
 
 
 def extended(payload: bytes, extension: bytes) -> bytes:
-    """The same PRESENT or HEARTBEAT with these bytes behind its body.
+    """The same PRESENT or HEARTBEAT with these bytes after its body.
 
     Raises PacketError if they do not fit.
     """
@@ -466,7 +466,7 @@ def with_frame_digest(present: bytes, digest: int) -> bytes:
 
 
 def order_number(order: bytes) -> int:
-    """The number behind the body of a MOVE_TO_LOCATION; 0: its creator wants no reply."""
+    """The number after the body of a MOVE_TO_LOCATION; 0: its creator wants no reply."""
     return int(_ORDER_NUMBER.unpack_from(order, _ORDER_NUMBER_AT)[0])
 
 
@@ -477,7 +477,7 @@ def with_order_number(order: bytes, number: int) -> bytes:
 
 
 def body(payload: bytes) -> bytes:
-    """The 27 bytes behind the header."""
+    """The 27 bytes after the header."""
     return payload[HEADER_BYTES:]
 
 

@@ -53,7 +53,7 @@ class Neighbours:
         return True
 
     def left_by_order(self) -> None:
-        """This node flies elsewhere by order, so hearing no node is not its medium's fault."""
+        """This node flies elsewhere by order: if it hears no node, its medium still works."""
         self._leaves_them = True
         self.silent = False
 

@@ -16,7 +16,7 @@ from drone_mesh.communication.text_parts import split
 from drone_mesh.drone.interfaces import Location
 
 STEPS_PER_M = 5  # places are encoded in steps of 0.2 m: 5000 m fit into an int16
-UNKNOWN = 255  # of one byte
+UNKNOWN = 255  # in a field of one byte
 NO_PLACE = -(2**15)
 WORDS_BYTES = 13  # in one packet
 _FLYING, _CAN_FLY = 1, 2

@@ -1,9 +1,8 @@
 """NodeSearch: a gateway on a shared channel searches for a node without a known route.
 
 A relay that loses a neighbour loses the routes to all nodes behind it, and learns new ones only
-from packets of those nodes. On a busy channel these may be silent for 25 s, so the gateway requests
-one.
-docs/protocol.md, "Shared channel".
+from packets of those nodes. On a busy channel such a node may be silent for 25 s, so the gateway
+requests a packet from it (docs/protocol.md, "Shared channel").
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ class NodeSearch:
         self._seen_s: dict[tuple[int, int, int], float] = {}  # creator, node, number
 
     def search(self, node: int) -> bool:
-        """Ask all nodes for it. False: too soon after another search."""
+        """Broadcast a search for `node`. False: too soon after another search."""
         now_s = self._parts.now_s
         if now_s - self._searched_s < SEARCH_EVERY_S:
             return False

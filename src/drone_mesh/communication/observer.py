@@ -24,7 +24,7 @@ class MeshEventKind(enum.Enum):
     POWER_ON = "power on"
     POWER_OFF = "power off"
     EMERGENCY = "emergency"  # no gateway answered for too long
-    NEGOTIATION_STARTED = "negotiation started"  # detail: the own score
+    NEGOTIATION_STARTED = "negotiation started"  # detail: the node's score
     NEGOTIATION_ENDED = "negotiation ended"  # peer: the node that flies
     FLIGHT_DECIDED = "flight decided"  # peer: the node whose place it takes
     FLIGHT_ORDERED = "flight ordered"  # peer: the creator of the order
@@ -40,7 +40,7 @@ class MeshEventKind(enum.Enum):
     ORDER_REFUSED = "order refused"
     ORDER_ARRIVED = "order arrived"
     ORDER_GIVEN_UP = "order given up"
-    # Of a drone, which a real gateway reads from the reports of its node
+    # About a drone; a real gateway derives them from the reports of its node
     TOOK_OFF = "took off"
     CANNOT_FLY = "cannot fly"  # detail: why
     CAN_FLY = "can fly again"

@@ -74,8 +74,10 @@ class OrderBook:
     def __init__(
         self, parts: NodeParts, may_find: Callable[[int], bool], search: Callable[[int], bool]
     ) -> None:
-        """`may_find`: whether a search could find this drone without a route. `search` starts one;
-        False: too soon after another."""
+        """`may_find`: whether a search could find this drone, to which there is no route.
+
+        `search` starts one; False: too soon after another.
+        """
         self._parts = parts
         self._may_find = may_find
         self._search = search
@@ -208,7 +210,11 @@ class OrderBook:
         return with_order_number(packet, order.number)
 
     def _no_route(self, order: _Order) -> None:
-        _log.warning("gateway %d: no route to drone %d, it stays", self._parts.node_id, order.drone)
+        _log.warning(
+            "gateway %d: no route to drone %d: it stays where it is",
+            self._parts.node_id,
+            order.drone,
+        )
         self._move(order, OrderState.NO_ROUTE)
 
     def _move(self, order: _Order, state: OrderState, reason: str = "") -> None:

@@ -22,7 +22,7 @@ from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused
 
 ORDERS_KEPT = 8  # our choice: more than the gateways that order one drone
-ARRIVED_WITHIN_M = 1.5  # our choice: a MAVLink drone counts 1 m as there (drone/route.py)
+ARRIVED_WITHIN_M = 1.5  # our choice: a MAVLink drone has arrived within 1 m (drone/route.py)
 REPLY_AGAIN_S = 1.0  # our choice: how often a reply without a route is retried
 REPLY_TRIES = 120  # our choice: then the gateway queries
 

@@ -1,4 +1,4 @@
-"""ConnectionRepair: repairs a router's connection, with its strategy, if it is lost for too long.
+"""ConnectionRepair: repairs a router's connection by a strategy, once it is lost for too long.
 
 It notices the loss, waits, flies for the strategy, and keeps clear of other drones.
 docs/protocol.md, "Lost connection" and "Flight".
@@ -50,7 +50,7 @@ class ConnectionRepair(RepairViews):
         self._introduce = introduce
         self._strategy = strategy
         self._lost_since_s = math.inf  # valid from LOSS_NOTICED until the router is AT_REST
-        self._checked_s: float | None = None  # the first check during an election was due then
+        self._checked_s: float | None = None  # when the first check during an election was due
         self._was_silent = False
         self._flight: RepairFlight | None = None
         self._flies_to_place_of = NO_ROUTE

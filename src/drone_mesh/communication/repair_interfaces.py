@@ -199,7 +199,10 @@ class IRepairStrategy(abc.ABC):
         self.mesh = mesh
 
     def patience(self, silent: bool) -> float:
-        """The wait before an emergency, in `connection_lost_after`; `silent`: see above."""
+        """The wait before an emergency, as a multiple of `connection_lost_after`.
+
+        `silent`: see IRepairActions.silent.
+        """
         return SILENCE_PATIENCE if silent else 1.0
 
     def on_gateway_lost(self) -> None:
@@ -213,7 +216,7 @@ class IRepairStrategy(abc.ABC):
         """A gateway answers."""
 
     def on_stopped(self) -> None:
-        """An order flies the drone, or the antenna is off: give up what is under way."""
+        """The drone flies by order, or the antenna is off: give up what is under way."""
 
     def on_neighbour_found(self, node: int) -> None:
         """A new node is in reach."""

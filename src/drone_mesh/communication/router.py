@@ -195,7 +195,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         connection = self._connection
         if node == connection.gateway:
             self.places.gateway_is_at(location, now_s)
-            connection.gateway_told_place()
+            connection.gateway_sent_place()
         elif gateway is not None:
             self._on_gateway_place(gateway)
         if node == connection.next_hop():

@@ -1,8 +1,7 @@
 """The states of a router, and every transition between them.
 
-A router is in two states at once, as an h11 connection is in the states of its two sides. They
-overlap: a lost router still tries the gateways that its neighbours offer, and a flying one may be
-answered in flight.
+A router is in two states at once. They are independent: a lost router still tries the gateways that
+its neighbours offer, and an answer may reach a router in flight.
 
 * `ConnectionState`: whether a gateway answers.
 * `RepairState`: the router's reaction to a lost connection.

@@ -150,8 +150,10 @@ class IRoutingTechnique(abc.ABC):
     """
 
     TAKES_SHORTCUTS: ClassVar[bool] = True
-    """A router tries a neighbour that introduces itself with fewer hops: its next heartbeat to the
-    gateway goes through that neighbour, and the answer decides."""
+    """Whether a router tries a neighbour that introduces itself with fewer hops.
+
+    If so, its next heartbeat to the gateway goes through that neighbour, and the answer decides.
+    """
 
     def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
         """A packet arrived from neighbour `from_`, for this node or to be forwarded.

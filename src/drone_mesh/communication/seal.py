@@ -3,9 +3,9 @@
 The last 7 bytes of each packet: the low 2 bytes of a counter of its sender, and a tag of 5 bytes
 over everything before them, the counter and the sender's epoch. The key is that of the network for
 packets to all, otherwise that of the pair, so a captured node cannot impersonate another one. An
-epoch is 8 random bytes that a node draws at each start; a receiver learns it by a challenge that
-only this node can answer. So there is no stored state to lose, and no packet of an earlier epoch is
-accepted.
+epoch is 8 random bytes that a node draws at each start; a receiver learns it through a challenge
+that only that node can answer. So there is no stored state to lose, and no packet of an earlier
+epoch is accepted.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
 _FROM, _TO, _FORWARD = 1, 3, 4
 _LOW_BYTES = 2**16 - 1  # of a counter: those in a packet
 
-# Each of these takes the whole packet (or all of it from `forward` on), and only the bytes before
-# its seal get into the result: one call is cheaper than slices that are put together.
+# Each takes the whole packet (or all of it from `forward` on) and keeps only the bytes before its
+# seal: one call is cheaper than joining slices.
 _covered = struct.Struct(f"<I{SEAL_AT}s").pack  # counter, packet
 _covered_to_all = struct.Struct(f"<I{_TO}sB{SEAL_AT - _FORWARD}s").pack
 _sealed = struct.Struct(f"<{SEAL_AT}sH{TAG_BYTES}s").pack  # packet, counter, tag

@@ -27,9 +27,9 @@ from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.seal import SEAL_AT, SEAL_BYTES, HopSeal
 from drone_mesh.communication.timing import MeshTiming
 
-FRESH_PERIODS = 3.0  # our choice: a neighbour speaks once per check period
+FRESH_PERIODS = 3.0  # our choice: a neighbour sends something once per check period
 FOREIGN_AFTER_S = 20.0  # our choice: two check periods; a restarted neighbour answers by then
-FOREIGN_FORGOTTEN_S = 60.0  # our choice: then the count starts again; tries come twice at times
+FOREIGN_FORGOTTEN_S = 60.0  # our choice: then the count starts again, as some packets arrive twice
 FOREIGN_PACKETS = 3
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
@@ -120,7 +120,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         self._mesh = None
 
     def send_message_to(self, payload: bytes) -> bool:
-        """As every antenna; True also for a packet that its addressee could not believe yet."""
+        """As for every antenna; True also for a packet that its addressee could not verify yet."""
         if payload[0] == self._node_id:
             proven = self._proven(payload)
             if proven is None:
@@ -150,14 +150,14 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         return self._antenna.on()
 
     def _proven(self, payload: bytes) -> bytes | None:
-        """A packet with its end-to-end seal; None: its addressee could not believe it yet."""
+        """A packet with its end-to-end seal; None: its addressee could not verify it yet."""
         if payload[0] != self._node_id or payload[SEAL_AT - 2] or payload[SEAL_AT - 1]:
             return payload
         now_s = self._clock()
         proven = self._end_to_end.seal(payload, now_s)
         if proven is None:
             detail = f"node {payload[4]} has not been heard by this node"
-            self.complaints.add("not sent, without a nonce", detail, now_s)
+            self.complaints.add("not sent: no nonce of the addressee", detail, now_s)
         return proven
 
     # For the antenna -------------------------------------------------------------------------
@@ -237,13 +237,13 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         challenge = self._seal.challenge(node, now_s)
         if challenge is None:
             return
-        if self._antenna.medium.shared and self._seal.crowded:  # none to ids that may not exist
+        if self._antenna.medium.shared and self._seal.crowded:  # some of these ids may not exist
             self._antenna.broadcast_message(challenge)
         else:
             self._antenna.send_message_to(challenge)
 
     def _not_proven(self, reason: str, payload: bytes, now_s: float) -> None:
-        """Copies, and packets for a nonce of the past, are normal; false orders are not."""
+        """Copies, and packets for an old nonce, are normal; forged orders are not."""
         if payload[2] == _ORDER:
             self.complaints.dropped(reason, payload, now_s)
         else:

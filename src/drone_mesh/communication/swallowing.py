@@ -1,9 +1,9 @@
-"""Swallowing: notices that the way to the gateway carries heartbeats and nothing else.
+"""Swallowing: notices that the route to the gateway carries heartbeats and nothing else.
 
 docs/security.md, "A relay that swallows". A captured relay can forward heartbeats, so that the
-nodes behind it stay connected, and drop all other packets. With a key, the place of a gateway is
-an answer that only the gateway can give: if the heartbeats are answered and this question is not,
-again and again, the way to the gateway swallows packets.
+nodes behind it stay connected, and drop all other packets. With a key, only the gateway itself can
+answer a request for its place. If it answers heartbeats but repeatedly does not answer this
+request, a node on the route swallows packets.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.neighbours import Neighbours
 
 ASK_PERIODS = 3.0  # our choice, in check periods: one packet and its answer in half a minute
-LEAST_UNANSWERED = 2  # our choice: of a next hop that was chosen because another one swallowed
+LEAST_UNANSWERED = 2  # our choice: for a next hop chosen because another one swallowed packets
 
 
 class Swallowing:
@@ -27,7 +27,7 @@ class Swallowing:
         self._asked_s = -math.inf
 
     def must_ask(self, now_s: float) -> bool:
-        """Whether the gateway has to be asked in this check; more often without an answer."""
+        """Whether to ask the gateway in this check: in each one after a question without answer."""
         return self._unanswered > 0 or now_s - self._asked_s >= self._ask_period_s
 
     def asked(self, now_s: float) -> None:
@@ -41,10 +41,10 @@ class Swallowing:
         self._unanswered = 0
 
     def noticed(self, hops: int) -> bool:
-        """Whether packets are swallowed on the route, which has so many hops.
+        """Whether packets are swallowed on the route, which is `hops` long.
 
-        Nodes with fewer hops come to this conclusion sooner. So the node next to the relay takes
-        another next hop first, and the nodes behind it need not.
+        Nodes with fewer hops come to this conclusion sooner. So the node next to the relay is the
+        first to change its next hop, and the nodes behind it need not change theirs.
         """
         return self._answers and self._unanswered >= max(LEAST_UNANSWERED, hops)
 
@@ -59,14 +59,14 @@ class Swallowing:
 
 
 class Detours:
-    """Which neighbours a router avoids on its way to the gateway, and which others there are."""
+    """The neighbours that a router avoids on its way to the gateway, and the alternatives."""
 
     def __init__(self, neighbours: Neighbours) -> None:
         self._neighbours = neighbours
         self._until_s: dict[int, float] = {}  # by neighbour
 
     def avoid(self, neighbour: int, until_s: float) -> None:
-        """Avoid this neighbour until then: no answer came over it."""
+        """Avoid this neighbour until then, because no answer came through it."""
         self._until_s[neighbour] = until_s
 
     def avoid_none(self) -> None:
@@ -78,13 +78,13 @@ class Detours:
         return now_s < self._until_s.get(neighbour, -math.inf)
 
     def passes_by(self, neighbour: int, now_s: float) -> bool:
-        """Whether to avoid it, as another neighbour has a gateway, too."""
+        """Whether to avoid it and use another neighbour that has a gateway."""
         return self.avoids(neighbour, now_s) and bool(self._others(neighbour, now_s))
 
     def nearest(self, but: int, hops: int, now_s: float) -> int:
-        """Another neighbour, with at most so many hops to the gateway; or NO_ROUTE.
+        """The nearest other neighbour, with at most `hops` hops to the gateway; or NO_ROUTE.
 
-        One with more of them may use this node to reach the gateway.
+        A neighbour with more hops may use this node to reach the gateway.
         """
         nearest_hops, node = min(self._others(but, now_s), default=(NO_ROUTE, NO_ROUTE))
         return node if nearest_hops <= hops else NO_ROUTE

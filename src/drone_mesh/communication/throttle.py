@@ -6,7 +6,7 @@ from collections import Counter
 
 
 class Throttle:
-    """Decides which lines are logged. One thread at a time; its caller knows the time."""
+    """Decides which lines are logged. One thread at a time; the caller passes the time."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from drone_mesh.errors import ConfigurationError
 
-HEARTBEAT_ANSWER_S = 0.5  # one heartbeat to the gateway under way at a time
+HEARTBEAT_ANSWER_S = 0.5  # at most one heartbeat to the gateway within this time
 CIRCULATION_S = 0.5  # the same packet from another neighbour within this time circulates
 FLIGHT_POSITION_PERIOD_S = 1.0  # how often a flying node requests its position
 MIN_REPORT_PERIOD_S = 30.0  # docs/protocol.md, "Node reports"

@@ -28,9 +28,9 @@ class FlightPath:
     """One flight in straight lines: up, across, down.
 
     A flight over a straight distance d takes d / speed_m_s and climbs d / 2. The path is longer
-    than d, so the drone flies faster than speed_m_s for most of it. Climbing higher than d / 2, as
-    `across_m` requires, takes the time for the extra metres; so does a detour over the corners
-    `around`, which are all at the greater height of the two ends.
+    than d, so the drone flies faster than speed_m_s for most of it. If `across_m` requires a higher
+    climb, or `around` a detour, the extra metres take additional time. On a detour the drone flies
+    at one height, the greater one of the two ends.
     """
 
     start: Vector

@@ -21,7 +21,7 @@ class VirtualClock:
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        # A heap. Its last event never comes, so that no packet has to ask whether there is one.
+        # A heap. Its last event never comes, so it is never empty and need not be checked.
         self._events: list[Event] = [(math.inf, math.inf, _never, None)]
         # Events requested in order of time, like most packets; cheaper than the heap.
         self._line: deque[Event] = deque()

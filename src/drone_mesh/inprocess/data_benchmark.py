@@ -24,7 +24,7 @@ from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 RANGE_M = 9.0
 SPACING_M = 6.0
 CONNECT_WITHIN_S = 120.0
-END_WITHIN_S = 600.0  # of the messages
+END_WITHIN_S = 600.0  # for all messages
 
 
 class DataCase(NamedTuple):
@@ -60,7 +60,7 @@ class LossyDisc(IdealDisc):
 
 
 def reuse_distance(settings: RadioSettings) -> int:
-    """How many hops apart two senders in the line may send at once, each to its next node.
+    """The least hops between two senders in the line that can send at once, each to its next node.
 
     A packet and its acknowledgement count as a whole: every frame of one pair has to arrive during
     every frame of the other, by the emulator's own rule of capture. Between the sender of one pair

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Callable, Protocol
 
-from drone_mesh.air.obstacles import NO_WAY
+from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine, Location
@@ -58,7 +58,7 @@ class InProcessDrone(IDroneEngine):
             return
         plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
         if plan is None:
-            raise GoalRefused(NO_WAY)
+            raise GoalRefused(NO_PATH)
         if self._path is None:
             self._on_flight(True)
         else:

@@ -17,7 +17,7 @@ from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
-PROGRESS_S = 5.0  # of the wall
+PROGRESS_S = 5.0  # of wall time
 
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:

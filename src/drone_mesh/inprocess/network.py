@@ -82,8 +82,8 @@ class Network:
         at `rate` (250k, 1M or 2M) with the space between them as `links` says (default: an ideal
         disc). `loss`, `delay_s` and `jitter_s` are for the disc. Raises ConfigurationError.
 
-        `key`: the key of the mesh, which every node then has, or a function that says what each
-        node has; None: that node, or every node, seals nothing.
+        `key`: the key of the mesh, for every node, or a function that returns the keys of each
+        node. None: no seals, of that node or of all.
         """
         _check_numbers(max_distance_m, loss, delay_s, jitter_s)
         self._seed = seed

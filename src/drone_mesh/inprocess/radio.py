@@ -47,9 +47,9 @@ class InProcessAir:
         self._antennas: dict[int, InProcessAntenna] = {}
         self._ids: set[int] = set()  # of all antennas, also before they start and after they stop
         self._cut: set[frozenset[int]] = set()
-        # Whether two places within range hear each other: obstacles say so before the nodes start.
+        # Whether two places within range hear each other; set if there are obstacles.
         self.sees: Callable[[Location, Location], bool] | None = None
-        # Whether a packet may arrive at all: experiments count packets and lose some.
+        # Whether a packet may arrive at all; set by experiments that count packets or lose some.
         self.carries: Callable[[bytes], bool] | None = None
         # The links between nodes at rest: looked up for each packet, and changed only when a node
         # appears, disappears or flies.
@@ -219,5 +219,5 @@ class InProcessAntenna(IWirelessCommunication):
     def receive(self, payload: bytes) -> None:
         """A packet arrived; ignored without power."""
         if self.powered and self._started:
-            deliver = self._deliver  # Python finds it faster than as a method
+            deliver = self._deliver  # calling a local is faster than self._deliver(...)
             deliver(payload)

@@ -1,10 +1,11 @@
 """The shared channel, packet by packet: a fast model of nRF24L01+ radios on one air.
 
-It models what decides the fate of a packet: the duration of frames, that a radio cannot receive
-while it sends, acknowledgements and their loss, overlapping frames (with capture), the FIFO of
-three payloads, and the rules by which the driver uses the channel. Those rules are the driver's own
-(`nrf24.medium_access`), as are the link models (`nrf24.emulator.links`). It omits the chip:
-registers, SPI and bits. `python3 -m drone_mesh.lab.air_validation` compares the two.
+It models what decides the fate of a packet: the duration of frames, half-duplex radios,
+acknowledgements and their loss, overlapping frames (with capture), the FIFO of three payloads, and
+the rules by which the driver uses the channel. These rules are the driver's own code
+(`nrf24.medium_access`), and the link models are the emulator's (`nrf24.emulator.links`). It omits
+the chip: registers, SPI and bits. `python3 -m drone_mesh.lab.air_validation` compares it with the
+emulator.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         self._ard_s = 0.0
         self._ce_rose_s = 0.0
         self._answered = False
-        self._last_taken: OutgoingPacket | None = None  # the last packet on the own address
+        self._last_taken: OutgoingPacket | None = None  # the last packet to this node alone
         self._unread = 0  # payloads in the FIFO
         self._radio = RadioStatistics()
         self._meter = ChannelMeter(self._clock.now_s)

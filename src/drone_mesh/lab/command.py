@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if argv is None else argv)
     parser = _parser()
     options, after_options = parser.parse_known_args(given)
-    if after_options:  # overrides behind an option: argparse takes those before it only
+    if after_options:  # argparse accepts overrides only before an option
         if not hasattr(options, "overrides") or any(w.startswith("-") for w in after_options):
             parser.error(f"unrecognized arguments: {' '.join(after_options)}")
         options.overrides += after_options
@@ -192,7 +192,7 @@ def _attack(options: argparse.Namespace) -> int:
         raise MeshError(f"unknown attack {min(unknown)!r}: use one of {', '.join(ATTACKS)}")
     if options.runs < 1:
         raise MeshError(f"invalid --runs {options.runs}: must be 1 or more")
-    logging.disable(logging.WARNING)  # an attacked mesh has much to say
+    logging.disable(logging.WARNING)  # an attacked mesh logs a lot
     for line in table(options.attacks or list(ATTACKS), options.runs):
         print(line, flush=True)
     return 0
@@ -256,7 +256,7 @@ def _milliseconds(guess: Estimate) -> str:
     whole = f"{guess.run_s * 1000:.0f} ms"
     if guess.outside_s is None:
         return whole
-    return f"{whole}, of which {guess.outside_s * 1000:.1f} ms are not the simulation"
+    return f"{whole}, including {guess.outside_s * 1000:.1f} ms outside the simulation"
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.worker import execute, measured, scenario_of, simulation_of
 
 BUDGET_S = 20.0  # of trial runs
-MOST_CELLS = 60  # cells that get a trial; of more, every n-th
+MOST_CELLS = 60  # cells that get a trial; if there are more, every n-th one does
 MOST_TRIALS = 8  # per cell, if there are several cells
 ENOUGH_TRIALS = 40  # for a few cells together
 LEAST_SHARE = 0.25  # least simulated share of a run in a trial: the start is not typical

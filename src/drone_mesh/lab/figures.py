@@ -91,7 +91,7 @@ def _axis_drawing(results: Results, axis: str, series: str | None) -> Drawing:
         )
         caption += f" Drawn for {held}; the tables have all cells."
     if any(_is_censored(metric) for metric in metrics):
-        caption += " Times to heal are of the runs that healed; compare the share healed as well."
+        caption += " Times to heal include only runs that healed; compare the share healed as well."
     return Drawing(f"axis_{_file_name(axis)}", f"Over {results.axis_names[axis]}", caption, figure)
 
 

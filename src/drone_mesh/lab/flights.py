@@ -11,7 +11,7 @@ from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, DESCENT_STARTS_AT, Fligh
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 
-EVENTS_BACK = 20  # a flight's event is among this many latest ones when it starts
+EVENTS_BACK = 20  # when a flight starts, its event is among this many latest ones
 
 
 @dataclass

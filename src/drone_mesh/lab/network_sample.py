@@ -24,8 +24,11 @@ class NetworkSample:
 
 
 def sample_of(network: Network) -> NetworkSample:
-    """A router is served while it considers itself connected and the chain of next hops leads to
-    a gateway over links that exist now: a stale route does not count."""
+    """Observe the network now. A stale route does not count as service.
+
+    A router is served while it considers itself connected and its chain of next hops leads to a
+    gateway over links that exist now.
+    """
     nodes = network.nodes
     leads = {n: node.antenna.powered for n, node in nodes.items() if node.is_gateway}
     alive = []

@@ -62,7 +62,7 @@ def _bootstrap(values: Sequence[float], statistic: Callable[..., float]) -> Inte
         return Interval(value, value, value, n, "all runs are equal")
     for method in ("BCa", "percentile"):
         with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # scipy warns of what the loop deals with
+            warnings.simplefilter("ignore")  # scipy warns about cases that the loop handles
             found = stats.bootstrap(
                 (np.asarray(values, float),),
                 statistic,

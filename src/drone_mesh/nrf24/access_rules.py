@@ -20,18 +20,18 @@ class AccessRules:
     gap_s: float  # mean distance between two packets of one node
     train: int  # users' packets without a gap between them, at most
     train_retransmits: int  # by the chip, of a packet that follows another one in a train
-    train_pause_s: float  # a train that was not heard for so long is over
-    train_gap_s: float  # least distance between two trains of one node: an answer fits in
-    train_hold_s: float  # if its end is announced: it was interrupted, and goes on within that time
-    most_yield_s: float  # wait for the end of trains at most so long
-    most_hold_s: float  # and if their end is announced
+    train_pause_s: float  # a train that was not heard for this time is over
+    train_gap_s: float  # least time between two trains of one node, enough for an answer
+    train_hold_s: float  # as train_pause_s, for a train whose sender announces its end
+    most_yield_s: float  # longest wait for the end of others' trains
+    most_hold_s: float  # as most_yield_s, if their end is announced
     broadcast_jitter_s: float  # a broadcast waits for a random part of this
-    answer_jitter_s: float  # as does whatever is sent within that time after a broadcast was heard
-    lifetime_s: float  # a packet that waited for so long is of no use to anyone
-    queue_length: int  # packets that may wait, in all
+    answer_jitter_s: float  # so does any packet within this time after a broadcast was heard
+    lifetime_s: float  # a packet that waited for this time is no longer useful
+    queue_length: int  # packets that may wait, in total
     data_queue_length: int  # of these: users' packets
-    most_patience: float  # check periods without probes on a busy channel
-    busy_at: float  # share of first tries that fail from which on a channel counts as busy
+    most_patience: float  # check periods without probes on a busy channel, at most
+    busy_at: float  # share of failed first tries above which a channel counts as busy
 
     @classmethod
     def for_cycle(cls, cycle_s: float) -> AccessRules:

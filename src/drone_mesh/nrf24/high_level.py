@@ -55,7 +55,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         runtime: Runtime | None = None,
         on_payload: Callable[[bytes], None] | None = None,
     ) -> None:
-        """`on_payload` is shown each payload as the mesh gets it, in the receiving thread."""
+        """`on_payload` is called with each payload as the mesh gets it, in the receiving thread."""
         self._radio = radio
         self._submit = submit
         self._inbox = PacketInbox(submit)
@@ -67,7 +67,7 @@ class NRF24HighLevelInterface(IWirelessCommunication):
         self._on_payload = on_payload
         self._mesh: IMeshNetwork | None = None
         self._receiving: Task | None = None
-        self._ending = False  # the receiving thread shall end
+        self._ending = False  # the receiving thread must end
         self._info: IMeshDebugInfo | None = None
         self._powered = False
         self._silent = False  # set by any thread

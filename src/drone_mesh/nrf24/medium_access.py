@@ -48,7 +48,7 @@ class Fate(enum.Enum):
 
 _LEARNING = 0.1  # weight of the latest first try in the estimate of contention
 _MOST_CONTENTION = 0.9
-_STILL_THERE_S = 5.0  # our choice: a node that was heard so lately is believed to be there
+_STILL_THERE_S = 5.0  # our choice: a node that was heard within this time is considered present
 
 
 class MediumAccess:
@@ -185,7 +185,7 @@ class MediumAccess:
 
     @property
     def patience(self) -> float:
-        """For how many check periods the mesh should not probe again what works.
+        """For how many check periods the mesh should not probe routes that work.
 
         0 on a quiet channel, and more as the node's own tries fail more often.
         """

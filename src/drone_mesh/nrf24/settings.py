@@ -148,8 +148,7 @@ class RadioSettings:
         return _LISTENING_PIPES
 
     def registers(self, node_id: int) -> dict[Register, bytes]:
-        """Every register that the driver depends on, except CONFIG, because no reset clears the
-        chip.
+        """Every register that the driver depends on, except CONFIG: the chip has no reset.
 
         Pipe 0 is opened for acknowledgements while sending; pipes 3 to 5 are never opened.
         """

@@ -162,10 +162,9 @@ class Transceiver:
         self._last_sent[address] = (pid, payload)
 
     def transmit(self) -> int | None:
-        """Send the loaded payload to a node; returns the chip's retransmits, None if not
-        acknowledged.
+        """Send the loaded payload to a node; returns the number of the chip's retransmits.
 
-        In that case it stays in the chip for another try.
+        None: it was not acknowledged, and stays in the chip for another try.
         """
         flags = self._pulse(self._settings.acknowledged_s)
         retransmits = ARC_CNT.get(self._link.read_byte(Register.OBSERVE_TX))

@@ -49,7 +49,7 @@ def timeline_figure(story: RunStory) -> str:
 
 
 def with_gaps(values: Iterable[float | None]) -> list[float]:
-    """The values of a line, with NaN in place of None: there matplotlib leaves a gap."""
+    """The values of a line, with NaN in place of None, where matplotlib leaves a gap."""
     return [math.nan if value is None else value for value in values]
 
 

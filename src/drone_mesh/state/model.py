@@ -106,7 +106,7 @@ class MeshStatus:
     routing: str = ""  # name of the routing technique; empty: not known
     repair_strategy: str = ""  # name of the repair strategy; empty: not known
     obstacles: Sequence[ObstacleStatus] = ()
-    shape: str = ""  # what a drone is drawn as: a value of view.picture.Shape; empty: the default
+    shape: str = ""  # how drones are drawn: a value of view.picture.Shape; empty: the default
 
 
 def channel_in_words(node: NodeStatus) -> str:

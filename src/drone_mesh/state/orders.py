@@ -84,7 +84,7 @@ class OrderWatch:
         return ticket
 
     def forget_expected(self, ticket: int) -> None:
-        """No event of this order is expected any more: it was refused, or events stay away."""
+        """No event of this order is expected any more: it was refused, or no event came."""
         self._expected = {
             drone: other for drone, other in self._expected.items() if other != ticket
         }

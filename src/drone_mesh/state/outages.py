@@ -43,7 +43,7 @@ class Outage:
 def find_outages(events: Iterable[EventRecord]) -> list[Outage]:
     """All periods in which a node was without a gateway, in order of loss.
 
-    A flight on orders counts as well: the node is without a gateway until it has landed.
+    A flight by order counts as well: the node is without a gateway until it has landed.
     """
     done: list[Outage] = []
     open_of: dict[int, Outage] = {}

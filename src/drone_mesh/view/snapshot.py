@@ -27,7 +27,7 @@ from drone_mesh.view.sketch import OVERSAMPLING, Sketch
 
 DEFAULT_SIZE = (1280, 800)  # pixels
 LEGEND_WIDTH = 168  # pixels
-NARROWEST_WITH_LEGEND = 500  # pixels; a narrower picture is all map
+NARROWEST_WITH_LEGEND = 500  # pixels; narrower pictures have no legend
 DRONE_PIXELS = 36  # approximate width of a drone
 SMALLEST_ID, LARGEST_ID = 9.0, 15.0  # pixels: height of the text
 MARGINS = Margins(left=64, top=56, right=24, bottom=56)  # pixels

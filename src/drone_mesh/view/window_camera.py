@@ -30,7 +30,7 @@ class WindowCamera:
             self._aim(frame(self.now, points, MARGINS))
 
     def take_over(self) -> bool:
-        """Adopt the window's size and the view set with the mouse; whether anything changed."""
+        """Adopt the window's size and the view set with the mouse; True if anything changed."""
         seen = pybullet.getDebugVisualizerCamera(physicsClientId=self._client)
         (width, height), projection = seen[:2], seen[3]
         yaw_deg, pitch_deg, distance_m, target = seen[8:12]

@@ -36,7 +36,7 @@ class WindowItems:
         self._shape = Shape.QUADROCOPTER
         self._bodies = Bodies(client, self._shape)
         self._drones: dict[int, tuple[int, DronePicture]] = {}
-        self._turned = 0  # counts on, over the drones in flight
+        self._turned = 0  # drones turned so far, to continue with the next ones
         self._ids: dict[int, _Item] = {}
         self._obstacles: list[tuple[int, ObstacleStatus]] = []
         self._lines: dict[Line, _Item] = {}
@@ -122,7 +122,7 @@ class WindowItems:
     def _turn_rotors(self) -> None:
         """Turn the rotors of the next few drones in flight.
 
-        While simulated time stands still, no new scene comes, and nothing turns.
+        They stop while simulated time does, because then no new scene arrives.
         """
         flying = [shown for _, shown in sorted(self._drones.items()) if shown[1].is_flying]
         now_s = time.monotonic()

@@ -124,7 +124,9 @@ class DynamicEngine(DroneEngine):
             return
         path = self._plan(position, goal.to_vector(), now_s)
         if path is None:
-            _log.warning("box %d stays: obstacles leave no way to %s", self._box, goal.in_words())
+            _log.warning(
+                "box %d stays: no path past the obstacles to %s", self._box, goal.in_words()
+            )
             return
         # As high as a kinematic drone would fly.
         across_m = max(path.above_start[2], path.above_goal[2])

@@ -6,7 +6,7 @@ import logging
 from collections import deque
 from typing import Callable, NamedTuple
 
-from drone_mesh.air.obstacles import NO_WAY
+from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
@@ -116,12 +116,12 @@ class DroneEngine(IDroneEngine):
         check_goal(latitude, longitude, height)
         goal = Location(latitude, longitude, height + self._half_height_m).to_vector()
         if self._plan(self._state.position, goal, self._world.now_s) is None:
-            raise GoalRefused(f"{NO_WAY}: x {longitude:g} m, y {latitude:g} m, z {height:g} m")
+            raise GoalRefused(f"{NO_PATH}: x {longitude:g} m, y {latitude:g} m, z {height:g} m")
         self._goals.append(goal)
         self._world.wake(self)
 
     def follow(self, centre: Vector) -> None:
-        """From the next step on, be at this position: another node flies the drone. Any thread."""
+        """Be at this position from the next step on; another node flies the drone. Any thread."""
         self._followed = centre
         self._world.wake(self)
 
@@ -165,7 +165,7 @@ class DroneEngine(IDroneEngine):
             return
         path = self._plan(position, goal, now_s)
         if path is None:  # it has moved since the goal was accepted
-            _log.warning("box %d stays: obstacles leave no way to %s", self._box, goal)
+            _log.warning("box %d stays: no path past the obstacles to %s", self._box, goal)
             return
         self._state = DroneState(position, path, now_s)
         _log.debug("box %d flies from %s to %s", self._box, position, goal)

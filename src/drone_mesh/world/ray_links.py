@@ -59,7 +59,7 @@ class RayLinks:
     def _loss_db(
         self, entered: dict[int, float], left: dict[int, float], distance_m: float
     ) -> float:
-        """From the fractions of the ray at which it enters each body, cast from either end."""
+        """The attenuation. `entered`, `left`: where the ray enters bodies, cast from either end."""
         crossed = sorted({*entered, *left})
         if self._obstacles.blocks:
             return math.inf if crossed else 0.0

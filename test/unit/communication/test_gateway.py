@@ -124,7 +124,7 @@ def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(caplog):
     with caplog.at_level(logging.INFO):
         assert not rig.mesh.send_goal_request_to_drone(77, 0.0, 0.0, 0, rig.now_s)
     assert [record.getMessage() for record in caplog.records] == [
-        "gateway 1: no route to drone 77, it stays"
+        "gateway 1: no route to drone 77: it stays where it is"
     ]
     assert rig.tried() == []
     assert (rig.events[-1].kind.name, rig.events[-1].peer) == ("NO_ROUTE", 77)
@@ -164,8 +164,8 @@ def test_an_order_for_its_own_drone_is_flown_and_the_landing_reported():
         ((5, 0.0, 0.0, 501), r"height 501 m is outside 0\.\.500 m"),
         ((5, 0.0, 0.0, -1), r"height -1 m is outside"),
         ((1, 0.0, 0.0, -1), r"height -1 m is outside"),
-        ((5, 0.0, 0.0, 2.5), r"height 2\.5 m: an order gives whole metres"),
-        ((1, 0.0, 0.0, 2.5), r"height 2\.5 m: an order gives whole metres"),
+        ((5, 0.0, 0.0, 2.5), r"invalid height 2\.5 m: must be in whole metres"),
+        ((1, 0.0, 0.0, 2.5), r"invalid height 2\.5 m: must be in whole metres"),
     ],
 )
 def test_what_is_no_order_is_refused_with_the_reason(order, why):

@@ -107,5 +107,5 @@ def test_a_drone_whose_goal_is_inside_an_obstacle_refuses_and_stays():
     network.run_for(0.5)
     ((drone, state, reason),) = ends(network)
     assert (drone, state) == (3, "refused")
-    assert "obstacles leave no way" in reason
+    assert "no path past the obstacles" in reason
     assert network.nodes[3].drone.path is None

@@ -9,7 +9,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.parts import NodeParts
 
-REMEMBERED_S = 5.0  # our choice: 256 messages to all need longer, so no number comes twice
+REMEMBERED_S = 5.0  # our choice: sending 256 messages takes longer, so no number recurs
 MOST_REMEMBERED = 1024  # messages of all senders together
 
 
@@ -50,7 +50,7 @@ class SeenFragments:
         """Whether this fragment is new; records it."""
         key = (sender, number)
         indices, first_s = self._seen.get(key, (0, now_s))
-        if now_s - first_s >= REMEMBERED_S:  # the number is that of another message by now
+        if now_s - first_s >= REMEMBERED_S:  # the number now belongs to another message
             indices, first_s = 0, now_s
         if indices >> index & 1:
             return False

@@ -9,7 +9,7 @@ _HALF = 1 << 15
 
 
 def ahead(order: int, of: int) -> int:
-    """By how many places `order` is ahead of another one; negative: behind (RFC 1982)."""
+    """How many places `order` is ahead of the place `of`; negative: behind it (RFC 1982)."""
     return (order - of + _HALF) % (1 << 16) - _HALF
 
 
@@ -20,7 +20,7 @@ class PortOrder:
     """
 
     def __init__(self) -> None:
-        self._next: int | None = None  # the place that comes next
+        self._next: int | None = None  # the place of the message to deliver next
         self._held: dict[int, tuple[Whole, float]] = {}  # complete, but earlier ones are missing
 
     def take(self, whole: Whole, now_s: float) -> list[Whole]:
@@ -28,7 +28,7 @@ class PortOrder:
         order = whole.head.order
         if not whole.head.reliable:
             if self._next is not None and ahead(order, self._next) < 0:
-                return []  # it comes late, or for the second time
+                return []  # it is late, or a duplicate
             self._next = (order + 1) & 0xFFFF
             return [whole]
         oldest = (order - whole.head.behind) & 0xFFFF
@@ -53,7 +53,10 @@ class PortOrder:
         return bool(self._held)
 
     def _ready_up_to(self, oldest: int) -> list[Whole]:
-        """What is complete before `oldest`, which no longer waits, and without a gap from there."""
+        """The held messages before `oldest`, and those from there up to the first gap.
+
+        Messages before `oldest` that are missing can no longer arrive.
+        """
         ready = []
         place = self._next if self._next is not None else oldest
         while ahead(oldest, place) > 0 or place in self._held:

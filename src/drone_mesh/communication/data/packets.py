@@ -16,9 +16,9 @@ from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RE
 from drone_mesh.errors import MessageRefused, PacketError
 
 MAX_MESSAGE_BYTES = 1024
-SEAL_BYTES = 6  # behind the payload of a message in a mesh with a key
+SEAL_BYTES = 6  # after the payload of a message in a mesh with a key
 FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
-ACK = 192  # what its creator has of a message
+ACK = 192  # the fragments of a message that its creator has
 POLL = 193  # asks for an ACK, and ends a train
 NO_ANSWER = 0  # nonce of a POLL that only ends a train
 ECHO = ROUTE_RECORD  # asks for an ECHO_ANSWER; each node that forwards it adds its id
@@ -54,7 +54,7 @@ class Head(NamedTuple):
     port: int  # 0..255
     length: int  # bytes of the whole payload
     reliable: bool
-    behind: int  # so many places back in the order is the oldest message that may still come
+    behind: int  # distance in the order back to the oldest message that may still arrive
     order: int  # 0..65535: place among the messages of this port and this kind of delivery
     checksum: int  # of the whole message
 
@@ -79,7 +79,7 @@ class Poll(NamedTuple):
     """Requests an ACK for a message."""
 
     session: int
-    nonce: int  # another one each time, 1..255: no two have the same bytes; or NO_ANSWER
+    nonce: int  # 1..255, different each time, so that no two have the same bytes; or NO_ANSWER
     number: int
 
 
@@ -93,7 +93,7 @@ def place_of(session: int, port: int, order: int) -> bytes:
 
 
 def checksum(session: int, port: int, order: int, payload: bytes) -> int:
-    """CRC-16/CCITT over a message behind its place and length."""
+    """CRC-16/CCITT over the place, the length and the payload of a message."""
     made = place_of(session, port, order) + _LENGTH.pack(len(payload)) + payload
     return binascii.crc_hqx(made, 0xFFFF)
 
@@ -158,7 +158,7 @@ def poll_of(body: bytes) -> Poll:
     return Poll(*_POLL.unpack_from(body))
 
 
-# The ids of the nodes that forward an ECHO are behind this: their number, then one byte each.
+# Offset in the body of an ECHO: the number of nodes that forwarded it, then one id byte for each.
 _ROUTE_AT = ROUTE_RECORD_AT - (32 - BODY_BYTES)
 
 

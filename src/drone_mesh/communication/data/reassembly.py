@@ -14,7 +14,7 @@ _LIVE = 64  # numbers: older messages are no longer under way
 
 
 Open = Callable[[bytes, bytes], Optional[bytes]]
-"""From the place and the bytes of a message to its content; None: not authentic."""
+"""Turns the place and the sealed bytes of a message into its content; None: not authentic."""
 
 
 def open_plain(_place: bytes, sealed: bytes) -> bytes:
@@ -59,7 +59,7 @@ class Reassembly:
         if index == 0:
             head = packets.head_of(body)
             if partial.head is not None and partial.head.fingerprint != head.fingerprint:
-                partial = self._begin(number)  # the number is that of another message by now
+                partial = self._begin(number)  # the number now belongs to another message
                 partial.touched_s = now_s
             partial.head = head
         partial.bodies[index] = body

@@ -76,7 +76,7 @@ class GatewayRoutes(ChildTableTree):
         return super().gateway_lost(gateway)
 
     def node_moved_location(self) -> None:
-        """Forget everything except the time-out of old entries."""
+        """Forget the neighbours and the routes through them, but not the sequence numbers."""
         for child in self.get_set_of_children():
             self.forget_neighbour(child)
         super().node_moved_location()

@@ -84,7 +84,7 @@ class Commander:
             self._tries, self._refusal, self._try_due_s = 0, "", now_s
         if not self._refusal and now_s >= self._try_due_s:
             if self._tries == COMMAND_TRIES:
-                self._refusal = "the autopilot did not do it"
+                self._refusal = "the autopilot did not carry it out"
             else:
                 self._tries += 1
                 self._try_due_s = now_s + COMMAND_PERIOD_S

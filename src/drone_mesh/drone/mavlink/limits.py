@@ -40,7 +40,7 @@ class FlightLimits:
                 raise ConfigurationError(f"{name} {value:g} is outside {lowest:g}..{highest:g}")
 
     def layer_height_m(self, node_id: int) -> float:
-        """The height at which this node crosses: its own layer, as far as there are enough."""
+        """The height at which this node flies across: its own layer, if there are enough layers."""
         if self.layer_m == 0.0:
             return self.cruise_height_m
         room_m = self.max_height_m - self.cruise_height_m

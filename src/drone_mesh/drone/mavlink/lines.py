@@ -15,7 +15,7 @@ MOST_BYTES = 4096  # of one reading
 
 
 class Line(Protocol):
-    """A connection for bytes. Any function raises OSError when it has broken."""
+    """A connection for bytes. Any function raises OSError when the connection is broken."""
 
     def receive(self, timeout_s: float) -> bytes:
         """Wait up to this time for data; returns as soon as there is some."""
@@ -54,7 +54,7 @@ class SerialLine:
 
 
 class UdpLine:
-    """UDP: with `listens` the address is ours and any peer may begin, else it is the peer's."""
+    """UDP: with `listens` the address is local and any peer may begin, else it is the peer's."""
 
     def __init__(self, host: str, port: int, listens: bool) -> None:
         """Raises OSError for an address that is not available."""

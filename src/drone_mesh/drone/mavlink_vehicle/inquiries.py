@@ -13,7 +13,7 @@ from drone_mesh.drone.mavlink_vehicle.reports import Reports
 
 
 class Inquiries:
-    """Answers them through `send`."""
+    """Answers these requests through `send`."""
 
     def __init__(
         self,

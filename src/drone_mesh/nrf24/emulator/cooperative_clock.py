@@ -52,8 +52,8 @@ class _VirtualTask(Task):
         self._clock = clock
         self._run = run
         self.ended = clock.signal()
-        # The depth of a stack counts from where it is first entered. Entered here, it stays low;
-        # entered wherever its turn comes, the depths of all tasks would add up.
+        # The depth of a stack counts from where it is first entered. So enter it here, where the
+        # depth is low: entered when their turns come, the depths of all tasks would add up.
         self.turn.stack.switch(greenlet.getcurrent())
 
     def join(self) -> None:

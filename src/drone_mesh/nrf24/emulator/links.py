@@ -153,11 +153,12 @@ class LossCurve(LinkModel):
 
     The measurements are the share of packets that were lost after 16 frames, and the duration of a
     packet. Independent losses cannot explain both: they would have to be so frequent that every
-    packet took long. So there are two kinds here. A link fails for `BURST_S` at a time, as often as
-    packets were lost: that loses all frames of a transaction of the chip, and a retry after a pause
-    meets a new state of the link. Between the bursts, single frames are lost as often as the bursts
-    leave packet durations unexplained. Acknowledgements of received packets are not lost. Beyond
-    the last distance nothing was measured and nothing arrives; below the first, its shares apply.
+    packet took long. So there are two kinds of loss here. A link fails for `BURST_S` at a time, as
+    often as packets were lost: such a burst loses all frames of one transaction of the chip, and a
+    retry after a pause meets a new state of the link. Between the bursts, single frames are lost,
+    just often enough to explain the rest of the measured durations. Acknowledgements of received
+    packets are not lost. Beyond the last distance nothing was measured and nothing arrives; below
+    the first, its shares apply.
     """
 
     BURST_S = 0.05  # our choice: just longer than 16 frames at 250 kbit/s

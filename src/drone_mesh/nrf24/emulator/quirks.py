@@ -29,4 +29,4 @@ class ChipFaults:
     irq_stuck_at: bool | None = None  # level of the pin
     dead_transmitter: bool = False
     dead_receiver: bool = False
-    next_width: int | None = None  # R_RX_PL_WID, once: as of a broken frame that passed the CRC
+    next_width: int | None = None  # R_RX_PL_WID, once: as for a broken frame that passed the CRC

@@ -101,7 +101,7 @@ class RegisterBank:
         self.dynamic_lengths = bool(feature & EN_DPL.mask)
         self.ack_payloads = bool(feature & EN_ACK_PAY.mask)
         self.dynamic_ack = bool(feature & EN_DYN_ACK.mask)
-        # SETUP_AW 0 is called illegal; silicon works with 2 bytes then.
+        # The datasheet calls SETUP_AW 0 illegal; silicon then uses 2 bytes.
         self.address_bytes = AW.get(self._byte(Register.SETUP_AW)) + 2
         self._derive_formats()
         self._derive_pipes()

@@ -64,7 +64,7 @@ class RemoteChip:
                 raise
 
     def wait_irq(self, timeout_s: float) -> bool:
-        """Wait for IRQ low, at most this long or a second; whether it is. Raises OSError."""
+        """Wait until IRQ is low, at most this long or a second. Whether it is. Raises OSError."""
         with self._irq_lock:
             if self._closed:
                 raise ConnectionError("this chip was released")

@@ -9,7 +9,7 @@ from typing import Callable
 
 import rospy
 
-from drone_mesh.air.obstacles import NO_WAY, Obstacles
+from drone_mesh.air.obstacles import NO_PATH, Obstacles
 from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.interfaces import IDroneEngine, Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
@@ -86,7 +86,7 @@ class RosDroneEngineConnector(IDroneEngine):
         except LocationUnknown:
             return
         if obstacles.plan_flight(start, goal.to_vector(), 0.0, SPEED_M_S) is None:
-            raise GoalRefused(NO_WAY)
+            raise GoalRefused(NO_PATH)
 
     def get_location(self) -> Location:
         """The position that the engine reports. Raises LocationUnknown if it does not answer."""

@@ -35,7 +35,7 @@ def test_what_a_gateway_makes_is_believed_once(pair, made):
     gateway, drone = pair
     sealed = relayed(gateway.seal(made, 0.0))
     assert drone.open(sealed) == relayed(made)
-    with pytest.raises(NotProven, match="came before"):
+    with pytest.raises(NotProven, match="replayed"):
         drone.open(sealed)
 
 
