@@ -258,14 +258,14 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         if unopened.count < FOREIGN_PACKETS or now_s - unopened.since_s < FOREIGN_AFTER_S:
             return
         if self._seal.knows(from_, now_s):
-            reason = f"packets that node {from_} did not send now: replayed or forged"
+            reason = f"replayed or forged packets in the name of node {from_}"
             self.complaints.add(reason, payload.hex(), now_s)
         elif payload[SEAL_AT:] == _NO_SEAL:
             reason = f"a neighbour, node {from_}, sends packets without a seal: it has no key"
             self.complaints.foreign(reason, payload, now_s)
         else:
             reason = (
-                f"a neighbour, node {from_}, sends packets that this key does not open: "
-                "other mesh or other key?"
+                f"a neighbour, node {from_}, sends packets that this node's key does not open: "
+                "another mesh or another key?"
             )
             self.complaints.foreign(reason, payload, now_s)

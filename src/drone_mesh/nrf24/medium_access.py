@@ -69,8 +69,8 @@ class MediumAccess:
         self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
         self._heard_s: dict[int, float] = {}
         self._counts = {"sent": 0, "acknowledged": 0, "lost": 0, "tries": 0, "broadcasts": 0}
-        # Share of first tries that failed lately, 0 to _MOST_CONTENTION. A receiver that is gone
-        # says nothing about the channel, so what it let fail does not count.
+        # Share of first tries that failed recently, 0 to _MOST_CONTENTION. Tries to reach a
+        # receiver that is gone do not count, because they say nothing about the channel.
         self.contention = 0.0
 
     def __len__(self) -> int:
@@ -151,7 +151,7 @@ class MediumAccess:
         gap_s = rules.gap_s / (1.0 - self.contention)
         self._free_s = now_s + 2.0 * self._rng.random() * gap_s
         if packet.priority is Priority.DATA and receiver != ALL_NODES:
-            # After a success the receiver may answer, and after a failure no answer waits.
+            # After a success leave time for an answer; after a failure there will be none.
             pause_s = rules.train_gap_s if acknowledged else rules.train_pause_s
             self._free_s = now_s + pause_s + self._rng.random() * gap_s
         counts = self._counts
@@ -205,7 +205,7 @@ class MediumAccess:
         return self.rules.train_retransmits, self.rules.retransmit_delays[0]
 
     def clear(self) -> None:
-        """Give up all that waits."""
+        """Give up all waiting packets."""
         self._queue.clear()
 
     def _learn(self, first_try_failed: bool) -> None:

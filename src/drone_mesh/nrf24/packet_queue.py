@@ -62,7 +62,7 @@ class PacketQueue:
         """Remove a packet, if it is still there."""
         line = self._lines.get(packet.receiver)
         if line is None or packet not in line:
-            return  # all was given up meanwhile
+            return  # all packets were given up meanwhile
         line.remove(packet)
         self._length -= 1
         self.data -= packet.priority is Priority.DATA
@@ -75,7 +75,7 @@ class PacketQueue:
         self._length = self.data = 0
 
     def hurry(self, receiver: int, now_s: float) -> None:
-        """Let the first packet for this receiver wait no longer than until now."""
+        """End the wait of the first packet for this receiver."""
         line = self._lines.get(receiver)
         if line is not None:
             line[0].not_before_s = min(line[0].not_before_s, now_s)
@@ -85,7 +85,7 @@ class PacketQueue:
         return min((line[0].not_before_s for line in self._lines.values()), default=math.inf)
 
     def ready(self, now_s: float) -> list[OutgoingPacket]:
-        """The first packets of all lines, as far as they may be tried now."""
+        """The first packets of all lines that may be tried now."""
         return [line[0] for line in self._lines.values() if line[0].not_before_s <= now_s]
 
     def after(self, packet: OutgoingPacket) -> OutgoingPacket | None:

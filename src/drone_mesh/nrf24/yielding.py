@@ -27,7 +27,7 @@ class Yielding:
         self._since_s = -math.inf
         self.until_s = -math.inf
         self._to = _NO_SENDER  # whose train is under way
-        self._enough = False  # it has waited for long enough: it is this node's turn
+        self._enough = False  # it has waited long enough, so it is this node's turn
 
     def heard(self, sender: int, train: InTrain, now_s: float, wants_to_send: bool) -> None:
         """A packet of a train came in: wait for the end of that train."""

@@ -18,7 +18,7 @@ class CongestionWindow:
         self._slow_start = True
 
     def grow(self, arrived: int) -> None:
-        """So many fragments have arrived."""
+        """This many fragments have arrived."""
         self.size += arrived if self._slow_start else arrived / self.size * 4
         self.size = min(self.size, float(MOST_SIZE))
 

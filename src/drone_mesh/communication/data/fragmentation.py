@@ -13,7 +13,7 @@ MOST_OPEN = 12  # messages on their way at once; at most MOST_BEHIND + 1
 NUMBER_SPAN = packets.DONE_BITS  # from the oldest to the newest open message
 
 Seal = Callable[[bytes, bytes], bytes]
-"""From the place and the payload of a message to the bytes to send."""
+"""Turns the place and the payload of a message into the bytes to send."""
 
 
 def leave_plain(_place: bytes, payload: bytes) -> bytes:
@@ -22,7 +22,7 @@ def leave_plain(_place: bytes, payload: bytes) -> bytes:
 
 
 class Fragmentation:
-    """Makes the fragments that the receiver's Reassembly puts together again."""
+    """Cuts messages into the fragments that the receiver's Reassembly joins again."""
 
     def __init__(
         self, session: int, room: int, seal: Seal, open_messages: Mapping[int, OutgoingMessage]
@@ -76,7 +76,7 @@ class Fragmentation:
         return packets.further_body(head.number, index, message.sealed, self._room)
 
     def _behind(self, ticket: Ticket, order: int) -> int:
-        """From a place in the order of this port back to its oldest open message."""
+        """The distance from a place in the order of this port back to its oldest open message."""
         behind = 0
         for message in self._open.values():
             head = message.head

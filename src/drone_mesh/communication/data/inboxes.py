@@ -16,7 +16,7 @@ from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.parts import NodeParts
 
 TIDY_PERIOD_S = 5.0  # our choice: how often old fragments are dropped
-MOST_INBOXES = 128  # senders whose messages are put together at once, the latest ones
+MOST_INBOXES = 128  # senders whose messages are reassembled at once, the latest ones
 
 OnArrived = Callable[[int, bool, Whole], None]
 """A message is complete: its sender, whether it was sent to all nodes, and the message."""

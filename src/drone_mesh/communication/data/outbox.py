@@ -3,8 +3,8 @@
 A message is cut into fragments. The receiver of a reliable one reports the fragments that it has in
 an ACK: when the message is complete, when its last fragment arrived but others are missing, and in
 answer to a POLL. Missing fragments are then sent again. The sender sends a POLL when no ACK arrives
-in time, and when the window is full; behind relays on a shared channel the train takes the place of
-the window (see Train), also for messages that are not reliable.
+in time, and when the window is full. If there are relays on a shared channel on the way, a train
+takes the place of the window (see Train), also for messages that are not reliable.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class Outbox:
                 if not message.ticket.reliable or in_flight < window:
                     return self._first_to_send(message)
                 if message.in_flight:
-                    return self._poll(message)  # what of it arrived?
+                    return self._poll(message)  # which fragments arrived?
         if in_flight < window and self._may_open():
             return self._opened()
         return None
@@ -192,7 +192,7 @@ class Outbox:
             train.over(arrived)
             for message in self._open.values():
                 if not message.ticket.reliable:
-                    message.sent &= message.known  # what is lost is not sent again
+                    message.sent &= message.known  # lost fragments are not sent again
         elif arrived and not train.waits:
             train.over(arrived)
 
@@ -271,7 +271,7 @@ class Outbox:
         return self._asking(self._latest)._replace(ends_train=True)
 
     def _mark_of_end(self, train: Train) -> DataPacket | None:
-        """For the relays, behind a train that is not full."""
+        """For the relays, after a train that is not full."""
         if not train.is_open:
             return None
         assert self._latest is not None

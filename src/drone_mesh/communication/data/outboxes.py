@@ -1,8 +1,8 @@
 """Outboxes: the messages from this node, and which of their packets leaves next.
 
 The outboxes of all destinations take turns. Packets are sent a few at a time, so that the mesh's
-own are handled in between. Messages for the gateway follow it: when the node has another one, they
-move to its outbox.
+own are handled in between. When the node gets another gateway, messages for the gateway move to the
+outbox of the new one.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Outboxes:
         for to, outbox in self._outboxes.items():
             outbox.expire(now_s, self._direction(to) != NO_ROUTE)
             due_s = outbox.due_s(now_s)
-            again_s = min(again_s, due_s if due_s > now_s else soon_s)  # it could not leave
+            again_s = min(again_s, due_s if due_s > now_s else soon_s)  # it could not be sent
         if self._for_gateway:
             again_s = min(again_s, now_s + ROUTE_PERIOD_S)
         return again_s

@@ -132,7 +132,7 @@ class Transport:
         return self._outboxes.unreachable(to)
 
     def hint(self) -> str:
-        """That a neighbour has another key or none, to be added to what went wrong; or empty."""
+        """Text to append to an error: that a neighbour has another key or none. Otherwise empty."""
         foreign = self._parts.antenna.foreign_neighbour()
         foreign = foreign or self._complaints.foreign_neighbour(self._parts.now_s)
         return f"; {foreign}" if foreign else ""
@@ -209,7 +209,7 @@ class Transport:
             raise QueueFull(f"the queue is full: {queued} messages wait or are on their way")
 
     def _is_authentic(self, ack: bytes, creator: int) -> bool:
-        """Whether an ACK comes from its creator; a relay could claim that."""
+        """Whether an ACK comes from its creator: a relay could forge one."""
         body = packets.untagged(ack)
         tag = self._parts.antenna.acknowledgement_tag(creator, self._parts.node_id, body)
         return hmac.compare_digest(tag, ack[len(body) : len(body) + len(tag)])

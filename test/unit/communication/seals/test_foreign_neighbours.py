@@ -19,7 +19,10 @@ def pair(key_of_router, key_of_gateway=KEY):
     return network
 
 
-OTHER = "a neighbour, node {}, sends packets that this key does not open: other mesh or other key?"
+OTHER = (
+    "a neighbour, node {}, sends packets that this node's key does not open: "
+    "another mesh or another key?"
+)
 
 
 @pytest.mark.parametrize(

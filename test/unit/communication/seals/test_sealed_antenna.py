@@ -111,8 +111,8 @@ def test_two_keys_are_two_meshes(caplog):
     network.run_for(60.0)
     assert [network.connected(node) for node in range(4)] == [True, True, False, False]
     assert (
-        "node 1: a neighbour, node 2, sends packets that this key does not open: "
-        "other mesh or other key?" in caplog.text
+        "node 1: a neighbour, node 2, sends packets that this node's key does not open: "
+        "another mesh or another key?" in caplog.text
     )
 
 
@@ -137,7 +137,7 @@ def test_replayed_packets_show_in_the_log(caplog):
     for _ in range(5):
         network.inject(1, heard[0])
         network.run_for(10.0)
-    assert "node 1: packets that node 0 did not send now: replayed or forged" in caplog.text
+    assert "node 1: replayed or forged packets in the name of node 0" in caplog.text
     assert network.all_connected()
 
 
@@ -217,4 +217,4 @@ def test_a_packet_that_comes_twice_now_and_then_is_not_reported_as_replayed(capl
     for _ in range(6):
         network.inject(1, record[-1].payload)
         network.run_for(10.0)
-    assert "node 0 did not send now: replayed or forged" in caplog.text
+    assert "replayed or forged packets in the name of node 0" in caplog.text
