@@ -59,7 +59,7 @@ def test_a_goal_in_or_against_a_box_is_refused_with_the_reason():
     world = StillWorld()
     drone, _ = fleet(world, TOWER)
     for x in (3.0, 3.6):
-        with pytest.raises(GoalRefused, match=r"no way there: x 3.* m, y 0 m, z 1 m"):
+        with pytest.raises(GoalRefused, match=r"no path past the obstacles: x 3.* m, y 0 m, z 1 m"):
             drone.engine.set_goal(0.0, x, 1)
     world.step()
     assert not drone.engine.state.is_flying
