@@ -18,7 +18,13 @@ from typing import Callable, NamedTuple
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import MAX_NODE_ID, PAYLOAD_BYTES
 from drone_mesh.communication.keys import Keys
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.messages import (
+    CREATOR_AT,
+    FORWARD_AT,
+    FROM_AT,
+    TYPE_AT,
+    MessageType,
+)
 from drone_mesh.communication.replay import ReplayWindow
 from drone_mesh.communication.seal import SEAL_AT, SEAL_BYTES
 from drone_mesh.errors import PacketError
@@ -37,7 +43,6 @@ _DIGEST_BYTES = 2  # the frame digest of a PRESENT, which moves in front of the 
 _DIGEST_AT = SEAL_AT - _DIGEST_BYTES
 _PRESENT_NONCE_AT = _DIGEST_AT - _NONCE_BYTES
 
-_CREATOR, _FROM, _TYPE, _FORWARD = 0, 1, 2, 4
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _REQUEST = int(MessageType.REQUESTLOCATION)
 _PRESENT = int(MessageType.PRESENT)
@@ -138,7 +143,7 @@ class EndToEnd:
 
     def seal(self, payload: bytes, now_s: float) -> bytes | None:
         """A packet of this node, sealed; None: its addressee has not announced a nonce yet."""
-        kind, forward = payload[_TYPE], payload[_FORWARD]
+        kind, forward = payload[TYPE_AT], payload[FORWARD_AT]
         if kind == _PRESENT:
             digest = payload[-_DIGEST_BYTES:]
             return _present_with_nonce(payload, self._nonces[0].value, digest)
@@ -191,14 +196,14 @@ class EndToEnd:
 
         Raises NotProven if it is not authentic.
         """
-        creator, kind = payload[_CREATOR], payload[_TYPE]
+        creator, kind = payload[CREATOR_AT], payload[TYPE_AT]
         if kind == _PRESENT:
             self._heard[creator] = _nonce_of_present(payload)[0]
             return _present_without_nonce(payload, payload[_DIGEST_AT:])
         if kind == _REQUEST:
             self._heard[creator] = _nonce_of(payload)[0]
             return _without_nonce(payload)
-        for_one = payload[_FORWARD] <= MAX_NODE_ID and creator <= MAX_NODE_ID
+        for_one = payload[FORWARD_AT] <= MAX_NODE_ID and creator <= MAX_NODE_ID
         if kind == _HEARTBEAT:
             if for_one and creator == messages.preferred_gateway(payload):
                 self._check(payload, _FORMS[kind])
@@ -211,13 +216,13 @@ class EndToEnd:
             return form.without_proof(payload)
         if kind in _PLACES and creator in self._gateways:
             raise NotProven("a gateway's place that any node could have broadcast")
-        if kind == _MISSING and creator != payload[_FROM] and not self._is_gateway:
+        if kind == _MISSING and creator != payload[FROM_AT] and not self._is_gateway:
             raise NotProven("a relayed MISSING")  # only sent to gateways, about orders
         return payload
 
     def _check(self, payload: bytes, form: _Form) -> None:
         """Raises NotProven unless the proof is valid."""
-        creator = payload[_CREATOR]
+        creator = payload[CREATOR_AT]
         node = self._node_id if form.by_authority else creator
         state = self._states[form].get(node) or self._state(form, node)
         assert state is not None, "a node has its own keys"
@@ -228,7 +233,7 @@ class EndToEnd:
                 if not _use(nonce.windows, creator, sequence):
                     raise NotProven("a replayed packet")
                 return
-        kind = payload[_TYPE]
+        kind = payload[TYPE_AT]
         if kind == _HEARTBEAT:
             raise NotProven("a heartbeat without the proof of a gateway")
         raise NotProven("an order without proof" if kind == _ORDER else "a packet without proof")

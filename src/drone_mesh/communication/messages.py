@@ -2,10 +2,11 @@
 
 docs/protocol.md, "Packets".
 
-Each class encodes and decodes its own bytes, and no other module knows an offset. The constructor
-arguments are those of the original encoder, in its order: creator, from, to, forward, then the
-body. Any byte value can be encoded and decoded; the receiving component decides whether an id is
-valid (docs/protocol.md, "Bad input").
+Each class encodes and decodes its own bytes. No other module defines an offset; the seals, which
+lie over packets of every type, use the places of the header bytes below. The constructor arguments
+are those of the original encoder, in its order: creator, from, to, forward, then the body. Any byte
+value can be encoded and decoded; the receiving component decides whether an id is valid
+(docs/protocol.md, "Bad input").
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import PacketError
 
-_CREATOR, _FROM, _TYPE, _TO, _FORWARD = range(5)  # offsets of the header bytes
+CREATOR_AT, FROM_AT, TYPE_AT, TO_AT, FORWARD_AT = range(5)  # offsets of the header bytes
 HEADER_BYTES = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
 _BYTE = tuple(bytes((value,)) for value in range(256))
@@ -299,7 +300,7 @@ class GatewayPlace(NamedTuple):
     def behind(self, payload: bytes) -> bytes:
         """The same packet with this extension after its body."""
         body = self._body()
-        at = _GATEWAY_PLACE_AT[payload[_TYPE]]
+        at = _GATEWAY_PLACE_AT[payload[TYPE_AT]]
         return payload[:at] + body + payload[at + len(body) :]
 
     def to_payload(self, creator: int, from_: int, to: int, forward: int) -> bytes:
@@ -314,7 +315,7 @@ class GatewayPlace(NamedTuple):
     @classmethod
     def from_payload(cls, payload: bytes) -> GatewayPlace | None:
         """The extension of such a packet; None if there is no valid one."""
-        at = _GATEWAY_PLACE_AT[payload[_TYPE]]
+        at = _GATEWAY_PLACE_AT[payload[TYPE_AT]]
         age, gateway, *place = _GATEWAY_PLACE.unpack_from(payload, at)
         if age == 0 or not all(map(math.isfinite, place)):
             return None
@@ -347,38 +348,38 @@ present_body: Callable[[bytes], tuple[int, bool]] = struct.Struct(
 ).unpack_from
 """The hops of the creator of a PRESENT to its gateway, and whether it knows one."""
 
-sender: Callable[[bytes], int] = operator.itemgetter(_FROM)
+sender: Callable[[bytes], int] = operator.itemgetter(FROM_AT)
 """The node that sends this hop."""
 
-receiver: Callable[[bytes], int] = operator.itemgetter(_TO)
+receiver: Callable[[bytes], int] = operator.itemgetter(TO_AT)
 """The node that this hop is for."""
 
-type_of: Callable[[bytes], int] = operator.itemgetter(_TYPE)
+type_of: Callable[[bytes], int] = operator.itemgetter(TYPE_AT)
 """The type of a packet; see MessageType."""
 
-addressee: Callable[[bytes], int] = operator.itemgetter(_FORWARD)
+addressee: Callable[[bytes], int] = operator.itemgetter(FORWARD_AT)
 """The final addressee of a packet, or BROADCAST."""
 
 
 def is_data(payload: bytes) -> bool:
     """Whether it is a packet of users' data, of any type."""
-    return payload[_TYPE] >= DATA_TYPES.start
+    return payload[TYPE_AT] >= DATA_TYPES.start
 
 
 def readdressed(payload: bytes, to: int) -> bytes:
     """The same packet with `to` as the receiver of this hop."""
-    return payload[:_TO] + _BYTE[to] + payload[_TO + 1 :]
+    return payload[:TO_AT] + _BYTE[to] + payload[TO_AT + 1 :]
 
 
 def copies_for(payload: bytes, receivers: Iterable[int]) -> list[bytes]:
     """For each of these nodes the same packet with it as the receiver of this hop."""
-    start, end = payload[:_TO], payload[_TO + 1 :]
+    start, end = payload[:TO_AT], payload[TO_AT + 1 :]
     return [start + _BYTE[to] + end for to in receivers]
 
 
 def addressed(payload: bytes, other: int) -> bytes:
     """The same packet for the neighbour `other`, as receiver of this hop and as addressee."""
-    return payload[:_TO] + _TWICE[other] + payload[_FORWARD + 1 :]
+    return payload[:TO_AT] + _TWICE[other] + payload[FORWARD_AT + 1 :]
 
 
 def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: bytes = b"") -> bytes:
@@ -410,10 +411,10 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
 
     None for a heartbeat that has reached MAX_HOPS.
     """
-    kind = payload[_TYPE]
+    kind = payload[TYPE_AT]
     forwarded = bytearray(payload)
-    forwarded[_FROM] = from_
-    forwarded[_TO] = to
+    forwarded[FROM_AT] = from_
+    forwarded[TO_AT] = to
     if kind == _HEARTBEAT:
         hops = payload[_HEARTBEAT_HOPS]
         if hops >= MAX_HOPS:
@@ -427,7 +428,7 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
 
 def hops(payload: bytes) -> int:
     """The hop count of a PRESENT or HEARTBEAT: to its gateway, or travelled so far."""
-    if payload[_TYPE] == _HEARTBEAT:
+    if payload[TYPE_AT] == _HEARTBEAT:
         return payload[_HEARTBEAT_HOPS]
     return payload[HEADER_BYTES]
 
@@ -438,7 +439,7 @@ EXTENSION_ROOM: Mapping[int, int] = {kind: len(part) for kind, part in _EXTENSIO
 
 def extension(payload: bytes) -> bytes:
     """The bytes after the body of a PRESENT or HEARTBEAT; zero if no technique uses them."""
-    part = _EXTENSIONS[payload[_TYPE]]
+    part = _EXTENSIONS[payload[TYPE_AT]]
     return payload[part.start : part.stop]
 
 
@@ -447,7 +448,7 @@ def extended(payload: bytes, extension: bytes) -> bytes:
 
     Raises PacketError if they do not fit.
     """
-    part = _EXTENSIONS[payload[_TYPE]]
+    part = _EXTENSIONS[payload[TYPE_AT]]
     at = part.start
     if len(extension) > len(part):
         raise PacketError(f"{len(extension)} extension bytes do not fit into {len(part)}")
@@ -483,14 +484,14 @@ def body(payload: bytes) -> bytes:
 
 def identity(payload: bytes) -> bytes:
     """The bytes that do not change while a packet is forwarded."""
-    if payload[_TYPE] == _HEARTBEAT:
-        return payload[:_FROM] + payload[_TYPE:_TO] + payload[_FORWARD:_HEARTBEAT_HOPS]
-    return payload[:_FROM] + payload[_TYPE:_TO] + payload[_FORWARD:]
+    if payload[TYPE_AT] == _HEARTBEAT:
+        return payload[:FROM_AT] + payload[TYPE_AT:TO_AT] + payload[FORWARD_AT:_HEARTBEAT_HOPS]
+    return payload[:FROM_AT] + payload[TYPE_AT:TO_AT] + payload[FORWARD_AT:]
 
 
 def is_finite(payload: bytes) -> bool:
     """Whether all floats of a packet are finite; its type is one of TYPES_WITH_NUMBERS."""
-    numbers = TYPES_WITH_NUMBERS[payload[_TYPE]].unpack_from(payload, HEADER_BYTES)
+    numbers = TYPES_WITH_NUMBERS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
     return all(map(math.isfinite, numbers))
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.keys import Keys
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.messages import FORWARD_AT, FROM_AT, TO_AT, MessageType
 from drone_mesh.communication.replay import ReplayWindow
 
 TAG_BYTES = 5
@@ -35,13 +35,12 @@ CHALLENGE_OUT_S = 0.5  # our choice: after that another node may take its slot
 _EPOCH_BITS, _NONCE_BITS = 64, 64
 _CHALLENGE = struct.Struct("<Q")  # nonce
 _ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
-_FROM, _TO, _FORWARD = 1, 3, 4
 _LOW_BYTES = 2**16 - 1  # of a counter: those in a packet
 
 # Each takes the whole packet (or all of it from `forward` on) and keeps only the bytes before its
 # seal: one call is cheaper than joining slices.
 _covered = struct.Struct(f"<I{SEAL_AT}s").pack  # counter, packet
-_covered_to_all = struct.Struct(f"<I{_TO}sB{SEAL_AT - _FORWARD}s").pack
+_covered_to_all = struct.Struct(f"<I{TO_AT}sB{SEAL_AT - FORWARD_AT}s").pack
 _sealed = struct.Struct(f"<{SEAL_AT}sH{TAG_BYTES}s").pack  # packet, counter, tag
 _unsealed = struct.Struct(f"{SEAL_AT}s{SEAL_BYTES}x").pack
 
@@ -93,27 +92,27 @@ class HopSeal:
         if self._count == LAST_COUNT:
             self._begin_epoch()
         self._count = count = self._count + 1
-        if payload[_FORWARD] == BROADCAST:  # `to` differs for each receiver
+        if payload[FORWARD_AT] == BROADCAST:  # `to` differs for each receiver
             tag = self._state_to_all.copy()
-            tag.update(_covered_to_all(count, payload, BROADCAST, payload[_FORWARD:]))
+            tag.update(_covered_to_all(count, payload, BROADCAST, payload[FORWARD_AT:]))
         else:
-            state = self._states.get(payload[_TO])
-            tag = (state or self._state_to(payload[_TO])).copy()
+            state = self._states.get(payload[TO_AT])
+            tag = (state or self._state_to(payload[TO_AT])).copy()
             tag.update(_covered(count, payload))
         return _sealed(payload, count & _LOW_BYTES, tag.digest())
 
     def open(self, payload: bytes, now_s: float) -> bytes | None:
         """The packet with zeros in place of its seal; None unless it is authentic and new."""
-        peer = self._peers.get(payload[_FROM])
+        peer = self._peers.get(payload[FROM_AT])
         if peer is None or now_s - peer.heard_s > self._fresh_s:
             return None
         window = peer.window
         count = window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8)
         if not 0 <= count <= LAST_COUNT:
             return None
-        if payload[_FORWARD] == BROADCAST:
+        if payload[FORWARD_AT] == BROADCAST:
             tag = peer.state_to_all.copy()
-            tag.update(_covered_to_all(count, payload, BROADCAST, payload[_FORWARD:]))
+            tag.update(_covered_to_all(count, payload, BROADCAST, payload[FORWARD_AT:]))
         else:
             tag = peer.state.copy()
             tag.update(_covered(count, payload))
@@ -209,7 +208,7 @@ class HopSeal:
     def _proof(self, packet: bytes, other: int) -> bytes:
         """Covers all but byte 3, which differs for each receiver of a broadcast challenge."""
         key = self._pair_key(other)
-        covered = packet[:_TO] + packet[_FORWARD:]
+        covered = packet[:TO_AT] + packet[FORWARD_AT:]
         tag = hashlib.blake2s(covered, key=key, digest_size=TAG_BYTES, person=b"epochs")
         return tag.digest()
 

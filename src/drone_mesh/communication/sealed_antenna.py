@@ -23,7 +23,7 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.keys import Keys
 from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.message_seal import MessageSeal
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TYPE_AT, MessageType
 from drone_mesh.communication.seal import SEAL_AT, SEAL_BYTES, HopSeal
 from drone_mesh.communication.timing import MeshTiming
 
@@ -121,7 +121,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def send_message_to(self, payload: bytes) -> bool:
         """As for every antenna; True also for a packet that its addressee could not verify yet."""
-        if payload[0] == self._node_id:
+        if payload[CREATOR_AT] == self._node_id:
             proven = self._proven(payload)
             if proven is None:
                 return True
@@ -139,7 +139,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def broadcast_message(self, payload: bytes) -> None:
         payload = self._end_to_end.seal(payload, self._clock()) or payload
-        if payload[2] == _PRESENT:
+        if payload[TYPE_AT] == _PRESENT:
             self._present = payload
         self._antenna.broadcast_message(self._seal.seal(payload))
 
@@ -151,12 +151,12 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def _proven(self, payload: bytes) -> bytes | None:
         """A packet with its end-to-end seal; None: its addressee could not verify it yet."""
-        if payload[0] != self._node_id or payload[SEAL_AT - 2] or payload[SEAL_AT - 1]:
+        if payload[CREATOR_AT] != self._node_id or payload[SEAL_AT - 2] or payload[SEAL_AT - 1]:
             return payload
         now_s = self._clock()
         proven = self._end_to_end.seal(payload, now_s)
         if proven is None:
-            detail = f"node {payload[4]} has not been heard by this node"
+            detail = f"node {payload[FORWARD_AT]} has not been heard by this node"
             self.complaints.add("not sent: no nonce of the addressee", detail, now_s)
         return proven
 
@@ -177,7 +177,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         if opened is None:
             self._not_opened(payload, now_s)
             return
-        forward = opened[4]
+        forward = opened[FORWARD_AT]
         if forward == self._node_id or forward == BROADCAST:
             try:
                 opened = self._end_to_end.open(opened)
@@ -192,7 +192,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
             self._mesh.on_delivered(neighbour, tries, now_s)
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
-        kind = payload[2]
+        kind = payload[TYPE_AT]
         if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, _PRESENT):
             self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, tries, now_s)
 
@@ -244,7 +244,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
 
     def _not_proven(self, reason: str, payload: bytes, now_s: float) -> None:
         """Copies, and packets for an old nonce, are normal; forged orders are not."""
-        if payload[2] == _ORDER:
+        if payload[TYPE_AT] == _ORDER:
             self.complaints.dropped(reason, payload, now_s)
         else:
             self.complaints.counts[f"dropped {reason}"] += 1

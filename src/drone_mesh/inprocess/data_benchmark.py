@@ -11,6 +11,7 @@ import random
 import sys
 from typing import NamedTuple, Sequence
 
+from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES, count_of
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage
@@ -21,7 +22,6 @@ from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import Hop, IdealDisc
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
-RANGE_M = 9.0
 SPACING_M = 6.0
 CONNECT_WITHIN_S = 120.0
 END_WITHIN_S = 600.0  # for all messages
@@ -70,7 +70,7 @@ def reuse_distance(settings: RadioSettings) -> int:
 
     def power_dbm(one: int, other: int) -> float:
         distance_m = SPACING_M * abs(one - other)
-        return IdealDisc(RANGE_M).received_dbm(distance_m, settings.power.value, 2400)
+        return IdealDisc(MAX_DISTANCE_M).received_dbm(distance_m, settings.power.value, 2400)
 
     def undisturbed(pair: tuple[int, int], others: tuple[int, int]) -> bool:
         return all(
@@ -107,7 +107,7 @@ def measure(case: DataCase, messages: int, seed: int) -> Throughput:
     settings = RadioSettings(data_rate=DATA_RATES[case.rate])
     rng = random.Random(f"{seed} loss")
     mesh = EmulatedMesh(
-        CooperativeClock(), LossyDisc(RANGE_M, case.loss, rng), seed, settings=settings
+        CooperativeClock(), LossyDisc(MAX_DISTANCE_M, case.loss, rng), seed, settings=settings
     )
     try:
         return _measured(mesh, case, messages, settings)

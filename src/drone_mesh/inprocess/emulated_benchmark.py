@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
@@ -27,7 +28,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         "grid, and prints how fast the emulation is.",
     )
     parser.add_argument(
-        "--nodes", type=int, default=17, help="number of nodes, 2..254 (default 17)"
+        "--nodes", type=int, default=17, help=f"number of nodes, 2..{MAX_DRONES} (default 17)"
     )
     parser.add_argument(
         "--spacing", type=float, default=6.0, help="spacing of the grid in metres (default 6)"
@@ -58,8 +59,8 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         "--trace", type=Path, help="write the last 100000 frames to this pcapng file"
     )
     arguments = parser.parse_args(argv)
-    if not 2 <= arguments.nodes <= 254:
-        parser.error("--nodes must be 2 to 254")
+    if not 2 <= arguments.nodes <= MAX_DRONES:
+        parser.error(f"--nodes must be 2 to {MAX_DRONES}")
     for name in ("spacing", "seconds"):
         if not getattr(arguments, name) > 0:
             parser.error(f"--{name} must be above 0")

@@ -162,7 +162,7 @@ class Network:
         if node_id in self.nodes:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
-        place = Location(y, x, 0.0)
+        place = Location.from_vector((x, y, 0.0))
         node = InProcessNode(self.clock, self.air, node_id, place, radio_rng, gateway, why_not_fly)
         self._install(node, node_id)
         self.nodes[node_id] = node

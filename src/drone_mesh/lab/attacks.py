@@ -16,6 +16,7 @@ from drone_mesh.communication.messages import (
     MessageType,
     MovementNegotiationMessage,
     header,
+    readdressed,
 )
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.lab.stranger import Stranger
@@ -197,6 +198,6 @@ def _replay(
     if through is None:
         stranger.play(1, first)
     else:
-        stranger.play(through, first[:3] + bytes((through,)) + first[4:])
+        stranger.play(through, readdressed(first, through))
     network.run_for(ATTACK_S)
     return {1: THERE}

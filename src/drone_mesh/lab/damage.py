@@ -9,6 +9,7 @@ from typing import AbstractSet, Iterator, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.keys import Keys, MeshKey
+from drone_mesh.communication.messages import present
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network
@@ -127,7 +128,7 @@ def keys_of(node_id: int) -> Keys | None:
 def _get_acquainted(stranger: Stranger) -> None:
     """A captured node becomes a neighbour of the others before it attacks."""
     me = stranger.node_id
-    stranger.antenna.broadcast_message(bytes((me, me, 3, 254, 254, 255, 0)).ljust(32, b"\0"))
+    stranger.antenna.broadcast_message(present(me, NO_ROUTE, know_gateway=False))
     stranger.network.run_for(12.0)
 
 

@@ -25,7 +25,7 @@ def without(points: Sequence[Point], dead: int) -> Places:
 
 def place(point: Point) -> Location:
     """A point (x, y) in metres, on the ground."""
-    return Location(point[1], point[0], 0.0)
+    return Location.from_vector((*point, 0.0))
 
 
 def cut_off(places: Places, range_m: float, root: int) -> frozenset[int]:

@@ -14,6 +14,7 @@ from pydantic import (
 from typing_extensions import Annotated, Literal
 
 from drone_mesh.air.obstacle_file import BoxRow
+from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.drone.fleet import MAX_DRONES
@@ -288,7 +289,7 @@ class Scenario(Part):
 
     model: Literal["mesh", "ideal"] = "mesh"
     layout: Layout = Layout()
-    range_m: Above0 = 9.0
+    range_m: Above0 = MAX_DISTANCE_M
     radio: Radio = Radio()
     routing: str = DEFAULT_ROUTING
     repair: str = DEFAULT_REPAIR

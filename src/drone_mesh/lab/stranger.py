@@ -79,7 +79,9 @@ class Stranger(IMeshNetwork):
         self.heard: list[bytes] = []  # packets to its own address
         self.swallows: set[int] = set()  # nodes that drop packets for other nodes
         self.on_packet: Callable[[bytes], None] = self.heard.append
-        drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda _started: None, "")
+        drone = InProcessDrone(
+            network.clock, Location.from_vector((x, y, 0.0)), lambda _started: None, ""
+        )
         self._receiver: IMeshNetwork = self
         self._is_inside = False
         self._air = air = network.air

@@ -6,7 +6,7 @@ import contextlib
 from typing import Callable, Iterator
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import IrqPin
@@ -165,5 +165,5 @@ def decoded(payload: bytes) -> str:
 _HEADER = ("creator", "from_", "to", "forward")
 
 
-def _probe(to: int = 254) -> bytes:
-    return bytes((253, 253, TEST_TYPE, to, to)).ljust(PAYLOAD_BYTES, b"\0")
+def _probe(to: int = BROADCAST) -> bytes:
+    return messages.packet(TEST_TYPE, MAX_NODE_ID, MAX_NODE_ID, to, to)

@@ -224,8 +224,7 @@ def _request_in(payload: bytes | None, me: int) -> _RateRequest | None:
 
 
 def _payload(from_: int, to: int, body: bytes = b"") -> bytes:
-    head = bytes((from_, from_, TEST_TYPE, to, to))
-    return (head + body).ljust(PAYLOAD_BYTES, b"\0")
+    return messages.packet(TEST_TYPE, from_, from_, to, to, body)
 
 
 def _kbit_s(settings: RadioSettings) -> str:

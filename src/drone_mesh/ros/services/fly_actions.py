@@ -182,7 +182,7 @@ class FlyActions:
             if node is None or not math.isfinite(node.position[0]):
                 raise _Refused(FlyResult.GIVEN_UP, "its place is not known")
             x, y, z = node.position
-            _order(flight.drone, Location(latitude=y, longitude=x, height=max(0.0, z)))
+            _order(flight.drone, Location.from_vector((x, y, max(0.0, z))))
             why = f"ordered to stop at x {x:.1f} m, y {y:.1f} m, z {max(0.0, z):.0f} m"
         except _Refused as refusal:
             why = f"the drone flies on: {refusal.args[1]}"
@@ -203,7 +203,7 @@ class FlyActions:
             node = self._nodes.get(flight.drone)
             if node is not None:
                 x, y, z = node.position
-                left_m = Location(y, x, z).distance_m(flight.goal)
+                left_m = Location.from_vector(node.position).distance_m(flight.goal)
                 word = flight.progress.state.value
                 flight.handle.publish_feedback(FlyFeedback(word, y, x, z, left_m))
 
