@@ -213,7 +213,7 @@ def test_a_drone_is_added_with_a_click_on_the_map_and_removed_again(page):
     page.page.mouse.click(*on_screen(page, 30.0, 14.0))  # a click selects again
     assert page.page.inner_text("#node-name") == "Router 18"
     page.page.click("#remove")
-    assert "Router 18 leaves the simulation" in page.page.inner_text("#confirm-text")
+    assert "Router 18 will be removed from the simulation" in page.page.inner_text("#confirm-text")
     page.page.click("#confirm >> text=Cancel")
     assert page.drawn("drones") == 19
     page.page.click("#remove")

@@ -22,9 +22,9 @@ const byId = (id) => document.getElementById(id);
 const mesh = new Mesh();
 const connection = new Connection(mesh);
 
-let undoLatest = null; // takes the latest order back, while its toast is shown
+let undoLatest = null; // undoes the latest order, while its toast is shown
 
-/** Shows a text for a moment; `undo` is called if the person asks for it meanwhile. */
+/** Shows a text briefly; with `undo`, a button beside it calls that function. */
 function toast(text, bad, undo) {
   const box = document.createElement("div");
   box.className = bad ? "toast bad" : "toast";
@@ -49,7 +49,7 @@ function toast(text, bad, undo) {
   setTimeout(close, bad ? FAILURE_MS : TOAST_MS);
 }
 
-/** Sends an order and shows its outcome; true if it was carried out. `button` is disabled meanwhile; `undo` is the order that takes it back. */
+/** Sends an order and shows its outcome; true if it was carried out. `button` is disabled until the answer; `undo` is the order that reverses this one. */
 async function order(request, button, undo) {
   if (button) button.disabled = true;
   try {
@@ -65,7 +65,7 @@ async function order(request, button, undo) {
 
 const flights = new Flights(mesh, (request) => connection.order(request), toast);
 
-/** The height of a drone's goal, or where it is, in whole metres. */
+/** The height of a drone's goal, or of the drone itself if it does not fly, in whole metres. */
 function heightOf(id) {
   const node = mesh.nodes.get(id);
   return Math.round(node?.path.length ? node.path.at(-1) : (node?.position?.[2] ?? 0));
@@ -152,14 +152,14 @@ function setSpeed(paused, factor) {
   order({ do: "speed", paused, factor }, null, { do: "speed", ...before });
 }
 
-/** The moves of the drones of this fleet to these places [[id, x, y, z]]. */
+/** The moves to these places [[id, x, y, z]], without drones that are not in this fleet. */
 function movesTo(places) {
   return places
     .filter(([id]) => mesh.nodes.has(id))
     .map(([id, x, y, z]) => ({ id, x, y, z: Math.round(z) }));
 }
 
-/** Names drones of a layout, and says how many of it are missing. */
+/** Describes the drones of a layout, and how many of them are not in this fleet. */
 function namesIn(layout, moves, places) {
   const missing = places.length - moves.length;
   return `${layout}: ${names(moves)}${missing ? ` (${missing} not in this fleet)` : ""}`;
@@ -234,7 +234,7 @@ byId("group-clear").addEventListener("click", () => mesh.select(null));
 
 // Files
 
-const PLACES_CASE = 900; // in a file that was saved; any other number would do
+const PLACES_CASE = 900; // the number of the layout in a saved file; arbitrary
 byId("files-button").addEventListener("click", () => byId("files").showModal());
 byId("save-nodes").addEventListener("click", () => save("nodes.csv", nodesCsv(mesh), "text/csv"));
 byId("save-nodes-picture").addEventListener("click", async () =>
@@ -263,7 +263,7 @@ byId("show-known").addEventListener("change", (event) =>
 byId("show-ranges").addEventListener("change", (event) =>
   map.setOption("ranges", event.target.checked),
 );
-byId("show-legend").addEventListener("change", () => map.moved || map.fit()); // it covers some of it
+byId("show-legend").addEventListener("change", () => map.moved || map.fit()); // the legend covers part of the map
 byId("find-form").addEventListener("submit", (event) => {
   event.preventDefault();
   const text = byId("find").value.trim();
@@ -327,7 +327,7 @@ byId("theme").addEventListener("click", () => {
 });
 showTheme();
 
-/** Takes back what is about to leave, or else the latest order whose toast is still shown. */
+/** Cancels the flight that is about to be ordered; if there is none, undoes the latest order. */
 function undo() {
   return flights.undo() || undoLatest?.();
 }

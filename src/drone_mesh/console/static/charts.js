@@ -124,7 +124,7 @@ export class Charts {
     const room = context.measureText(`${end.toFixed(0)} s`).width + BETWEEN_TIMES_PX;
     const spacing = niceStep(((end - start) * room) / Math.max(width - LEFT_PX, 1) || 1);
     context.textAlign = "left";
-    let [ticks, free] = [0, 0]; // px from which on there is room
+    let [ticks, free] = [0, 0]; // free: px, where the previous text ends
     for (let t = Math.ceil(start / spacing) * spacing; t <= end; t += spacing) {
       const text = `${Number(t.toPrecision(6))} s`;
       const wide = context.measureText(text).width;
@@ -191,7 +191,7 @@ function share(sample) {
   return sample.routers_on ? (100 * sample.routers_connected) / sample.routers_on : null;
 }
 
-/** Messages per simulated second, over a few samples: nodes speak in bursts. */
+/** Messages per simulated second, over a few samples, because nodes send in bursts. */
 function withRates(samples) {
   return samples.map((sample, i) => {
     const before = samples[Math.max(0, i - RATE_OVER)];

@@ -1,6 +1,6 @@
-// The question before what cannot be undone.
+// Asks for confirmation, as for an order that cannot be undone.
 
-/** Asks; true if the person presses the button named `verb`. */
+/** Asks; returns whether the user presses the button labelled `verb`. */
 export async function agreed(question, verb) {
   const dialog = document.getElementById("confirm");
   document.getElementById("confirm-text").textContent = question;

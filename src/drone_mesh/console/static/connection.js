@@ -1,4 +1,4 @@
-// The one WebSocket: frames in, orders out, and a new try for as long as there is none.
+// The page's WebSocket: frames in, orders out. When it breaks, the page tries again until it is open.
 
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 5000;
@@ -18,12 +18,12 @@ export class Connection extends EventTarget {
     mesh.addEventListener("select", () => this.#watch());
   }
 
-  /** Orders something. Resolves with a few words, or throws an Error with the reason. */
+  /** Sends an order. Resolves with a short text, or throws an Error with the reason. */
   async order(request) {
     return (await this.request(request)).text;
   }
 
-  /** Asks for something. Resolves with the answer, or throws an Error with the reason. */
+  /** Sends a request. Resolves with the answer, or throws an Error with the reason. */
   request(request) {
     if (!this.open) return Promise.reject(new Error("there is no connection to the console"));
     const number = ++this.#number;
@@ -37,7 +37,7 @@ export class Connection extends EventTarget {
     });
   }
 
-  /** Asks for something that is not answered. */
+  /** Sends a request that gets no answer. */
   ask(request) {
     if (this.open) this.#socket.send(JSON.stringify(request));
   }

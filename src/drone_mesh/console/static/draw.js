@@ -2,7 +2,7 @@
 
 const DIGIT_WIDTH = 0.7; // of a bold digit, as a share of its height
 const SMALLEST_ID_PX = 6;
-const LEAST_ARMS_PX = 7; // the radius of a drone whose arms and rotors can be told apart
+const LEAST_ARMS_PX = 7; // smallest radius of a drone that is drawn with arms and rotors
 const MOTORS = [
   [0.7, 0.7],
   [-0.7, 0.7],
@@ -13,12 +13,12 @@ const MOTOR_AT = 1.2; // in radii of a drone, as the next two
 const ROTOR = 0.45;
 const HULL = 0.85;
 const ROTOR_RAD_PER_S = 9; // our choice: a real one is a blur
-const MOST_LINKS = 4000; // known ones; beyond that a crowd is a grey blot, and only the selected node's are drawn
+const MOST_LINKS = 4000; // known links; with more, which would be a grey blot, only those of the selected node are drawn
 
 const MOST_LOST = 1500; // lost links drawn: the shortest ones, as in rviz
-const CLEAR_LOST = 150; // up to so many in full colour; more of them fade, so that drones stay visible
+const CLEAR_LOST = 150; // lost links in full colour; with more, all of them fade so that drones stay visible
 const FAINTEST = 0.25;
-const MOST_GOAL_TEXTS = 8; // of drones that are about to leave; of more, the texts would overlap
+const MOST_GOAL_TEXTS = 8; // for drones that are about to leave; with more, the texts would overlap
 
 /** The palette's colours in the present theme, by name. */
 export function readColours() {
@@ -170,7 +170,7 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
   return drawn;
 }
 
-/** At most so many of these [node, node] pairs, those that are closest to each other. */
+/** The shortest of these [node, node] pairs, at most `most` of them. */
 function shortest(pairs, most) {
   if (pairs.length <= most) return pairs;
   const length = ([a, b]) =>
@@ -295,7 +295,7 @@ function drawPath(context, camera, node, colours, radius) {
   context.stroke();
 }
 
-/** Arms and rotors, around a drone's middle; the rotors of one that flies turn. */
+/** Arms and rotors, around a drone's middle; the rotors turn while it flies. */
 function drawArms(context, px, py, node, colours, r) {
   context.strokeStyle = colours.muted;
   context.lineWidth = Math.max(1.5, 0.18 * r);

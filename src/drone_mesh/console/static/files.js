@@ -63,7 +63,7 @@ export function chartsCsv(mesh) {
   );
 }
 
-/** The present places, as a file that `casus:=` and "Fly to the positions of a layout file" read. */
+/** The current places, as a file that `casus:=` and "Fly to the positions of a layout file" read. */
 export function placesYaml(mesh, number) {
   const lines = [...mesh.nodes.values()]
     .filter((node) => node.role === 0 && node.position)
@@ -94,7 +94,7 @@ export function chartsPicture(figures, colours) {
   return png(picture);
 }
 
-/** Hands a file to the person. */
+/** Saves a file through the browser. */
 export function save(name, content, type) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([content], { type }));

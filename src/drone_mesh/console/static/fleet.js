@@ -8,7 +8,7 @@ const FIELDS = ["id", "x", "y"];
 const byId = (id) => document.getElementById(id);
 
 export class Fleet {
-  /** `order(request, button)` shows what became of the order, and resolves with whether it was carried out. */
+  /** `order(request, button)` shows the outcome of the order, and resolves with whether it was carried out. */
   constructor(mesh, map, order) {
     this.mesh = mesh;
     this.map = map;
@@ -27,7 +27,7 @@ export class Fleet {
     return !this.form.hidden;
   }
 
-  /** Offers to add a drone: a click on the map says where. */
+  /** Opens the form; a click on the map fills in the position. */
   open() {
     if (!this.mesh.canOrder || !this.mesh.actions.includes("add")) return;
     this.mesh.select(null);
@@ -38,7 +38,7 @@ export class Fleet {
     byId("add-x").select();
   }
 
-  /** True if the form was open. */
+  /** Closes the form; returns whether it was open. */
   close() {
     const adding = this.adding;
     if (adding && this.form.contains(document.activeElement)) byId("add").focus();
@@ -46,12 +46,12 @@ export class Fleet {
     return adding;
   }
 
-  /** Removes the selected drone, if the person confirms it. */
+  /** Removes the selected drone, if the user confirms it. */
   async remove() {
     const node = this.mesh.nodes.get(this.mesh.selected);
     if (!node || !this.mesh.canOrder || !this.mesh.actions.includes("remove")) return;
     const what = `${node.role === 1 ? "Gateway" : "Router"} ${node.id}`;
-    const question = `${what} leaves the simulation: its node ends. This cannot be undone.`;
+    const question = `${what} will be removed from the simulation. This cannot be undone.`;
     if (await agreed(question, `Remove ${node.id}`))
       this.order({ do: "remove", node: node.id }, byId("remove"));
   }

@@ -1,5 +1,5 @@
-// Sends drones away: asks before a long flight, and holds each order for a moment, so that it can be undone.
-// A drone in flight may be out of reach, so an order that has left cannot be taken back.
+// Orders flights: asks for confirmation of a long one, and holds each order briefly so that it can be undone.
+// A drone in flight may be out of reach, so an order cannot be recalled once it is sent.
 
 import { agreed } from "./confirm.js";
 
@@ -10,22 +10,22 @@ const byId = (id) => document.getElementById(id);
 
 export class Flights extends EventTarget {
   #timer = null;
-  #send = null; // orders what is held
+  #send = null; // sends the held orders
 
-  /** `order(request)` resolves with a few words, or throws; `toast(text, bad)` shows them. */
+  /** `order(request)` resolves with a short text, or throws; `toast(text, bad)` shows them. */
   constructor(mesh, order, toast) {
     super();
     this.mesh = mesh;
     this.order = order;
     this.toast = toast;
-    this.held = []; // [{id, x, y, z}] that leave in a moment
+    this.held = []; // [{id, x, y, z}], ordered when HOLD_MS are over
     byId("held-undo").addEventListener("click", () => this.undo());
     byId("held-now").addEventListener("click", () => this.#release());
   }
 
   /**
-   * Sends these drones [{id, x, y, z}] after a moment, or not, if the person changes their mind.
-   * `what` names them; `send` orders all of them at once.
+   * Orders these drones [{id, x, y, z}] to fly after HOLD_MS, unless the user undoes it.
+   * `what` describes them; `send` sends all the orders.
    */
   async hold(moves, what = names(moves), send = () => this.#order(moves)) {
     this.#release();
@@ -36,7 +36,7 @@ export class Flights extends EventTarget {
     this.#timer = setTimeout(() => this.#release(), HOLD_MS);
   }
 
-  /** True if there was something to undo. */
+  /** Drops the held orders; returns whether there were any. */
   undo() {
     const held = this.held.length > 0;
     this.#hold([], null);
@@ -75,7 +75,7 @@ export class Flights extends EventTarget {
     if (failed.length < moves.length) this.toast(text, false);
   }
 
-  /** Whether none flies far, or the person agrees. */
+  /** Whether no drone flies far, or the user agrees. */
   async #agreed(moves, what) {
     const far = Math.max(...moves.map((move) => this.#distance(move)));
     if (far <= FAR_M) return true;

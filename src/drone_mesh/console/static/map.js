@@ -32,14 +32,14 @@ export class MapView {
     this.camera = new Camera();
     this.radius = 0; // of a drone, px
     this.following = false; // keeps the selected node in the middle
-    this.onPlace = null; // called with the place (x, y) of a click, while one is to be chosen
+    this.onPlace = null; // called with the place (x, y) of a click, while the user chooses one
     this.newDrone = null; // {x, y, gateway}, where a drone would be added
     this.held = []; // [{id, x, y}] that are about to leave
     this.options = { known: true, ranges: false };
     this.colours = readColours();
     this.drag = null;
-    this.fitted = false; // to the first mesh that was seen
-    this.moved = false; // by a person, since it was fitted
+    this.fitted = false; // whether it has been fitted to a first mesh
+    this.moved = false; // whether the user has moved it since
     this.pointers = new Map();
     this.pending = false;
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
@@ -89,18 +89,18 @@ export class MapView {
     this.redraw();
   }
 
-  /** The middle of what is to be seen, [x, y] in metres. */
+  /** The middle of the visible part, [x, y] in metres. */
   middle() {
     const { top, bottom } = this.#covered();
     return this.camera.toWorld(this.camera.width / 2, (this.camera.height + top - bottom) / 2);
   }
 
-  /** A click no longer selects: it says a place, to `onPlace(x, y)`; null: it selects again. */
+  /** From now on a click calls `onPlace(x, y)` and selects nothing; null: it selects again. */
   choosePlace(onPlace) {
     this.onPlace = onPlace;
   }
 
-  /** Shows where a drone {x, y, gateway} would be added; null: none would. */
+  /** Shows where a drone {x, y, gateway} would be added; null: nothing. */
   showPlace(newDrone) {
     this.newDrone = newDrone;
     this.redraw();
@@ -118,7 +118,7 @@ export class MapView {
     this.redraw();
   }
 
-  /** Lets go of a drone that is being dragged. True if there was one. */
+  /** Cancels a drag; returns whether there was one. */
   cancelDrag() {
     const dragged = this.drag !== null;
     this.drag = null;
@@ -169,7 +169,7 @@ export class MapView {
     this.camera.pan(this.camera.width / 2 - x, (this.camera.height + top - bottom) / 2 - y);
   }
 
-  /** Draws again in a moment while a rotor is to be seen turning. */
+  /** Redraws after TURN_PERIOD_MS while turning rotors are visible. */
   #keepTurning({ radius }) {
     clearTimeout(this.turning);
     if (this.still.matches || !hasArms(this.mesh.clock.shape, radius)) return;
@@ -191,7 +191,7 @@ export class MapView {
     Object.assign(this.note.dataset, drawn, { x, y, scale });
   }
 
-  /** How much of the canvas is covered by what stands on it, px. */
+  /** How much of the canvas its tools and its legend cover, px. */
   #covered() {
     return {
       top: this.top.offsetTop + this.top.offsetHeight,

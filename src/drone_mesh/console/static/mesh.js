@@ -32,7 +32,7 @@ export class Mesh extends EventTarget {
     this.samples = [];
     this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}}
     this.recording = ""; // its name, if the console shows one
-    this.timeline = {}; // {start, end, now, live, paused, factor, packets} of what can be looked at again
+    this.timeline = {}; // {start, end, now, live, paused, factor, packets} of the recorded time
     this.marks = []; // on the time line: [{t, kind, node}]
     this.hasPresent = false; // whether there is a present to return to
     this.selected = null;
@@ -126,7 +126,7 @@ export class Mesh extends EventTarget {
     this.#notify("select");
   }
 
-  /** Adds a node to the group or takes it out; the node that was selected before belongs to it. */
+  /** Adds a node to the group or removes it; the node selected before joins the group. */
   toggle(id) {
     if (!this.group.size && this.selected !== null) this.group.add(this.selected);
     if (!this.group.delete(id)) this.group.add(id);

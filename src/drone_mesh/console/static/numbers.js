@@ -1,4 +1,4 @@
-// Numbers that people type.
+// Numbers typed by the user.
 
 /**
  * What was typed in a field: {input, value, error}; `error` is empty if it is a number from `low`

@@ -4,7 +4,7 @@
 import { onScreen } from "./draw.js";
 
 const RUN_MS = 700; // our choice: a packet takes 2 ms, which cannot be seen
-const START_MS = 300; // after a packet arrived in the air its dot starts: every sample is here by then
+const START_MS = 300; // from a packet's arrival to the start of its dot: each sample has reached the page by then
 const MOST_DOTS = 600;
 const FRAME_MS = 33;
 
@@ -14,7 +14,7 @@ export class PacketDots {
   #drawn = 0;
   #frame = null;
 
-  /** `card` holds the map and its legend; `map` is its view; `connection` brings the packets. */
+  /** `card` holds the map and its legend; `map` is its view; `connection` delivers the packets. */
   constructor(mesh, map, connection, card) {
     this.mesh = mesh;
     this.map = map;
@@ -31,7 +31,7 @@ export class PacketDots {
     this.box.addEventListener("change", () => this.#ask());
     document.addEventListener("visibilitychange", () => this.#ask());
     connection.addEventListener("change", () => {
-      this.#asked = false; // by a connection that is gone
+      this.#asked = false; // the request was for the previous connection
       this.#ask();
     });
   }

@@ -5,7 +5,7 @@ import { orDash } from "./mesh.js";
 import { typedNumber } from "./numbers.js";
 
 export class NodePanel {
-  /** `power(id, on)` and `fly(id, x, y, z)` carry out what the buttons say. */
+  /** `power(id, on)` and `fly(id, x, y, z)` carry out the orders of the buttons. */
   constructor(mesh, power, fly) {
     this.mesh = mesh;
     this.power = power;
@@ -79,7 +79,7 @@ export class NodePanel {
     if (row >= 0) this.#linkIn(list.children[row], id)?.focus();
   }
 
-  /** [row, id] of the link in the list that has the focus; a new list gives it back. */
+  /** [row, id] of the link in the list that has the focus, so that a new list can restore it. */
   #focused(list) {
     const link = document.activeElement;
     return [[...list.children].findIndex((box) => box.contains(link)), link?.textContent];
