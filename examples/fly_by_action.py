@@ -31,7 +31,7 @@ def show(feedback: FlyFeedback) -> None:
 
 
 def why_not_offered(drone: int) -> str:
-    """The reason why the drone cannot be ordered yet; empty if it can."""
+    """The reason why the drone does not take orders yet; empty if it does."""
     if drones_if_known() is None:
         return "no simulation is running: roslaunch drone_mesh factory.launch actions:=true"
     if any(topic == f"/Drones/{drone}/fly/status" for topic, _ in rospy.get_published_topics()):
@@ -40,7 +40,7 @@ def why_not_offered(drone: int) -> str:
 
 
 def wait_until_offered(drone: int) -> str:
-    """Wait until the drone can be ordered, and print for what; returns the reason if it cannot."""
+    """Wait until the drone takes orders and print why it waits; returns why if it never does."""
     deadline_s = time.monotonic() + OFFERED_WITHIN_S
     printed = ""
     while True:
@@ -76,7 +76,7 @@ def main(drone: int, x: float, y: float, height: int) -> int:
     if client.get_state() == GoalStatus.SUCCEEDED:
         print("arrived")
         return 0
-    print(result.message if isinstance(result, FlyResult) else "no result came")
+    print(result.message if isinstance(result, FlyResult) else "the action returned no result")
     return 1
 
 

@@ -1,6 +1,6 @@
 # Tab completion in an interactive bash; scripts/env.bash sources it.
 
-# Those of rosrun, roslaunch, rostopic ...: Noetic's setup.bash has loaded them, Debian's has not.
+# Completion of rosrun, roslaunch, rostopic ...: Noetic's setup.bash loads it, Debian's does not.
 if ! complete -p roslaunch >/dev/null 2>&1 && [ -r /usr/share/bash-completion/completions/rosbash ]; then
   # shellcheck source=/dev/null
   . /usr/share/bash-completion/completions/rosbash

@@ -12,7 +12,7 @@ if [ -e "$drone_mesh_root/build/devel/setup.bash" ]; then
     *) PATH="$drone_mesh_root/.venv/bin:$PATH" ;;
   esac
   export PYTHONUNBUFFERED=1  # log lines appear at once, also in a pipe
-  # ROS sends the name of this machine to other nodes; they must be able to look it up.
+  # ROS gives the name of this machine to other nodes, which must be able to resolve it.
   if [ -z "$ROS_HOSTNAME$ROS_IP" ] && ! getent hosts "$(uname -n)" >/dev/null; then
     export ROS_HOSTNAME=localhost
   fi

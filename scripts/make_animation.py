@@ -21,7 +21,7 @@ from drone_mesh.view.palette import LIGHT
 GIF = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "repair.gif"
 MASTER_PORT = "11652"
 WIDTH, HEIGHT = 680, 760  # px: the page of a narrow window, where map and story are one column
-FRAME_S = 0.4  # wall time between two looks at the page
+FRAME_S = 0.4  # wall time between two screenshots
 LAST_FRAME_S = 6.0
 COLOURS = 64  # of the GIF
 LIMIT_S = 240.0
@@ -64,10 +64,10 @@ def film(page: Page) -> list[tuple[Image.Image, float]]:
 
 
 def save(frames: list[tuple[Image.Image, float]]) -> None:
-    """Frames of one size, which is that of the largest one, in one palette."""
+    """Write the GIF: all frames in one palette, and padded to the size of the largest."""
     width = max(frame.width for frame, _ in frames)
     height = max(frame.height for frame, _ in frames)
-    # The colours that mean something cover little of a frame; as large areas they all get a place.
+    # The palette's colours cover little of a frame; as large areas, quantize() keeps all of them.
     sheet = frames[0][0].copy()
     for number, colour in enumerate(asdict(LIGHT).values()):
         sheet.paste(colour, (0, 30 * number, sheet.width // 2, 30 * number + 30))
@@ -88,7 +88,7 @@ def save(frames: list[tuple[Image.Image, float]]) -> None:
 
 
 def main() -> None:
-    """Start a simulation of its own, and film its console."""
+    """Start a simulation and record its console."""
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{MASTER_PORT}"
     command = ["roslaunch", "-p", MASTER_PORT, "drone_mesh", "factory.launch"]
     launch = subprocess.Popen([*command, "routers:=5", "seed:=1"], stdout=sys.stderr)

@@ -28,10 +28,10 @@ SCREEN_SIZE = (1400, 900)
 CASE, LOST_ROUTER = 202, 2
 ROUTERS = 5
 ROUNDS_S = 25.0  # simulated; by then each node has asked where the next hop is
-FAST = 4.0  # while no picture is taken
-LIMIT_S = 240.0  # wall time for each thing that is waited for
+FAST = 4.0  # real-time factor while no picture is taken
+LIMIT_S = 240.0  # wall time for each wait
 FEWEST_COLOURS = 300  # of a drawn screen; an empty one has a handful
-SETTLE_S = 3.0  # until what is on a screen has been drawn
+SETTLE_S = 3.0  # wall time for drawing a screen
 CHROMIUM_FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
 
@@ -92,7 +92,7 @@ def take_page(browser: Browser, url: str, name: str, whole: bool, *selectors: st
 
 
 def take_screen(name: str) -> None:
-    """Save the screen as soon as something is drawn on it; rviz takes its time to start."""
+    """Save the screen as soon as something is drawn on it; rviz takes seconds to start."""
     deadline_s = time.monotonic() + LIMIT_S
     while True:
         picture = ImageGrab.grab(xdisplay=SCREEN)
@@ -111,12 +111,12 @@ def take_pictures(browser: Browser, folder: Path) -> None:
         watch.wait_for("the recorder", lambda _state: any(folder.glob("*.active")))
         controls.speed(False, FAST)
         controls.layout(CASE)
-        watch.wait_for("the drones on their way", a_drone_flies)
+        watch.wait_for("the drones take off", a_drone_flies)
         watch.wait_for("all connected in their places", all_stand_connected)
         settled_until_s = watch.time_s + ROUNDS_S
-        watch.wait_for("some rounds", lambda _state: watch.time_s >= settled_until_s)
+        watch.wait_for("some check periods", lambda _state: watch.time_s >= settled_until_s)
         controls.power(LOST_ROUTER, False)
-        watch.wait_for("the repair flies", a_drone_flies)
+        watch.wait_for("the repair's drone takes off", a_drone_flies)
         controls.speed(True, 0.0)
         time.sleep(SETTLE_S)
         take_screen("rviz.png")

@@ -25,16 +25,16 @@ class ConfigurationError(MeshError):
 
 @contextlib.contextmanager
 def naming_argument(argument: str, path: str | Path) -> Iterator[None]:
-    """Put an argument in front of each ConfigurationError about its file.
+    """Put an argument in front of each MeshError about its file.
 
     `argument`: what the user wrote before the path, such as "casus:=" or "--key-file ".
     """
     try:
         yield
-    except ConfigurationError as error:
+    except MeshError as error:
         if not str(error).startswith(str(path)):
             raise
-        raise ConfigurationError(f"{argument}{error}") from error
+        raise type(error)(f"{argument}{error}") from error
 
 
 class FleetRefused(MeshError):

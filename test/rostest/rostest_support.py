@@ -17,9 +17,9 @@ from drone_mesh.msg import NRF24, DroneInfo, NodeDebugInfo
 from drone_mesh.srv import Casus, PowerSwitch, RequestGPS, WirelessMessage
 
 PAYLOAD_BYTES = 32
-STANDSTILL_S = 20.0  # wall: time that does not move means that the world has died
+STANDSTILL_S = 20.0  # wall; if simulated time stands still for longer, the world has died
 POLL_PERIOD_S = 0.01
-WALL_LIMIT_S = 60.0  # for what takes a moment; a machine with much to do takes longer
+WALL_LIMIT_S = 60.0  # for what takes a moment on an idle machine
 
 
 def wait_for(what: str, within_s: float, condition: Callable[[], object]) -> None:
@@ -32,7 +32,7 @@ def wait_for(what: str, within_s: float, condition: Callable[[], object]) -> Non
 
 
 def call(service: str, service_class: type, *arguments: object) -> object:
-    """Call a service once it is there."""
+    """Call a service as soon as it is offered."""
     rospy.wait_for_service(service, timeout=WALL_LIMIT_S)
     return rospy.ServiceProxy(service, service_class)(*arguments)
 
@@ -56,7 +56,7 @@ def pid_of(node: str) -> int | None:
 def kill_and_wait_for_respawn(node: str) -> None:
     """SIGKILL; returns when roslaunch has started it again."""
     old_pid = pid_of(node)
-    assert old_pid is not None, f"{node} is not there to be killed"
+    assert old_pid is not None, f"{node} is not running, so it cannot be killed"
     os.kill(old_pid, signal.SIGKILL)
     wait_for(f"{node} was not respawned", WALL_LIMIT_S, lambda: pid_of(node) not in (None, old_pid))
 
@@ -69,7 +69,7 @@ class LogWatch:
         self._subscriber = rospy.Subscriber("/rosout", Log, self._lines.append)
 
     def lines(self, text: str) -> list[str]:
-        """The lines that hold this text."""
+        """The lines that contain this text."""
         return [line.msg for line in list(self._lines) if text in line.msg]
 
     def failures(self) -> list[str]:
@@ -117,7 +117,7 @@ class MeshWatch:
         return not self._infos[node_id].on
 
     def info(self, node_id: int) -> NodeDebugInfo:
-        """What the node said last."""
+        """The node's latest report."""
         return self._infos[node_id]
 
     def wait(self, what: str, within_s: float, condition: Callable[[], object]) -> float:
@@ -171,7 +171,7 @@ class MeshWatch:
 
 
 class Stranger:
-    """A node that is none of ours: speaks the wire contract and keeps what it hears."""
+    """A foreign node: it follows the wire contract and stores what it receives."""
 
     def __init__(self, node_id: int, topic: str, place: tuple[float, float, float]) -> None:
         self.node_id = node_id
@@ -190,7 +190,7 @@ class Stranger:
         self._publisher.publish(DroneInfo(self.node_id, position, sub, on))
 
     def register(self) -> None:
-        """Returns when the simulator knows it and it can be sent to."""
+        """Return when the simulator has registered it and can send to it."""
         wait_for("no simulator", WALL_LIMIT_S, lambda: self._publisher.get_num_connections() > 0)
         self.announce(self._place, self._topic)
         hello = bytes((self.node_id, self.node_id, 0, self.node_id, self.node_id))
@@ -202,7 +202,7 @@ class Stranger:
         self.heard.clear()
 
     def send(self, packet: bytes) -> bool:
-        """Send to the node in byte 3; True: it has it."""
+        """Send to the node in byte 3; True: that node received it."""
         message = NRF24(packet.ljust(PAYLOAD_BYTES, b"\0"))
         answer = call("/SignalSimulator/message", WirelessMessage, packet[1], packet[3], message)
         return bool(answer.succes)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An argument that makes no sense ends the whole launch, with one line that says what is wrong."""
+"""An invalid argument ends the whole launch, with one line that says what is wrong."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class BadArgumentsTest(unittest.TestCase):
         self.assertIn(f"/DroneFactory: {line}", launch.stdout)
         self.assertIn("exit code 1", launch.stdout)
         self.assertEqual(launch.returncode, 1)
-        # What is stopped while Python itself still starts says so with a traceback of its own.
+        # A node that is stopped while Python itself is starting prints a traceback.
         until_failure, shutdown, _ = launch.stdout.partition("Initiating shutdown!")
         self.assertTrue(shutdown, launch.stdout)
         self.assertNotIn("Traceback", until_failure)

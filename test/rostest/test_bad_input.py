@@ -20,7 +20,7 @@ SEED = 14
 
 
 def random_packet(rng: random.Random, receiver: int) -> bytes:
-    """Half of them any bytes, half of them a good header with a random body."""
+    """Half of them random bytes, half of them a valid header with a random body."""
     packet = bytearray(rng.randrange(256) for _ in range(32))
     if rng.random() < 0.5:
         packet[:5] = bytes((ME, ME, rng.randrange(8), receiver, rng.choice((receiver, 254))))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""flight:=dynamic: two drones that change places meet in the air; everyone learns of the crash."""
+"""flight:=dynamic: two drones that change places meet in the air; all reports show the crash."""
 
 from __future__ import annotations
 

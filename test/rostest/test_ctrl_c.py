@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Ctrl-C in the terminal of roslaunch: everything ends by itself, without a traceback.
 
-roslaunch waits for 15 s and then sends SIGTERM ("escalating"). How long it takes is printed; on an
-idle machine about 4 s, most of them roslaunch's own.
+roslaunch waits for 15 s and then sends SIGTERM ("escalating"). The test prints how long the end
+takes: about 4 s on an idle machine, most of it in roslaunch.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class CtrlCTest(unittest.TestCase):
                 for line in ready:
                     wait_for(f"'{line}' in the output", 60, lambda line=line: line in said())
                 begun_s = time.monotonic()
-                os.killpg(launch.pid, signal.SIGINT)  # as a terminal does: to all of them
+                os.killpg(launch.pid, signal.SIGINT)  # as a terminal does: to all processes
                 launch.wait(timeout=30)
                 took_s = time.monotonic() - begun_s
             finally:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The ROS definitions are a wire contract: built against those of 2019 means understood."""
+"""The ROS definitions are a wire contract: programs built against those of 2019 still work."""
 
 from __future__ import annotations
 

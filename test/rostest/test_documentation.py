@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The commands that README gives for a second terminal, as they stand there, in their order."""
+"""README's commands for a second terminal, exactly as written and in that order."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COMMAND_LIMIT_S = 60.0
 CONNECTED_WITHIN_S = 60.0  # simulated
 
 
-# ros_comm 1.15.9 under Python 3.9 (Debian 11) ends each tool with this, its work done.
+# With ros_comm 1.15.9 and Python 3.9 (Debian 11), each tool prints this when its work is done.
 OF_DEBIAN_11 = re.compile(
     r"(?:Error in atexit._run_exitfuncs:\n)?"
     r"Traceback.*\n(?:  .*\n)+AttributeError: 'Thread' object has no attribute 'isAlive'\n"

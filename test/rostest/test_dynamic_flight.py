@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""flight:=dynamic: physics moves the drones, in a wind, and an order is flown as ever."""
+"""flight:=dynamic: physics moves the drones, in a wind, and they still carry out orders."""
 
 from __future__ import annotations
 

@@ -42,9 +42,9 @@ class EmulatedRadioTest(unittest.TestCase):
             "/mesh/packets", PacketSample, lambda m: packets.update(zip(m.senders, m.receivers))
         )
         mesh.wait("all connected over the chips", 30, mesh.connected)
-        # A frame that is lost when they meet costs a detour until the next rounds.
+        # If a frame is lost at the start, a node uses a longer route until its next checks.
         shortest = {0: 0, 1: 1, 2: 1, 3: 2, 4: 3, 5: 4}
-        mesh.wait("the shortest ways found", 45, lambda: mesh.hops() == shortest)
+        mesh.wait("the shortest routes", 45, lambda: mesh.hops() == shortest)
         wait_for("a packet from 3 to 2 in a sample", WALL_LIMIT_S, lambda: (3, 2) in packets)
         wait_for("/Node/2 shows what was received", WALL_LIMIT_S, lambda: received)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Drones are ordered through actions: they arrive, stop, or say why not."""
+"""Drones are ordered through actions: they arrive or stop, or the result gives the reason."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ class HostsTest(unittest.TestCase):
     def test_only_the_drones_of_a_killed_host_are_lost_and_they_rejoin(self) -> None:
         rospy.init_node("test_hosts")
         log = LogWatch()
-        mesh = MeshWatch(18)  # ids 0..4, 5..9 and 10..14 in a host each, the others are added
+        mesh = MeshWatch(18)  # ids 0..4, 5..9 and 10..14 in one host each; the others are added
         mesh.wait("all connected", 60, lambda: mesh.connected(range(15)))
         for host, latitude in ((1, 0.0), (2, 6.0), (3, 12.0)):
             added = call("/DroneFactory/addDrone", AddDrone, 255, False, latitude, 24.0)

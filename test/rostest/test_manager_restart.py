@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The DroneManager is killed in mid-run; orders work again after its return."""
+"""The DroneManager is killed during a run; orders work again after its restart."""
 
 from __future__ import annotations
 

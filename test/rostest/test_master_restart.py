@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The master is killed in mid-run and comes back knowing nothing; everything is found again."""
+"""The master is killed during a run and restarts empty; all nodes can be looked up again."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ class MasterRestartTest(unittest.TestCase):
         )
 
     def all_connected(self) -> bool:
-        """What `status` finds: it needs the state's topic and the parameter of simulated time."""
+        """Whether `status` works, which needs the state's topic and the simulated time."""
         return self.run_tool("rosrun", "drone_mesh", "status").returncode == 0
 
     def markers_are_found(self) -> bool:
-        """What rviz finds: a node that publishes them, from the states."""
+        """Whether rviz can find a node that publishes them and subscribes to the states."""
         shown = self.run_tool("rostopic", "info", "/mesh/markers").stdout
         read = self.run_tool("rostopic", "info", "/mesh/state").stdout
         return "* /mesh_markers" in shown and "* /mesh_markers" in read

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The console's orders reach the real system, and its page the real state."""
+"""The console's orders reach the real system, and its page shows the real state."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What rviz is shown: frames and markers; and that rviz itself runs with our configuration."""
+"""The frames and markers for rviz, and rviz itself with our configuration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drone_mesh.msg import Location, MeshState
 from drone_mesh.srv import PowerSwitch, SetSpeed
 
-RVIZ_LIMIT_S = 40.0  # software rendering takes its time
+RVIZ_LIMIT_S = 40.0  # software rendering is slow
 
 
 class MeshMarkersTest(unittest.TestCase):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""/mesh/state, /mesh/events and /diagnostics; and that nothing of the viewers runs by itself."""
+"""/mesh/state, /mesh/events and /diagnostics; no viewer starts unless it is requested."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def run(*command: str) -> None:
 
 @contextlib.contextmanager
 def two_namespaces() -> Iterator[tuple[str, str]]:
-    """Names of two namespaces with a cable between them. Skips the test where that is forbidden."""
+    """Two namespaces connected by a virtual cable. Skips the test where they are forbidden."""
     names = (f"mesh_a_{os.getpid()}", f"mesh_b_{os.getpid()}")
     with contextlib.ExitStack() as undo:
         try:

@@ -24,7 +24,7 @@ class NoRouteTest(unittest.TestCase):
         begun_s = time.monotonic()
         answer = call("/DroneManager/requestDroneMovement", RequestDroneFlight, 2, 4.0, 3.0, 0)
         self.assertLess(time.monotonic() - begun_s, WALL_LIMIT_S)
-        # 1 as long as the gateway believes in the way over node 1, which loses the order.
+        # 1 as long as the gateway has its route over node 1, which then loses the order.
         self.assertIn(answer.status, (1, 2))
         wait_for("no line that names drone 2", 10, lambda: log.lines("no route to drone 2"))
         mesh.wait(

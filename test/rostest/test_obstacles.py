@@ -20,7 +20,7 @@ class ObstaclesTest(unittest.TestCase):
         rospy.init_node("test_obstacles")
         log, mesh = LogWatch(), MeshWatch(3)
         mesh.wait("router 1 connected", 60, lambda: mesh.connected([1]))
-        mesh.wait("router 2 heard of", 60, lambda: 2 in mesh.hops())
+        mesh.wait("a report of router 2", 60, lambda: 2 in mesh.hops())
         mesh.pass_time(25.0)  # two checks of each node
         self.assertIsNone(mesh.hops()[2], "the wall does not stop the radio")
         self.assertEqual(bytes(call("/SignalSimulator/othersinRange", AreaScan, 1).near), b"\0")

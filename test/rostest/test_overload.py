@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A machine with too much to do makes the mesh slow, and not wrong."""
+"""On an overloaded machine the mesh is slower, but not different."""
 
 from __future__ import annotations
 

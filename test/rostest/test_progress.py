@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The world and the processes that host its nodes keep together."""
+"""The world and the processes that host its nodes stay in step."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ProgressTest(unittest.TestCase):
         before = self.said.copy()
         hosts = ("/mesh_host_1", "/mesh_host_2")
         wait_for(
-            "both hosts said twice how far they are",
+            "two reports of progress from each host",
             WALL_LIMIT_S,
             lambda: all(self.said[host] - before[host] >= 2 for host in hosts),
         )

@@ -27,7 +27,7 @@ class RepairTest(unittest.TestCase):
         )
         mesh.switch(2, False)
         mesh.wait("3 lost its gateway", 30, lambda: mesh.lost(3))
-        # It can have its two hops while it still descends.
+        # It may have its two hops while it is still descending.
         mesh.wait(
             "3 connected again, at the place of 2",
             120 + FLIGHT_S,

@@ -17,7 +17,7 @@ class SimpleSimulatorTest(unittest.TestCase):
         log = LogWatch()
         mesh = MeshWatch(4)
         shortest = {0: 0, 1: 1, 2: 1, 3: 2}
-        mesh.wait("all connected over the shortest ways", 60, lambda: mesh.hops() == shortest)
+        mesh.wait("all connected over the shortest routes", 60, lambda: mesh.hops() == shortest)
         _publishers, _subscribers, services = rosgraph.Master("/test").getSystemState()
         offered = {name for name, _nodes in services if name.startswith("/SignalSimulator/")}
         self.assertEqual(offered, {"/SignalSimulator/message", "/SignalSimulator/othersinRange"})

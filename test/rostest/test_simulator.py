@@ -59,7 +59,7 @@ class SimulatorTest(unittest.TestCase):
     def figure(self, name: str) -> float:
         """The figures that the simulator publishes after this call."""
         heard: list[float] = []
-        for _message in range(2):  # the first may have been on its way
+        for _message in range(2):  # the first may have been sent before the call
             array = rospy.wait_for_message("/diagnostics", DiagnosticArray, WALL_LIMIT_S)
             heard += [float(v.value) for s in array.status for v in s.values if v.key == name]
         return heard[-1]
@@ -142,7 +142,7 @@ class SimulatorTest(unittest.TestCase):
         subscriber = rospy.Subscriber("/stranger_late", NRF24, lambda _packet: None)
         wait_for("8 listens", WALL_LIMIT_S, lambda: self.a.send(packet(1, 8)))
         subscriber.unregister()
-        wait_for("8 listens no more", WALL_LIMIT_S, lambda: not self.a.send(packet(1, 8)))
+        wait_for("8 no longer listens", WALL_LIMIT_S, lambda: not self.a.send(packet(1, 8)))
         self.assertGreater(self.figure("lost in range"), lost)
         late.announce((0.0, 0.0, 0.0), "/stranger_late", on=False)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The WirelessSignalSimulator is killed in mid-run and comes back knowing nothing."""
+"""The WirelessSignalSimulator is killed during a run and restarts with an empty table."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SimulatorRestartTest(unittest.TestCase):
         mesh.wait("9 off in the simulator", 3, lambda: 9 not in near(5))
         near_before = near(5)
         kill_and_wait_for_respawn("/WirelessSignalSimulator")
-        # Counted only now: what the killed one carried has been reported since.
+        # Read only now, when the reports include all packets that the killed one carried.
         sent_before = {node_id: mesh.info(node_id).totalMessages for node_id in others}
 
         def all_sent() -> bool:

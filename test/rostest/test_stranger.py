@@ -19,8 +19,8 @@ class StrangerTest(unittest.TestCase):
         rospy.init_node("test_stranger")
         log = LogWatch()
         mesh = MeshWatch(3)
-        shortest = {0: 0, 1: 1, 2: 1}  # the first meeting need not find them
-        mesh.wait("all connected, over the shortest ways", 60, lambda: mesh.hops() == shortest)
+        shortest = {0: 0, 1: 1, 2: 1}  # the first routes need not be the shortest
+        mesh.wait("all connected, over the shortest routes", 60, lambda: mesh.hops() == shortest)
         stranger = Stranger(ME, "/my/own/topic", (12.0, 0.0, 0.5))  # only router 2 hears it
         stranger.register()
 
@@ -34,7 +34,7 @@ class StrangerTest(unittest.TestCase):
         answer = stranger.wait_for_packet(bytes((0, 2, HEARTBEAT, ME, ME)), "no answer from 0")
         know_gateway, gateway, hops = answer[5:8]
         self.assertEqual((know_gateway, gateway), (1, 0))
-        self.assertEqual(hops, 1)  # how often it was sent on
+        self.assertEqual(hops, 1)  # how often it was forwarded
         self.assertEqual(log.failures(), [])
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What other nodes publish or do not read does not cut off a node, nor slow the world down."""
+"""Foreign DroneInfo, and subscribers that never read, neither cut off a node nor slow the world."""
 
 from __future__ import annotations
 
@@ -81,7 +81,11 @@ class StrayMessagesTest(unittest.TestCase):
             return announcer
 
         announcers = [announce_for_ever(topic) for topic in (AGAIN_AND_AGAIN, "/Node/2")]
-        wait_for("it to be taken away", WALL_LIMIT_S, lambda: AGAIN_AND_AGAIN in published_topics())
+        wait_for(
+            "another topic for 2",
+            WALL_LIMIT_S,
+            lambda: AGAIN_AND_AGAIN in published_topics(),
+        )
         self.mesh.pass_time(20.0)
         for announcer in announcers:
             announcer.terminate()
@@ -101,7 +105,7 @@ class StrayMessagesTest(unittest.TestCase):
         wait_for("the clock to go on", WALL_LIMIT_S, lambda: rospy.get_time() > now_s + 1.0)
 
     def test_a_subscriber_that_never_reads_is_dropped_and_the_others_get_everything(self) -> None:
-        """With the publisher of /clock, and messages that fill the buffers of the kernel soon."""
+        """With the publisher of /clock, and messages that soon fill the kernel's buffers."""
         publisher = DirectPublisher("/large", String, STUCK_SUBSCRIBER_S)
         self.addCleanup(publisher.close)
         heard: list[String] = []

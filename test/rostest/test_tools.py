@@ -37,7 +37,7 @@ TOOL_LIMIT_S = 60.0
 
 
 def run(tool: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A tool as rosrun starts it, but for the time that rosrun takes to find it."""
+    """Run a tool as rosrun does, without the time that rosrun takes to find it."""
     program = Path(rospkg.RosPack().get_path("drone_mesh")) / "nodes" / tool
     return subprocess.run(
         [sys.executable, str(program), *arguments],
@@ -193,10 +193,13 @@ class ToolsTest(unittest.TestCase):
         nonsense = self.folder / "nonsense.bag"
         nonsense.write_bytes(b"\x89 this is not a bag")
         for path in (nonsense, self.folder / "missing.bag"):
-            for arguments in (["status", "--bag"], ["report"]):
+            for arguments, given in ((["status", "--bag"], "--bag "), (["report"], "report: ")):
                 finished = run(*arguments, str(path))
                 self.assertEqual(finished.returncode, 2)
-                self.assertIn(str(path), finished.stderr)
+                self.assertRegex(
+                    finished.stderr, f"{given}{path}: no(t a complete bag| such file);"
+                )
+                self.assertIn("'roslaunch drone_mesh record.launch' records one", finished.stderr)
                 self.assertNotIn("Traceback", finished.stderr)
 
 

@@ -140,13 +140,13 @@ class FrameStore:
             )
 
     def expect_orders(self, drones: Iterable[int]) -> int:
-        """An order to these drones is being given; returns a ticket for `forget_expected`."""
+        """An order to these drones is being sent; returns a ticket for `forget_expected`."""
         ticket = self._orders.expect(drones)
         self._show_orders()
         return ticket
 
     def forget_expected(self, ticket: int) -> None:
-        """Show the progress of earlier orders again, where no event of this one has come."""
+        """Show earlier orders again for the drones for which no event of this order has come."""
         self._orders.forget_expected(ticket)
         self._show_orders()
 

@@ -54,7 +54,7 @@ class Page:
             yield from self._time_line_messages()
 
     def show_packets(self, carried: int, dots: Sequence[Dot]) -> None:
-        """So many packets arrived in the present; `dots` are a sample of them."""
+        """`carried` packets arrived in the present; `dots` are a sample of them."""
         if self._player is None:
             self.packets.add(carried, dots)
 

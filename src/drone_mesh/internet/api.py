@@ -212,7 +212,7 @@ def make_api(
         _log.info("drone %d: order sent, to %s", drone, place.in_words())
 
     not_found: Responses = {
-        404: {"model": Refusal, "description": "No such order, or forgotten"},
+        404: {"model": Refusal, "description": "No such order, or no longer remembered"},
         422: {"model": Refusal, "description": "Invalid number"},
     }
     add_order_requests(app, desk, guards, refusals, {**refusals, **not_found})

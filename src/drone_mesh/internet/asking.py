@@ -76,7 +76,7 @@ class GatewayDesk:
             if future.cancel():
                 raise NotCarriedOut("the gateway is busy or stopping; nothing was sent")
             if not future.done():
-                raise AnswerLate("the gateway has started but not finished yet")
+                raise AnswerLate("the gateway has started this request but not finished it yet")
             return future.result()
         finally:
             self._waiting.discard(future)

@@ -57,7 +57,8 @@ def parse_broker(url: str, password: str = "") -> Broker:
         )
     if parts.password is not None:
         raise ConfigurationError(
-            "a password in the MQTT address shows in the list of processes: use a file"
+            "a password in the MQTT address shows in the list of processes: "
+            "use --mqtt-password-file"
         )
     mesh = parts.path.strip("/") or DEFAULT_MESH
     if not re.fullmatch(r"[\w.-]{1,64}", mesh):

@@ -173,10 +173,9 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def _count(text: str) -> int:
-    number = int(text)
-    if number < 0:
-        raise argparse.ArgumentTypeError("must be 0 or more")
-    return number
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"invalid number {text!r}: must be whole, 0 or more")
+    return int(text)
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -21,7 +21,7 @@ class AirAddress(NamedTuple):
 
 @dataclass(frozen=True)
 class AirOptions:
-    """How a node joins or serves a shared emulated air; neither: not at all."""
+    """Whether a node joins a shared emulated air, serves one, or neither."""
 
     join: AirAddress | None = None
     serve: AirAddress | None = None

@@ -28,8 +28,8 @@ from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import POWER_UP_S
 
-TEST_TYPE = 255  # of packets of the field tools: a type that no node processes
-RPD_VALID_S = 250e-6  # settling 130 us and 40 us of signal [DS 6.4], and some room
+TEST_TYPE = 255  # type of the field tools' packets; no node processes it
+RPD_VALID_S = 250e-6  # settling 130 us and 40 us of signal [DS 6.4], plus a margin
 SWITCH_S = 505e-6  # an acknowledgement that is being sent must not be cut off
 SEND_WITHIN_S = 95e-3  # the longest transaction takes 87.1 ms
 LEAST_POLLS = 50  # our choice: on a busy machine the time may pass while this process is paused

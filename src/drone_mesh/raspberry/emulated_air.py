@@ -19,11 +19,11 @@ from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
 # Distance between columns: 0.7 of the distance at which one frame in four is lost (0 dBm, path
-# loss exponent 2.7). The next column is in range, the one after it is not.
+# loss exponent 2.7). The adjacent column is in range, the one after it is not.
 COLUMN_M = {DataRate.KBPS_250: 70.0, DataRate.MBPS_1: 32.0, DataRate.MBPS_2: 25.0}
 MOST_COLUMNS = 4  # of routers; over more hops, collisions delay the gateway's answers too long
 FEWEST_IN_COLUMN = 2  # so that each router has a second route
-_COLUMN_WIDTH = 0.5  # from its first to its last router, in distances between columns
+_COLUMN_WIDTH = 0.5  # from its first to its last router, as a share of COLUMN_M
 
 
 _log = logging.getLogger(__name__)

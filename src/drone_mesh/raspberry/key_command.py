@@ -24,13 +24,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "only, such as scp.",
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    new = commands.add_parser(
-        "new", help="make a new mesh key, for gateways and for routers that cannot be captured"
-    )
+    about = "make a new mesh key, for gateways and for routers that cannot be captured"
+    new = commands.add_parser("new", help=about, description=about)
     new.add_argument("file", type=Path, help="file to make; it must not exist")
-    node = commands.add_parser(
-        "node", help="make the keys of one router; they do not allow it to give orders to others"
-    )
+    about = "make the keys of one router, which do not allow it to give orders to others"
+    node = commands.add_parser("node", help=about, description=about)
     node.add_argument("mesh_key", type=Path, help="file with the mesh key")
     node.add_argument("id", type=whole(0, MAX_NODE_ID), help="node id of the router, 0..253")
     node.add_argument("file", type=Path, help="file to make; it must not exist")
@@ -43,7 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with naming_argument("mesh_key ", parsed.mesh_key):
                 keys = read_key_file(parsed.mesh_key)
                 if not isinstance(keys, MeshKey):
-                    raise ConfigurationError(f"{parsed.mesh_key}: not a mesh key")
+                    raise ConfigurationError(
+                        f"{parsed.mesh_key}: not a mesh key but the keys of node {keys.node}; "
+                        "use the file that 'raspberry_key new' made"
+                    )
             write_key_file(parsed.file, keys.for_node(parsed.id))
             print(f"raspberry_key: keys of node {parsed.id} in {parsed.file}")
     except ConfigurationError as error:

@@ -183,7 +183,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         type=float,
         default=MIN_REPORT_PERIOD_S,
         metavar="SECONDS",
-        help="how often a router reports its state to its gateway, for GET /mesh and the web "
+        help="period of a router's reports to its gateway, for GET /mesh and the web "
         f"console: at least {MIN_REPORT_PERIOD_S:g}, 0 for never (default: %(default)g)",
     )
     mesh.add_argument(

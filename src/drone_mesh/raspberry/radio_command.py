@@ -86,30 +86,42 @@ def _report(radio: BenchRadio, irq: IrqPin | None, options: argparse.Namespace) 
         f"radio {_radio_in_words(options)}",
         f"settings {radio.settings}",
     ]
-    for part, made in (
-        ("check", radio_tests.check(radio, irq)),
-        ("scan", radio_tests.scan(radio, REPORT_ROUNDS, USUAL_NODES)),
-    ):
-        lines.append(f"== {part}")
-        try:
-            for line in made:
-                lines.append(line)
-                if part == "check":
-                    yield line
-        except MeshError as error:
-            lines.append(f"FAIL {error}")
-            yield lines[-1]
-            break
-    try:
-        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"{file}: {error.strerror or error}") from error
+    with _refusing(file):  # before the scan, which takes seconds
+        report = file.open("w", encoding="utf-8")
+    with report:
+        for part, made in (
+            ("check", radio_tests.check(radio, irq)),
+            ("scan", radio_tests.scan(radio, REPORT_ROUNDS, USUAL_NODES)),
+        ):
+            lines.append(f"== {part}")
+            try:
+                for line in made:
+                    lines.append(line)
+                    if part == "check":
+                        yield line
+            except MeshError as error:
+                lines.append(f"FAIL {error}")
+                yield lines[-1]
+                break
+        with _refusing(file):
+            report.write("\n".join(lines) + "\n")
+            report.flush()
     yield f"report written to {file}"
+
+
+@contextlib.contextmanager
+def _refusing(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise ConfigurationError(
+            f"cannot write the report to {file}: {error.strerror or error}"
+        ) from error
 
 
 def _radio_in_words(options: argparse.Namespace) -> str:
     if options.emulated:
-        return "emulated: these results are not about a real chip"
+        return "emulated: these results do not come from a real chip"
     bus, device = options.spi
     irq = "not connected" if options.irq is None else f"GPIO{options.irq}"
     return f"on SPI {bus}.{device} at {options.spi_hz} Hz, CE GPIO{options.ce}, IRQ {irq}"
@@ -180,8 +192,12 @@ def _parser() -> argparse.ArgumentParser:
         help=f"without hardware: use an emulated radio, with node {PARTNER_ID} at this distance",
     )
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
-    tools.add_parser("check", help="test wiring, SPI, CE, supply and IRQ")
-    scan = tools.add_parser("scan", help="show the 126 channels as bars; suggest channel and rate")
+
+    def add_tool(name: str, text: str) -> argparse.ArgumentParser:
+        return tools.add_parser(name, help=text, description=text)
+
+    add_tool("check", "test wiring, SPI, CE, supply and IRQ")
+    scan = add_tool("scan", "show the 126 channels as bars; suggest channel and rate")
     scan.add_argument(
         "--rounds",
         type=whole(1, 10_000),
@@ -194,7 +210,7 @@ def _parser() -> argparse.ArgumentParser:
         default=USUAL_NODES,
         help="number of nodes in the mesh, for the suggested rate (default: %(default)s)",
     )
-    reach = tools.add_parser("range", help="measure the loss to a node at each power, as CSV")
+    reach = add_tool("range", "measure the loss to a node at each power, as CSV")
     reach.add_argument(
         "--to", type=whole(0, MAX_NODE_ID), required=True, help="id of the other node"
     )
@@ -208,17 +224,15 @@ def _parser() -> argparse.ArgumentParser:
         "--distance",
         type=float,
         metavar="METRES",
-        help="distance to the other node: also print the loss measured in 2019 at about it",
+        help="distance to the other node: also print the loss measured near that distance in 2019",
     )
     reach.add_argument(
         "--all-rates",
         action="store_true",
         help="measure at every data rate; the other node must run 'answer', with the same --rate",
     )
-    tools.add_parser(
-        "answer", help="acknowledge the packets of 'range --all-rates', at each of its rates"
-    )
-    ear = tools.add_parser("listen", help="print packets to all nodes and to --id, decoded")
+    add_tool("answer", "acknowledge the packets of 'range --all-rates', at each of its rates")
+    ear = add_tool("listen", "print packets to all nodes and to --id, decoded")
     ear.add_argument(
         "--seconds",
         type=float,
@@ -228,6 +242,6 @@ def _parser() -> argparse.ArgumentParser:
     ear.add_argument(
         "--pcapng", type=Path, metavar="FILE", help="also write the packets to FILE, for Wireshark"
     )
-    report = tools.add_parser("report", help="save check and scan in one file, for a bug report")
+    report = add_tool("report", "save check and scan in one file, for a bug report")
     report.add_argument("file", type=Path, help="text file to write")
     return parser

@@ -19,14 +19,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print it; the exit status is 1 if the gateway does not answer properly."""
     parser = argparse.ArgumentParser(
         "raspberry_status",
-        description="Prints the status of a gateway.",
-        epilog=f"Environment: {TOKEN_VARIABLE}, the token of the gateway, if it needs one.",
+        description="Prints the status of a gateway, or of a router with --http, as a table.",
+        epilog=f"Environment: {TOKEN_VARIABLE}, the token of that node, if it needs one.",
     )
     parser.add_argument(
         "url",
         nargs="?",
         default=f"http://127.0.0.1:{DEFAULT_PORT}",
-        help="address of the gateway (default: %(default)s)",
+        help="address of the node (default: %(default)s)",
     )
     url = parser.parse_args(arguments).url.rstrip("/")
     token = os.environ.get(TOKEN_VARIABLE, "")
@@ -36,6 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"raspberry_status: {error}", file=sys.stderr)
         return 1
     except (AttributeError, KeyError, TypeError):
-        print(f"raspberry_status: {url}: not a node of the mesh", file=sys.stderr)
+        print(
+            f"raspberry_status: {url}: the answer is not from a mesh node; check the address",
+            file=sys.stderr,
+        )
         return 1
     return 0

@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from drone_mesh.errors import ConfigurationError, MeshError
 
-SHORTEST_TOKEN = 16  # characters; our choice: out of reach of guessing over a network
+SHORTEST_TOKEN = 16  # characters; our choice: too long to be guessed over a network
 
 
 class AccessDenied(MeshError):

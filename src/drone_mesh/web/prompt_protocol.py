@@ -12,7 +12,7 @@ MOST_SILENT = 32  # our choice: connections without a request; the oldest makes 
 
 
 class PromptProtocol(H11Protocol):
-    """Closes a connection whose request does not arrive in time; others are left alone.
+    """Closes a connection whose request does not arrive in time, and no others.
 
     Silent connections cannot lock other clients out: there are always fewer of them than uvicorn's
     `limit_concurrency` allows. Belongs to the server's event loop.

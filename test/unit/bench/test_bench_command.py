@@ -61,7 +61,8 @@ def test_without_ros_it_says_what_to_do(capsys, tmp_path, monkeypatch):
     [
         (["--sizes", "17"], "such as 100/6"),
         (["--sizes", "300/6"], "at most 254"),
-        (["--hours", "0"], "must be above 0"),
+        (["--hours", "0"], "must be a number above 0"),
+        (["--hours", "many"], "must be a number above 0"),
         (["--launch", "hosts=2"], "name:=value"),
         (["--only", "everything"], "invalid choice"),
     ],

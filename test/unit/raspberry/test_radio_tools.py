@@ -182,12 +182,20 @@ def test_a_packet_of_a_type_that_is_not_known_is_shown_as_bytes():
     )
 
 
+def test_a_report_that_cannot_be_written_is_refused_before_the_check(tmp_path, capsys):
+    file = tmp_path / "no" / "report.txt"
+    assert main(["--emulated", "30", "report", str(file)]) == 1
+    output = capsys.readouterr()
+    assert not output.out
+    assert f"cannot write the report to {file}: No such file or directory" in output.err
+
+
 @pytest.mark.slow
 def test_a_report_holds_checks_scan_and_machine(tmp_path, capsys):
     file = tmp_path / "report.txt"
     assert main(["--emulated", "30", "report", str(file)]) == 0
     text = file.read_text(encoding="utf-8")
-    assert "radio emulated: these results are not about a real chip" in text
+    assert "radio emulated: these results do not come from a real chip" in text
     assert "== check\nok   registers" in text
     assert "125 2525 MHz" in text
     assert "Python" in text

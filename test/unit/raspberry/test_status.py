@@ -148,7 +148,7 @@ def test_a_status_that_cannot_be_had_is_one_line_and_a_failure(capsys):
     ("code", "page", "said"),
     [
         (404, b"<html>", "HTTP Error 404"),
-        (200, b"[1]", "not a node of the mesh"),
+        (200, b"[1]", "not from a mesh node"),
         (200, b"<", "line 1"),
     ],
 )

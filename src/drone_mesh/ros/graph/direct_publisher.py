@@ -23,7 +23,7 @@ class DirectPublisher(rospy.SubscribeListener):
         """`limit_s`: wall seconds, below 1, for which one send may block."""
         self._timeval = struct.pack("@ll", 0, int(limit_s * 1e6))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SyntaxWarning)  # rospy's about the missing queue
+            warnings.simplefilter("ignore", SyntaxWarning)  # rospy warns about queue_size
             self._publisher = rospy.Publisher(
                 topic, data_class, subscriber_listener=self, tcp_nodelay=True, queue_size=None
             )

@@ -31,7 +31,7 @@ class FailedNodes(ProcessListener):
 
 
 class WatchedLaunch(roslaunch.parent.ROSLaunchParent):
-    """A launch whose failed nodes are known after it."""
+    """A launch that records which required nodes failed."""
 
     failed: ClassVar[FailedNodes | None] = None  # of the one launch of this process
 

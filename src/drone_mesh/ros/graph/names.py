@@ -10,7 +10,7 @@ OTHERS_IN_RANGE_SERVICE = "/SignalSimulator/othersinRange"
 MESSAGES_SERVICE = "/SignalSimulator/messages"
 BROADCAST_SERVICE = "/SignalSimulator/broadcast"
 
-LAYOUTS_PARAM = "/DroneManager/casus"  # the file of the layouts; empty or not set: the usual one
+LAYOUTS_PARAM = "/DroneManager/casus"  # the file of the layouts; empty or not set: the package's
 GATEWAY_TOPIC = "/gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
 GATEWAY_ANSWERS_TOPIC = "/gateway/answers"  # FlightOrderAnswer: each gateway -> DroneManager
 REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"
@@ -32,10 +32,10 @@ FLEET_PARAM = "/drone_mesh/fleet"  # the factory's configuration, for hosts in o
 DRONES_PARAM = "/drone_mesh/drones"  # the ids of the present drones, see fleet_parameter.py
 
 REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
-STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> people
-EVENTS_TOPIC = "/mesh/events"  # MeshEvent: DroneFactory -> people
-PACKETS_TOPIC = "/mesh/packets"  # PacketSample: simulator -> people, while there is a subscriber
-DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> people
+STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> users
+EVENTS_TOPIC = "/mesh/events"  # MeshEvent: DroneFactory -> users
+PACKETS_TOPIC = "/mesh/packets"  # PacketSample: simulator -> users, while there is a subscriber
+DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> users
 
 MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz
 MAP_FRAME = "map"
@@ -59,7 +59,7 @@ def node_topic(node_id: int) -> str:
 
 
 def debug_topic(node_id: int) -> str:
-    """NodeDebugInfo: antenna -> people."""
+    """NodeDebugInfo: antenna -> users."""
     return f"/Nodes/{node_id}/debug"
 
 
@@ -69,12 +69,12 @@ def power_switch(node_id: int) -> str:
 
 
 def send_service(node_id: int) -> str:
-    """SendData: people -> node."""
+    """SendData: users -> node."""
     return f"/Nodes/{node_id}/send"
 
 
 def received_topic(node_id: int) -> str:
-    """ReceivedData: node -> people."""
+    """ReceivedData: node -> users."""
     return f"/Nodes/{node_id}/received"
 
 
@@ -84,7 +84,7 @@ def goal_topic(node_id: int) -> str:
 
 
 def fly_action(node_id: int) -> str:
-    """Fly, an action: people -> fly_actions."""
+    """Fly, an action: users -> fly_actions."""
     return f"/Drones/{node_id}/fly"
 
 

@@ -100,7 +100,7 @@ def main() -> None:
     with OrderlyStop() as stop:
         clock = FollowedClock()
         fleet_is_there = partial(rospy.has_param, names.FLEET_PARAM)
-        _wait_for("/DroneFactory to make the drones", fleet_is_there, stop.requested)
+        _wait_for("/DroneFactory to create the drones", fleet_is_there, stop.requested)
         _wait_for("/clock", lambda: clock.now_s > 0.0, stop.requested)
         if stop.requested():
             return

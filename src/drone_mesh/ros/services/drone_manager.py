@@ -87,7 +87,7 @@ class DroneManager:
                 f"drone {request.ID} is not in this fleet: its ids are {ids_in_words(fleet.roles)}"
             )
         if not self._gateway_is_there():
-            _log.warning("drone %d: order dropped, there is no gateway", request.ID)
+            _log.warning("drone %d: order dropped: no gateway is running", request.ID)
             return RequestDroneFlightResponse(status=0)
         _sent, no_route = self._order([Order(request.ID, goal)], fleet)
         if no_route:
@@ -156,6 +156,7 @@ def main() -> None:
     show_library_logs_on_rosout()
     layouts = or_exit(lambda: manager_layouts("~casus"))
     DroneManager(layouts)
-    _log.info("%d layouts, the built-in ones among them", len(layouts.cases))
+    file = rospy.get_param("~casus", "") or "config/casus.yaml of this package"
+    _log.info("%d layouts: built-in ones, and those of %s", len(layouts.cases), file)
     MasterWatch().start()
     rospy.spin()

@@ -185,7 +185,7 @@ class FlyActions:
             _order(flight.drone, Location.from_vector((x, y, max(0.0, z))))
             why = f"ordered to stop at x {x:.1f} m, y {y:.1f} m, z {max(0.0, z):.0f} m"
         except _Refused as refusal:
-            why = f"the drone flies on: {refusal.args[1]}"
+            why = f"the drone continues its flight: {refusal.args[1]}"
         self._forget(flight)
         handle.set_canceled(FlyResult(FlyResult.CANCELLED, why), why)
 

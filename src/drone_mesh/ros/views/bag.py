@@ -20,6 +20,7 @@ from drone_mesh.ros.graph.conversions import (
 from drone_mesh.state.model import EventRecord, MeshStatus
 
 EARLIEST_S = 1e-3  # a bag refuses a message with time 0
+_RECORDER = "'roslaunch drone_mesh record.launch'"
 
 
 class BagUnusable(MeshError):
@@ -68,11 +69,16 @@ def topics_in_bag(path: Path) -> set[str]:
         return set(bag.get_type_and_topic_info().topics)
 
 
+def no_states(path: Path) -> BagUnusable:
+    """The error for a bag without states."""
+    return BagUnusable(f"{path}: contains no {names.STATE_TOPIC}, which {_RECORDER} records")
+
+
 def _open(path: Path) -> rosbag.Bag:
     try:
         return rosbag.Bag(str(path))
     except FileNotFoundError as error:
-        raise BagUnusable(f"{path}: no such file") from error
+        raise BagUnusable(f"{path}: no such file; {_RECORDER} records one") from error
     except rosbag.ROSBagUnindexedException as error:
         raise BagUnusable(
             f"{path}: the recording was not closed; 'rosbag reindex {path}' repairs it"
@@ -80,4 +86,4 @@ def _open(path: Path) -> rosbag.Bag:
     except OSError as error:
         raise BagUnusable(f"{path}: {error.strerror or error}") from error
     except (rosbag.ROSBagException, ValueError) as error:  # for arbitrary bytes
-        raise BagUnusable(f"{path}: not a bag, or not a whole one") from error
+        raise BagUnusable(f"{path}: not a complete bag; {_RECORDER} records one") from error

@@ -27,7 +27,7 @@ from drone_mesh.view.quadrocopter import (
     turned_rad,
 )
 
-MOST_LINKS = 1500  # our choice, per use: 254 drones 1 m apart have 18,000, a blot
+MOST_LINKS = 1500  # our choice, per use: 254 drones 1 m apart have 18,000 links
 TIMES_LARGER = 4.0  # how much larger than life drones are drawn
 MESHES = "package://drone_mesh/meshes/"  # written by scripts/meshes
 FRAME_COLOUR = DARK.muted

@@ -54,7 +54,7 @@ class MeshMarkers:
         moved = self._moved.select(state.nodes, stamp.to_sec(), now_s)
         if moved:
             self._frames.publish(_frames(moved, stamp))
-        if newcomers:  # the others have these frames, perhaps with this very stamp
+        if newcomers:  # earlier subscribers have these frames already, perhaps with the same stamp
             sent = {node.id for node in moved}
             known = [node for node in state.nodes if position_is_known(node)]
             rest = _frames([node for node in known if node.id not in sent], stamp)

@@ -50,7 +50,7 @@ class Recording:
                     packets = list(read_packets(self._path))
                     self._runner.in_loop(partial(self._history.add_packets, packets))
                     took_s = time.monotonic() - begun_s
-                    _log.info("%s: on the time line as a whole after %.1f s", self._path, took_s)
+                    _log.info("%s: completely on the time line after %.1f s", self._path, took_s)
                     return
                 self._hand_over(batch)
         except BagUnusable as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import rospy
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import require_master, run_tool
-from drone_mesh.ros.views.bag import BagUnusable, topics_in_bag
+from drone_mesh.ros.views.bag import no_states, topics_in_bag
 
 # Topics that rosbag must not publish: --clock publishes the time, and running nodes the log.
 NOT_PLAYED = {names.CLOCK_TOPIC, "/rosout", "/rosout_agg"}
@@ -38,7 +39,7 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh replay",
-        description="Plays a recorded run as if it ran now, for rviz, the console and your own "
+        description="Plays a recorded run as if it were live, for rviz, the console and your own "
         "nodes. Skips the recorded clock, because rosbag publishes its own: with both, time "
         "would jump backwards.",
         epilog="The space bar pauses. Exit code: that of rosbag play; 2: unusable bag or no free "
@@ -55,23 +56,25 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _rate(text: str) -> float:
-    rate = float(text)
-    if not 0.001 <= rate <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{text}: must be 0.001..1000")
-    return rate
+    return _number(text, 0.001, 1000.0, "a number from 0.001 to 1000")
 
 
 def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0.0 <= seconds < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text}: must be 0 or more")
-    return seconds
+    return _number(text, 0.0, sys.float_info.max, "a number, 0 or more")
+
+
+def _number(text: str, lowest: float, highest: float, expected: str) -> float:
+    with contextlib.suppress(ValueError):
+        number = float(text)
+        if lowest <= number <= highest:
+            return number
+    raise argparse.ArgumentTypeError(f"invalid value {text!r}: must be {expected}")
 
 
 def _run(options: argparse.Namespace) -> int:
     topics = topics_in_bag(options.bag)
     if names.STATE_TOPIC not in topics:
-        raise BagUnusable(f"{options.bag}: contains no {names.STATE_TOPIC}")
+        raise no_states(options.bag)
     require_master()
     publishers, _subscribers, _services = rosgraph.Master("/replay").getSystemState()
     others = dict(publishers).get(names.CLOCK_TOPIC, [])

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import rospy
 
-from drone_mesh.errors import MeshError
+from drone_mesh.errors import MeshError, naming_argument
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import mesh_status
-from drone_mesh.ros.views.bag import BagUnusable, read_states
+from drone_mesh.ros.views.bag import BagUnusable, no_states, read_states
 from drone_mesh.state.model import MeshStatus
 
 WAIT_S = 5.0  # wall time for a live state: it is latched, so it arrives at once or not at all
@@ -55,16 +55,16 @@ def live_state() -> MeshStatus:
 def state_in_bag(path: Path, at_s: float | None) -> MeshStatus:
     """The last state in a bag, or the last one up to `at_s`. Raises BagUnusable."""
     found = None
-    for mesh in read_states(path):
-        if at_s is not None and mesh.stamp_s > at_s:
-            if found is None:
-                raise BagUnusable(
-                    f"{path}: no state up to {at_s:g} s; the recording starts at "
-                    f"{mesh.stamp_s:.1f} s of simulated time"
-                )
-            break
-        found = mesh
-    if found is None:
-        when = "" if at_s is None else f" up to {at_s:g} s"
-        raise BagUnusable(f"{path}: contains no {names.STATE_TOPIC}{when}")
+    with naming_argument("--bag ", path):
+        for mesh in read_states(path):
+            if at_s is not None and mesh.stamp_s > at_s:
+                if found is None:
+                    raise BagUnusable(
+                        f"{path}: no state up to {at_s:g} s; the recording starts at "
+                        f"{mesh.stamp_s:.1f} s of simulated time"
+                    )
+                break
+            found = mesh
+        if found is None:
+            raise no_states(path)
     return found
