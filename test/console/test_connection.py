@@ -32,7 +32,7 @@ def test_a_page_reconnects_by_itself_after_the_server_was_restarted(start_consol
     page.wait_for("orders work again", lambda: page.row(3, 2) == "off")
 
 
-def test_an_order_without_a_connection_is_answered_in_words(start_console, visit):
+def test_an_order_without_a_connection_gets_a_readable_answer(start_console, visit):
     console = start_console("--skip", "25")
     page = visit(console.url)
     page.wait_for_drones(len(PLACES))
@@ -94,7 +94,7 @@ def test_a_socket_of_another_page_is_refused(start_console, origin):
     assert status_of(console) == 101
 
 
-def test_a_name_that_points_here_from_elsewhere_is_refused(start_console):
+def test_another_name_that_points_here_is_refused(start_console):
     console = start_console()
     answer = httpx.get(console.url, headers={"Host": "evil.example"})
     assert answer.status_code == 403
@@ -162,7 +162,7 @@ def open_and_take_nothing(console) -> socket.socket:
     return page
 
 
-def test_a_page_that_takes_nothing_delays_no_other_page(start_console, visit):
+def test_a_page_that_reads_nothing_delays_no_other_page(start_console, visit):
     console = start_console("--routers", "253", "--gridsize", "16", "--skip", "12")
     stuck = [open_and_take_nothing(console) for _ in range(4)]
     page = visit(console.url)

@@ -54,7 +54,7 @@ def test_a_demonstration_that_was_asked_for_at_the_start_begins_with_the_first_p
     page.wait_for("the rest is on again", lambda: page.page.inner_text("#demonstrate") != "End")
 
 
-def test_a_fleet_that_is_too_small_is_told_so(start_console, visit):
+def test_a_fleet_that_is_too_small_is_refused_with_the_reason(start_console, visit):
     page = visit(start_console("--routers", "4", *HASTE).url)
     page.wait_for_drones(5)
     page.page.click("#demonstrate")

@@ -75,7 +75,7 @@ def test_a_layout_that_is_far_away_is_confirmed(start_console, visit):
     assert not page.page.is_visible("#held")
 
 
-def test_power_and_speed_are_set_back_from_the_toast(page):
+def test_power_and_speed_are_restored_from_the_toast(page):
     page.page.click("#nodes tr[data-id='5']")
     page.undo_next()
     page.page.click("#power")
@@ -144,7 +144,7 @@ def test_the_map_follows_a_drone(page):
     )
 
 
-def test_a_drone_that_is_gone_is_no_longer_followed(page):
+def test_a_removed_drone_is_no_longer_followed(page):
     page.page.click("#nodes tr[data-id='17']")
     page.page.click("#follow")
     page.page.click("#remove")
@@ -192,7 +192,7 @@ def test_places_are_saved_and_flown_to_again(page, tmp_path):
     page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
 
 
-def test_a_file_that_is_no_layout_is_refused_with_its_line(page, tmp_path):
+def test_an_invalid_layout_file_is_refused_with_its_line(page, tmp_path):
     path = tmp_path / "wrong.yaml"
     path.write_text("cases:\n  1:\n    17: [far, 14, 0]\n")
     page.page.click("#files-button")

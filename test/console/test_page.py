@@ -307,7 +307,7 @@ def test_at_phone_width_nothing_sticks_out_and_each_view_is_one_tap_away(start_c
     )
 
 
-def test_a_finger_that_moves_the_map_sends_no_drone_away(start_console, visit):
+def test_a_swipe_that_moves_the_map_sends_no_drone_away(start_console, visit):
     page = visit(start_console(*FAST).url, viewport={"width": 390, "height": 780}, has_touch=True)
     page.wait_for_drones(len(PLACES))
     start = on_screen(page, *PLACES[9])
@@ -354,7 +354,7 @@ def test_a_node_that_is_found_comes_into_view(page):
     )
 
 
-def test_a_crowd_of_events_and_ids_is_a_handful_of_tab_stops(page):
+def test_many_events_and_ids_are_only_a_few_tab_stops(page):
     page.page.check("#show-neighbours")
     page.page.click("#nodes tr[data-id='8']")
     page.wait_for("its neighbours", lambda: page.page.locator("#node-facts button").count() > 8)

@@ -81,7 +81,7 @@ def test_one_page_looks_back_while_another_stays_in_the_present(start_console, v
     assert clock_s(other) > 12.0
 
 
-def test_all_of_a_recording_that_is_played_can_be_looked_at_at_once(start_console, visit):
+def test_the_whole_of_a_recording_can_be_viewed_while_it_is_played(start_console, visit):
     recording = ("--recording", "run.bag", "--recorded", "80")
     page = visit(start_console("--skip", "2", "--haste", "1", *recording).url)
     page.wait_for_drones(18)
@@ -112,7 +112,7 @@ def test_all_of_a_recording_that_is_played_can_be_looked_at_at_once(start_consol
 
 
 @pytest.mark.parametrize("size", [(1400, 880), (390, 844)], ids=["desk", "phone"])
-def test_the_track_keeps_its_ends_when_the_past_begins_under_the_hand(start_console, visit, size):
+def test_the_track_keeps_its_ends_when_a_drag_enters_the_past(start_console, visit, size):
     page = visit(start_console(*HASTE).url, viewport={"width": size[0], "height": size[1]})
     page.wait_for_drones(18)
     page.wait_for("some time to look back at", lambda: clock_s(page) > 12.0)

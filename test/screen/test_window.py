@@ -127,7 +127,7 @@ def test_q_closes_the_window_and_the_simulation_hears_of_it(screen, window, capl
 
 
 @needs_screen
-def test_a_window_that_dies_does_no_harm_and_is_reported(screen, caplog):
+def test_a_window_that_crashes_does_no_harm_and_is_reported(screen, caplog):
     looks = []
     window = WindowProcess(lambda: looks.append(1) or SCENE)
     window.start()
@@ -138,7 +138,7 @@ def test_a_window_that_dies_does_no_harm_and_is_reported(screen, caplog):
 
 
 @needs_screen
-def test_it_can_be_stopped_before_it_is_there(screen):
+def test_it_can_be_stopped_before_it_has_started(screen):
     window = WindowProcess(lambda: SCENE)
     window.start()
     window.stop()
@@ -155,7 +155,7 @@ def test_a_screen_that_answers_is_enough(screen):
     ("display", "why"),
     [("", "DISPLAY is not set"), ("no-such-host.invalid:5", "the screen .* does not answer")],
 )
-def test_without_a_screen_it_says_so_in_one_line(monkeypatch, display, why):
+def test_without_a_screen_it_reports_that_in_one_line(monkeypatch, display, why):
     monkeypatch.setenv("DISPLAY", display)
     with pytest.raises(ConfigurationError, match=f"^gui: .*{why}.*gui:=false"):
         WindowProcess(lambda: SCENE)

@@ -1,4 +1,4 @@
-"""The order and time limits of the unit tests, and what hypothesis may make of a busy machine."""
+"""The order and time limits of the unit tests, and settings of hypothesis for a busy machine."""
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,7 +15,7 @@ SLOW_HANGS_AFTER_S = 600
 
 
 def pytest_collection_modifyitems(items: "list[pytest.Item]") -> None:
-    """Begin with what takes long on its own, or at the end one worker waits for the other.
+    """Begin with the slow tests; at the end, one worker would have to wait for the other.
 
     Slow tests get a time limit of their own.
     """

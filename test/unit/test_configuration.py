@@ -68,7 +68,7 @@ def test_an_override_wins_over_the_file_and_an_empty_one_leaves_it(write):
 
 
 @pytest.mark.parametrize("routers", [5, "5", " 5", 5.0, "5.0"])
-def test_a_number_may_come_as_yaml_ros_or_a_shell_made_it(write, routers):
+def test_a_number_may_be_written_as_in_yaml_ros_or_a_shell(write, routers):
     configuration = load_configuration(write(""), {"routers": routers})
     assert configuration.routers == 5
     assert type(configuration.routers) is int
@@ -86,7 +86,7 @@ def test_a_number_may_come_as_yaml_ros_or_a_shell_made_it(write, routers):
         ("0", False),
     ],
 )
-def test_a_switch_may_come_as_yaml_ros_or_a_shell_made_it(write, word, value):
+def test_a_switch_may_be_written_as_in_yaml_ros_or_a_shell(write, word, value):
     assert load_configuration(write(""), {"gui": word}).gui is value
 
 
@@ -165,13 +165,13 @@ def test_a_bad_override_is_refused_as_an_argument(write):
         ("routers: 1\n" * 60_000, "mine.yaml: larger than 500000 bytes"),
     ],
 )
-def test_a_file_that_is_no_configuration_is_refused_in_one_line(write, text, why):
+def test_an_invalid_configuration_file_is_refused_in_one_line(write, text, why):
     with pytest.raises(ConfigurationError, match=why) as refused:
         load_configuration(write(text))
     assert "\n" not in str(refused.value)
 
 
-def test_a_file_that_is_not_there_or_no_text_is_refused_by_name(tmp_path):
+def test_a_missing_or_binary_file_is_refused_by_name(tmp_path):
     with pytest.raises(ConfigurationError, match="nowhere.yaml: No such file"):
         load_configuration(tmp_path / "nowhere.yaml")
     with pytest.raises(ConfigurationError, match="Is a directory"):

@@ -42,7 +42,7 @@ def test_a_mesh_in_process_heals(run_example):
     assert "all nodes with a path are connected: True" in printed
 
 
-def test_ten_lines_are_enough_for_a_network_of_ones_own():
+def test_ten_lines_are_enough_for_a_network():
     lines = (ROOT / "examples" / "inprocess_network.py").read_text(encoding="utf-8").splitlines()
     code = [line for line in lines if line and not line.startswith('"""')]
     assert len(code) == 10
@@ -77,7 +77,7 @@ def test_a_comparison_that_cannot_end_well_is_refused_at_once(monkeypatch, capsy
     assert why in capsys.readouterr().err
 
 
-def test_an_engine_of_ones_own_is_chosen_by_name_and_flies(monkeypatch):
+def test_a_users_own_engine_is_chosen_by_name_and_flies(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as listener:
         monkeypatch.setenv("DRONE_PORT", str(listener.getsockname()[1]))
         monkeypatch.syspath_prepend(str(ROOT / "examples"))
@@ -97,11 +97,11 @@ def test_an_engine_of_ones_own_is_chosen_by_name_and_flies(monkeypatch):
             assert engine.get_location() == Location(latitude=2.5, longitude=1.5, height=4.0)
 
 
-def test_an_engine_of_ones_own_takes_forty_lines():
+def test_a_users_own_engine_takes_forty_lines():
     lines = (ROOT / "examples" / "own_engine.py").read_text(encoding="utf-8").splitlines()
     assert len(lines) <= 40
 
 
-def test_a_repair_of_ones_own_runs_beside_the_default(run_example):
+def test_a_users_own_repair_runs_beside_the_default(run_example):
     lines = run_example("own_repair.py", "--runs", "1").splitlines()
     assert [line.partition(": ")[0] for line in lines] == ["thesis", "__main__:LowestId"]

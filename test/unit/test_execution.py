@@ -183,7 +183,7 @@ def test_lateness_is_measured_in_seconds_of_the_clock(executor, clock):
     assert executor.lag_s(1.25) == 0.0
 
 
-def test_it_says_so_when_no_work_is_left_and_not_before(clock):
+def test_it_reports_when_no_work_is_left_and_not_before(clock):
     executor = MeshExecutor(clock, clock_is_poked=True)
     seen = []
     idle = threading.Event()

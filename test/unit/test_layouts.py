@@ -177,6 +177,6 @@ def test_a_layout_is_read_from_text_from_the_highest_id_down():
         ("nothing", "the file: expected 'key: value' lines"),
     ],
 )
-def test_a_text_that_is_no_layout_is_refused(text, why):
+def test_an_invalid_layout_text_is_refused(text, why):
     with pytest.raises(ConfigurationError, match=why):
         read_layout(text)

@@ -17,7 +17,7 @@ LIMIT_S = 100
 
 
 def run(*command: object, cwd: Path) -> str:
-    """What the command prints; fails with what it says if it fails."""
+    """What the command prints; if the command fails, fails with its output."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "PIP_"))}
     done = subprocess.run(
         [str(word) for word in command],

@@ -141,12 +141,12 @@ def test_bad_information_is_refused_and_changes_nothing(node_id, position, sub, 
 
 
 @pytest.mark.parametrize("distance_m", [0.0, -1.0, math.nan])
-def test_a_maximum_distance_that_is_none_is_refused(distance_m):
+def test_an_invalid_maximum_distance_is_refused(distance_m):
     with pytest.raises(AirError, match="must be above 0"):
         NodeTable(distance_m)
 
 
-def test_both_questions_agree_whatever_is_moved_and_switched():
+def test_both_queries_agree_however_nodes_are_moved_and_switched():
     rng = random.Random(4)
     table = register_of(*[(rng.uniform(0, 30), rng.uniform(0, 30), 0.05) for _ in range(40)])
     for _ in range(200):

@@ -1,4 +1,4 @@
-"""A file of obstacles, and what is said about a bad one."""
+"""A file of obstacles, and the error for a bad one."""
 
 from __future__ import annotations
 
@@ -67,7 +67,9 @@ def test_the_street_of_the_experiments_can_stand_in_the_world() -> None:
         ("boxes: [\n", "line 2: "),
     ],
 )
-def test_a_bad_file_is_one_line_with_file_line_and_key(tmp_path: Path, text: str, why: str) -> None:
+def test_a_bad_file_gives_one_line_with_file_line_and_key(
+    tmp_path: Path, text: str, why: str
+) -> None:
     path = written(tmp_path, text)
     with pytest.raises(ConfigurationError, match=why) as caught:
         read_obstacles(path)

@@ -1,4 +1,4 @@
-"""Boxes on the route of radio and drones."""
+"""Boxes in the way of radio and drones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_a_segment_through_a_box_is_inside_it_for_its_width() -> None:
     assert WALL.chord((0, 0, 4), (10, 0, 4)) is None
 
 
-def test_a_turned_box_stands_where_its_angle_says() -> None:
+def test_a_rotated_box_lies_at_its_angle() -> None:
     turned = Box((5.0, 0.0, 1.5), (0.2, 4.0, 3.0), yaw_rad=math.pi / 2)  # along x now
     assert turned.chord((5, -3, 1), (5, 3, 1)) == pytest.approx((2.9 / 6, 3.1 / 6))
     assert turned.chord((5.5, -3, 1), (5.5, 3, 1)) is not None
@@ -33,7 +33,7 @@ def test_a_box_that_blocks_ends_the_link() -> None:
     assert obstacles.margin_db((0, 0, 1), (4, 0, 1), 9.0) > 0
 
 
-def test_a_wall_takes_its_decibels_for_each_surface_and_each_metre() -> None:
+def test_a_wall_attenuates_by_its_decibels_per_surface_and_per_metre() -> None:
     obstacles = Obstacles([WALL], blocks=False)
     assert obstacles.loss_db((0, 0, 1), (8, 0, 1)) == pytest.approx(2 * 9.0 + 0.2 * 0.4)
     assert obstacles.loss_db((0, 0, 1), (5, 0, 1)) == pytest.approx(9.0 + 0.1 * 0.4)
@@ -41,7 +41,7 @@ def test_a_wall_takes_its_decibels_for_each_surface_and_each_metre() -> None:
 
 
 @pytest.mark.parametrize(("loss_db", "reach_m"), [(4.0, 5.7), (9.0, 3.2), (15.0, 1.6)])
-def test_behind_a_wall_the_range_shrinks_as_free_space_says(loss_db: float, reach_m: float) -> None:
+def test_behind_a_wall_the_range_shrinks_as_in_free_space(loss_db: float, reach_m: float) -> None:
     """One surface of loss_db between them: the node at the origin stands inside the box."""
     box = Box((0.0, 0.0, 0.0), (0.02, 9.0, 9.0), cut_db=loss_db)
     obstacles = Obstacles([box], blocks=False, metre_db=0.0)
@@ -104,7 +104,7 @@ def test_a_flight_goes_round_what_is_high_and_takes_the_time_of_the_detour(
         assert not TOWER.grown(CLEARANCE_M).contains(place)
 
 
-def test_the_way_round_a_low_wall_with_a_tower_in_it_is_over_the_wall() -> None:
+def test_a_low_wall_with_a_tower_in_it_is_crossed_over_the_wall() -> None:
     wall = Box((10.0, 0.0, 6.0), (2.0, 80.0, 12.0))
     obstacles = Obstacles([wall, TOWER], ceiling_m=15.0)
     path = obstacles.plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0)
@@ -115,7 +115,7 @@ def test_the_way_round_a_low_wall_with_a_tower_in_it_is_over_the_wall() -> None:
         assert obstacles.is_free(path.position_at(path.duration_s * share / 100))
 
 
-def test_out_of_a_yard_under_the_ceiling_there_is_no_way() -> None:
+def test_no_path_leads_out_of_a_yard_as_high_as_the_ceiling() -> None:
     walls = [
         Box((x, y, 10.0), (12.0, 1.0, 20.0), yaw)
         for x, y, yaw in ((0, 5, 0.0), (0, -5, 0.0), (5, 0, math.pi / 2), (-5, 0, math.pi / 2))
@@ -126,7 +126,7 @@ def test_out_of_a_yard_under_the_ceiling_there_is_no_way() -> None:
     assert Obstacles(walls).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0) is not None
 
 
-def test_a_flight_that_passes_above_or_beside_is_as_without_the_box() -> None:
+def test_a_flight_above_or_beside_a_box_is_the_same_as_without_it() -> None:
     house = Box((10.0, 30.0, 10.0), (4.0, 4.0, 20.0))
     path = Obstacles([house]).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0)
     assert path is not None
@@ -134,7 +134,7 @@ def test_a_flight_that_passes_above_or_beside_is_as_without_the_box() -> None:
     assert path.duration_s == 10.0
 
 
-def test_there_is_no_way_into_a_box_nor_up_through_one_nor_over_the_ceiling() -> None:
+def test_no_path_leads_into_a_box_or_up_through_one_or_over_the_ceiling() -> None:
     roof = Box((0.0, 0.0, 5.0), (4.0, 4.0, 1.0))
     assert Obstacles([TOWER]).plan_flight((0, 0, 0), (10, 0, 0), 0.0, 2.0) is None
     assert Obstacles([roof]).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0) is None

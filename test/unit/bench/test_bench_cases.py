@@ -27,7 +27,7 @@ def test_one_drone_of_a_fleet_is_the_gateway_and_the_others_stand_in_a_square():
 @pytest.mark.parametrize(
     "text", ["17", "17/", "/6", "x/6", "17/6@", "17/6@fast", "1.5/6", "17/6+hop"]
 )
-def test_what_is_no_size_is_refused_with_an_example(text):
+def test_an_invalid_size_is_refused_with_an_example(text):
     with pytest.raises(ConfigurationError, match="such as 100/6"):
         Case.parse(text)
 
@@ -42,7 +42,7 @@ def test_what_is_no_size_is_refused_with_an_example(text):
         ("17/6@inf", "real-time factor"),
     ],
 )
-def test_a_fleet_that_the_factory_would_not_make_is_refused_with_the_reason(text, why):
+def test_a_fleet_that_the_factory_would_refuse_is_refused_with_the_reason(text, why):
     with pytest.raises(ConfigurationError, match=why):
         Case.parse(text)
 

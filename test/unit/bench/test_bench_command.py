@@ -1,4 +1,4 @@
-"""The command as it is typed."""
+"""The command line of the benchmark."""
 
 import json
 
@@ -73,9 +73,7 @@ def test_wrong_options_are_refused_with_the_reason(capsys, arguments, why):
     assert why in err
 
 
-def test_a_place_for_the_figures_that_does_not_exist_is_refused_before_anything_is_measured(
-    capsys, tmp_path
-):
+def test_a_missing_folder_for_the_figures_is_refused_before_anything_is_measured(capsys, tmp_path):
     code, _out, err = run(capsys, "--only", "inprocess", "--json", str(tmp_path / "no" / "x.json"))
     assert "no such directory" in code
     assert err == ""

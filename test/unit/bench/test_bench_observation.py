@@ -1,4 +1,4 @@
-"""What the benchmark concludes from what its probe sees."""
+"""What the benchmark concludes from the observations of its probe."""
 
 import pytest
 
@@ -31,14 +31,14 @@ def watch_of(drones, *sights):
     "sight",
     [sample(1.5, 3, 2), Happening(0.25, 7, CONNECTED), Figures("air", 1.0, {"delivered": 12.0})],
 )
-def test_what_the_probe_says_arrives_as_it_was_meant(sight):
+def test_what_the_probe_prints_is_parsed_unchanged(sight):
     assert from_line(to_line(sight)) == sight
 
 
 @pytest.mark.parametrize(
     "line", ["", "{}", "[ WARN] something", '{"kind": "StateSample"}', '{"kind": 1}']
 )
-def test_a_line_that_is_none_is_refused(line):
+def test_an_invalid_line_is_refused(line):
     with pytest.raises(ValueError, match="probe"):
         from_line(line)
 

@@ -1,4 +1,4 @@
-"""What real processes are said to cost."""
+"""The measured cost of real processes."""
 
 import subprocess
 import sys
@@ -104,5 +104,5 @@ def test_cores_are_seconds_of_work_per_second_summed_over_processes_of_one_name(
         ([], "?"),
     ],
 )
-def test_a_process_is_called_by_its_node_or_else_its_program(arguments, name):
+def test_a_process_is_named_after_its_node_or_else_its_program(arguments, name):
     assert name_of(arguments) == name

@@ -35,7 +35,7 @@ RESULT = RosResult(
 )
 
 
-def test_a_fleet_that_flies_is_named_so() -> None:
+def test_the_name_of_a_flying_fleet_says_that_it_flies() -> None:
     assert "100, 97 flying" in ros_tables([replace(RESULT, flying=97)])
     assert "flying" not in ros_tables([RESULT])
 

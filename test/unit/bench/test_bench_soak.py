@@ -38,11 +38,11 @@ def test_memory_that_keeps_growing_is_noticed():
     assert not verdict.steady
 
 
-def test_memory_may_breathe():
+def test_memory_may_rise_and_fall():
     assert not judge(samples(lambda minute: 100.0 + (minute % 2))).memory_grew
 
 
-def test_one_connection_more_is_noticed():
+def test_one_more_connection_is_noticed():
     verdict = judge(samples(lambda minute: 100.0, files=lambda minute: 90 + (minute > 55)))
     assert verdict.open_files == (95, 96)
     assert verdict.changed == ("world",)

@@ -27,7 +27,7 @@ def packet(text):
 class RecordingAntenna(IWirelessCommunication):
     """Keeps what is sent. Loses the next `losing` packets; `dead` neighbours never take one.
 
-    `gets_lost(payload)` says so of single packets.
+    `gets_lost(payload)` decides for single packets.
     """
 
     medium = UNDISTURBED
@@ -72,7 +72,7 @@ class RecordingAntenna(IWirelessCommunication):
 
 
 class RigEngine(IDroneEngine):
-    """A drone that is where the test puts it. `place` None: it cannot say."""
+    """A drone that is where the test puts it. `place` None: the position is unknown."""
 
     def __init__(self):
         self.place = Location(0.0, 0.0, 0.0)
@@ -105,7 +105,7 @@ class RigInternet(IInternetConnection):
 
 
 class AlwaysHalf(random.Random):
-    """Chance that is none: the first check comes after half a period."""
+    """A random source that always gives 0.5: the first check comes after half a period."""
 
     def random(self):
         return 0.5
@@ -140,18 +140,18 @@ class Rig:
         self.forget()
 
     def forget(self):
-        """Start a new page: nothing sent so far counts."""
+        """Forget all packets sent so far."""
         self.antenna.taken.clear()
         self.antenna.tried.clear()
         self.antenna.broadcasts.clear()
 
     def hear(self, *texts):
-        """Packets arrive, now."""
+        """These packets arrive now."""
         for text in texts:
             self.mesh.on_msg(packet(text), self.now_s)
 
     def wait_until(self, now_s):
-        """Time passes; the component is called whenever it wants to be."""
+        """Time passes; the component is called whenever it is due."""
         while self.mesh.next_tick_s <= now_s:
             self.now_s = max(self.now_s, self.mesh.next_tick_s)
             self.mesh.tick(self.now_s)
@@ -163,19 +163,19 @@ class Rig:
         self.wait_until(self.now_s + seconds)
 
     def sent(self, kind=None):
-        """Packets that were taken since the last question, perhaps only those of one type."""
+        """Packets that were taken since the last call, or only those of one type."""
         found = [p for p in self.antenna.taken if kind in (None, p[2])]
         self.antenna.taken.clear()
         return found
 
     def tried(self, kind=None):
-        """Packets that were handed to the antenna since the last question, taken or not."""
+        """Packets that were handed to the antenna since the last call, taken or not."""
         found = [p for p in self.antenna.tried if kind in (None, p[2])]
         self.antenna.tried.clear()
         return found
 
     def broadcasts(self):
-        """Packets that were broadcast since the last question."""
+        """Packets that were broadcast since the last call."""
         found = list(self.antenna.broadcasts)
         self.antenna.broadcasts.clear()
         return found
@@ -185,7 +185,7 @@ class Rig:
         return [event.kind.name for event in self.events]
 
     def repair_in_words(self):
-        """What people see of the repair."""
+        """The sentence about the repair that views show."""
         return self.mesh.get_repair_status().in_words(self.now_s)
 
     # Shorthand for what many tests begin with; the packets are those of gateway 0.
@@ -199,7 +199,7 @@ class Rig:
         self.forget()
 
     def connect_to_gateway(self):
-        """Router: gateway 0, a neighbour, answers. All that this makes it send is forgotten."""
+        """Router: gateway 0, a neighbour, answers. The packets that this causes are forgotten."""
         me = self.mesh.get_node_id()
         self.mesh.on_msg(bytes((0, 0, 4, me, me, 1, 0, 0)).ljust(32, b"\0"), self.now_s)
         assert self.mesh.get_connected_to_gateway()

@@ -1,4 +1,4 @@
-"""A foreign routing technique, and things that are not one, for test_routing.py."""
+"""A foreign routing technique, and invalid ones, for test_routing.py."""
 
 from drone_mesh.communication.child_table_tree import ChildTableTree
 
@@ -12,7 +12,7 @@ class NotRouting:
 
 
 class WantsArguments(ChildTableTree):
-    """Cannot be made by name alone."""
+    """Cannot be created by name alone."""
 
     def __init__(self, depth):
         super().__init__()

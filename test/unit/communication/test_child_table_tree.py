@@ -75,7 +75,7 @@ def test_losing_a_grandchild_that_is_a_child_as_well_is_not_losing_the_node():
     assert tree.get_direction_to_node(4) == 4
 
 
-def test_losing_the_only_way_to_a_grandchild_is_losing_the_node():
+def test_losing_the_only_route_to_a_grandchild_is_losing_the_node():
     tree = tree_with((1, 4))
     assert tree.other_cant_communicate_with_node(1, 4) == 1
     assert tree.get_direction_to_node(4) == NO_ROUTE
@@ -127,7 +127,7 @@ def test_maintaining_asks_for_all_children_together_even_if_one_heartbeat_costs_
     assert tree.get_set_of_children() == {3}
 
 
-def test_maintaining_before_starting_is_a_mistake():
+def test_maintaining_before_starting_is_an_error():
     with pytest.raises(RuntimeError, match="maintain_routing before start_routing"):
         ChildTableTree().maintain_routing()
 
@@ -224,7 +224,7 @@ operation = st.one_of(
 
 @settings(derandomize=True, deadline=None, database=None, max_examples=60)
 @given(st.lists(operation, max_size=40))
-def test_does_what_the_words_of_the_protocol_say(operations):
+def test_behaves_as_the_protocol_describes(operations):
     tree, naive = ChildTableTree(), Naive()
     for name, *ids in operations:
         assert getattr(tree, name)(*ids) == getattr(naive, name)(*ids), (name, ids)

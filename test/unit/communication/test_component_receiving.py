@@ -86,7 +86,7 @@ def test_the_sender_is_a_direct_neighbour():
     assert rig.mesh.get_neighbours() == {2: 2.5}
 
 
-def test_a_packet_that_is_sent_on_teaches_as_well():
+def test_a_forwarded_packet_teaches_as_well():
     rig = Rig()
     rig.know_neighbour(9)
     rig.hear("05 02 00 01 09")
@@ -116,7 +116,7 @@ def test_a_packet_of_a_direct_neighbour_that_came_round_leaves_it_a_neighbour():
     assert rig.routing.get_table_size() == 2
 
 
-def test_a_packet_of_its_own_that_comes_back_does_not_teach_the_way_to_itself():
+def test_an_own_packet_that_comes_back_does_not_teach_a_route_to_itself():
     rig = Rig()
     rig.hear("01 02 04 01 01 00 ff 01", "01 02 00 01 01")
     assert rig.routing.get_direction_to_node(1) == NO_ROUTE

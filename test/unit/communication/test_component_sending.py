@@ -46,7 +46,7 @@ def test_a_router_introduces_itself_without_a_gateway_and_a_gateway_with_itself(
 
 
 @pytest.mark.parametrize("node_id", [-1, 254, 255])
-def test_an_id_that_no_node_has_is_refused(node_id):
+def test_an_invalid_id_is_refused(node_id):
     with pytest.raises(ValueError, match=f"invalid node id {node_id}: must be 0..253"):
         Rig(node_id=node_id)
 
@@ -96,7 +96,7 @@ def test_a_late_tick_makes_up_for_one_check_and_not_for_many():
         ({"send_attempts": 0}, "invalid send_attempts 0: must be at least 1"),
     ],
 )
-def test_timing_that_no_node_could_live_by_is_refused(changes, why):
+def test_impossible_timing_is_refused(changes, why):
     with pytest.raises(ConfigurationError, match=why):
         MeshTiming(**changes)
 
@@ -213,7 +213,7 @@ def test_after_three_failures_the_neighbour_is_lost_and_the_others_are_informed(
     assert rig.kinds()[-2:] == ["NEIGHBOUR_LOST", "NODE_MISSING"]
 
 
-def test_how_often_it_is_tried_is_adjustable():
+def test_the_number_of_tries_is_adjustable():
     rig = Rig(timing=MeshTiming(send_attempts=5))
     rig.antenna.dead = {5}
     rig.hear(ASK)
@@ -284,7 +284,7 @@ def test_a_missing_node_is_dropped_and_reported_to_all_but_the_sender():
     assert rig.routing.get_set_of_children() == {2, 3, 4}
 
 
-def test_a_missing_node_that_was_never_behind_the_teller_is_no_news():
+def test_a_missing_node_that_was_never_behind_the_sender_changes_nothing():
     rig = Rig()
     rig.know_neighbour(3)
     rig.hear("02 02 05 01 01 09")
@@ -310,7 +310,7 @@ def test_a_neighbour_that_is_missing_elsewhere_stays_a_neighbour():
 
 
 @pytest.mark.parametrize("missing", ["01", "fe", "ff"])
-def test_that_this_node_or_no_node_is_missing_is_no_news(missing):
+def test_a_missing_about_this_node_or_no_node_changes_nothing(missing):
     rig = Rig()
     rig.know_neighbour(2, 3)
     rig.hear(f"02 02 05 01 01 {missing}")
@@ -356,7 +356,7 @@ def test_a_height_beyond_the_field_is_its_limit(height, on_the_air):
     assert rig.sent() == [packet(f"01 01 01 05 05 00 00 00 00 00 00 00 00 {on_the_air}")]
 
 
-def test_an_answer_goes_the_way_the_question_came_with_the_asker_as_addressee():
+def test_an_answer_takes_the_route_of_the_question_with_the_asker_as_addressee():
     rig = Rig()
     rig.hear("09 05 02 01 01")
     assert rig.sent() == [packet("01 01 01 05 09")]

@@ -53,7 +53,7 @@ def test_a_check_maintains_the_routes_and_does_nothing_else():
         "05 02 04 01 01 01 09 01",  # prefers another one
     ],
 )
-def test_the_heartbeat_of_a_router_is_answered_the_way_it_came(heartbeat):
+def test_the_heartbeat_of_a_router_is_answered_along_its_route(heartbeat):
     rig = gateway_rig()
     rig.hear(heartbeat)
     assert rig.sent() == [packet("01 01 04 02 05 01 01 00")]

@@ -29,7 +29,7 @@ def test_a_rate_is_limited_per_period_and_node():
     assert limit.count(5, 10.0)
 
 
-def test_a_node_that_took_a_packet_is_no_stranger():
+def test_a_node_that_acknowledged_a_packet_does_not_count_as_a_stranger():
     strangers = Strangers()
     strangers.known.add(5)
     for node in range(100, 200):

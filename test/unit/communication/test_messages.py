@@ -231,7 +231,7 @@ def test_bytes_from_the_air_are_a_message_or_a_packet_error(payload):
 
 @repeatable
 @given(byte, header, st.sampled_from(["nan", "inf", "-inf"]), st.booleans())
-def test_numbers_that_are_none_can_be_decoded_and_are_known_as_such(kind, ids, text, second):
+def test_nan_and_infinity_can_be_decoded_and_are_recognised(kind, ids, text, second):
     numbers = (
         struct.pack("<ff", 1.0, float(text)) if second else struct.pack("<ff", float(text), 1.0)
     )
@@ -247,7 +247,7 @@ def test_numbers_that_are_none_can_be_decoded_and_are_known_as_such(kind, ids, t
         assert not math.isfinite(MovementNegotiationMessage.from_payload(payload).cost)
 
 
-def test_the_short_ways_to_a_heartbeat_and_its_body_are_those_of_the_class():
+def test_the_fast_functions_for_heartbeats_agree_with_the_class():
     message = messages.HeartbeatMessage(3, 2, 1, 0, True, 7, 0)
     assert messages.heartbeat(3, 2, 1, 0, True, 7) == message.to_payload()
     received = bytes.fromhex("03 02 00 01 00 01 07 09") + bytes(24)

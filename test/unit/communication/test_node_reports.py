@@ -1,4 +1,4 @@
-"""Compact reports: a node says how it is, and its gateway keeps the latest word."""
+"""Compact reports: a node describes its state, and its gateway keeps the latest report."""
 
 from __future__ import annotations
 

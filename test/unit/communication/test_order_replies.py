@@ -205,7 +205,7 @@ def told(rig):
     ]
 
 
-def test_a_gateway_follows_an_order_from_the_question_to_the_arrival():
+def test_a_gateway_follows_an_order_from_the_request_to_the_arrival():
     rig = gateway_rig()
     assert state(rig) == (OrderState.ASKED, "")
     rig.hear("05 05 40 00 00 01 00 01")

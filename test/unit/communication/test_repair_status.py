@@ -73,7 +73,7 @@ def test_a_router_that_is_connected_has_nothing_to_repair():
     assert rig.mesh.get_repair_status() == NOTHING_TO_REPAIR
 
 
-def test_an_ordered_flight_is_no_repair():
+def test_an_ordered_flight_is_not_a_repair():
     rig = Rig()
     rig.connect_through(2)
     rig.hear("00 02 06 01 01 00 00 a0 41")

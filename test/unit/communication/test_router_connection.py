@@ -220,7 +220,7 @@ def test_while_the_first_answer_is_waited_for_no_other_offer_is_taken():
     assert rig.mesh.get_preferred_gateway() == 9
 
 
-def test_a_check_while_the_first_answer_is_waited_for_does_not_drop_the_way():
+def test_a_check_while_the_first_answer_is_waited_for_does_not_drop_the_route():
     rig = Rig()
     rig.wait_until(4.8)
     rig.hear("02 02 04 01 01 01 00 00")
@@ -281,7 +281,7 @@ def test_two_unconnected_routers_change_nothing_in_each_other():
 
 
 @pytest.mark.parametrize("gateway", ["01", "fe", "ff"])
-def test_a_gateway_that_cannot_be_one_is_not_taken(gateway):
+def test_an_impossible_gateway_is_not_accepted(gateway):
     rig = Rig()
     rig.hear(f"02 02 04 01 01 01 {gateway} 00")
     assert rig.tried() == []
@@ -351,7 +351,7 @@ def test_the_neighbour_with_the_fewest_hops_is_tried():
 
 
 @pytest.mark.parametrize("hops", ["04", "05", "fe", "ff"])
-def test_a_neighbour_that_would_not_make_the_way_shorter_is_not_tried(hops):
+def test_a_neighbour_that_would_not_shorten_the_route_is_not_tried(hops):
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear(f"03 03 03 01 fe {hops} 01")
@@ -381,7 +381,7 @@ def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
-def test_a_neighbour_that_had_to_take_a_longer_way_since_is_no_shortcut():
+def test_a_neighbour_whose_route_has_become_longer_is_no_shortcut():
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear("03 03 03 01 fe 02 01", "03 03 03 01 fe 06 01")
@@ -399,8 +399,8 @@ def test_only_a_neighbour_can_be_a_shortcut():
         assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
-def test_a_neighbour_that_is_nearer_to_another_gateway_is_a_way_to_that_one_alone():
-    """Its few hops say nothing of the own gateway: that heartbeat goes the usual way."""
+def test_a_neighbour_nearer_to_another_gateway_is_a_shortcut_to_that_one_only():
+    """Its few hops do not lead to the own gateway, whose heartbeat takes the usual route."""
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
@@ -416,7 +416,7 @@ def test_a_neighbour_that_is_nearer_to_another_gateway_is_a_way_to_that_one_alon
     assert rig.mesh.get_preferred_gateway() == 9
 
 
-def test_a_shortcut_of_before_the_connection_was_lost_is_none():
+def test_a_shortcut_from_before_the_loss_does_not_count():
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.mesh.send_heartbeat(0)
@@ -515,7 +515,7 @@ def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
     assert len(rig.engine.goals) == 1
 
 
-def test_a_router_that_was_never_connected_knows_no_way_to_a_gateway():
+def test_a_router_that_was_never_connected_knows_no_route_to_a_gateway():
     assert Rig().mesh.get_route_to_gateway() == NO_ROUTE
 
 
@@ -546,7 +546,7 @@ def test_a_router_whose_only_route_is_gone_asks_around_at_once():
     assert packet("01 01 03 fe fe 02 00") in rig.broadcasts()
 
 
-def test_a_queued_packet_teaches_the_routes_when_the_antenna_says_what_became_of_it():
+def test_a_queued_packet_teaches_the_routes_when_the_antenna_reports_its_outcome():
     routing = EtxTree()
     rig = Rig(routing=routing)
     rig.antenna.medium = Medium(shared=True)
@@ -557,7 +557,7 @@ def test_a_queued_packet_teaches_the_routes_when_the_antenna_says_what_became_of
     assert routing.links.etx(2) > 1.0
 
 
-def test_a_router_that_takes_off_says_where_to():
+def test_a_router_that_takes_off_announces_its_goal():
     rig = shared_rig()
     rig.connect_through(2)
     rig.hear("00 02 06 01 01 00 00 80 3f")  # latitude 1
@@ -579,14 +579,14 @@ def test_a_neighbour_that_flies_out_of_reach_is_no_neighbour_from_its_take_off(l
 
 
 def test_a_place_that_was_asked_for_does_not_end_a_link():
-    """The range is only what the node knows of it: a link may be longer."""
+    """The range in the settings is only an estimate: a link may be longer."""
     rig = shared_rig()
     rig.connect_through(2)
     rig.hear("02 02 01 01 01 00 00 20 41")  # 10 m away
     assert rig.mesh.get_connected_to_gateway()
 
 
-def test_a_router_that_flies_out_of_reach_of_its_next_hop_takes_another_way_at_once():
+def test_a_router_that_flies_out_of_reach_of_its_next_hop_takes_another_route_at_once():
     rig = shared_rig()
     rig.connect_through(2)
     rig.hear("02 02 01 01 01 00 00 00 41")  # 8 m away

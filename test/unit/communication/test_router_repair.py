@@ -31,7 +31,7 @@ def bid(neighbour: int, score: float) -> str:
 
 
 def place(node: int, latitude: float) -> str:
-    """`node` says where it is."""
+    """`node` reports its place."""
     return bytes((node, node, 1, 1, 1)).hex() + struct.pack("<f", latitude).hex()
 
 
@@ -134,7 +134,7 @@ def test_a_flight_of_a_quarter_of_the_range_keeps_the_connection_and_the_routes(
     assert rig.routing.get_direction_to_node(0) == 2
 
 
-def test_after_a_short_flight_it_looks_for_others_and_loses_whom_it_left_behind():
+def test_after_a_short_flight_it_looks_for_others_and_loses_those_left_behind():
     rig = Rig()
     rig.know_neighbour(3)
     rig.connect_through(2)
@@ -287,7 +287,7 @@ def test_a_drone_that_cannot_say_where_it_is_does_not_fly_for_ever():
     assert "LANDED" in rig.kinds()
 
 
-def test_a_heartbeat_that_is_answered_in_flight_counts_no_more_after_the_landing():
+def test_a_heartbeat_answered_in_flight_no_longer_counts_after_the_landing():
     rig = Rig()
     rig.connect_through(2)
     rig.hear("00 02 06 01 01 00 00 a0 41", "00 02 04 01 01 01 00 01")
@@ -399,7 +399,7 @@ def test_a_router_that_knows_no_place_at_all_stays():
     "place", ["00 60 9c 45", "ff ff 7f 7f ff ff 7f 7f", "00 00 00 00 00 00 00 00 ff ff"]
 )
 def test_a_place_where_no_drone_may_go_is_nowhere_to_fly(place):
-    """Anybody can say anything of where he is."""
+    """Any node can claim any place."""
     rig = Rig()
     rig.connect_through(2)
     rig.hear(f"00 02 01 01 01 {place}", f"02 02 01 01 01 {place}")
@@ -408,7 +408,7 @@ def test_a_place_where_no_drone_may_go_is_nowhere_to_fly(place):
     assert rig.engine.goals == []
 
 
-def test_a_next_hop_that_says_nonsense_does_not_hide_the_place_of_the_gateway():
+def test_a_next_hop_with_an_impossible_place_does_not_hide_that_of_the_gateway():
     rig = lone_rig()
     rig.hear("02 02 01 01 01 00 60 9c 45")
     rig.antenna.dead = {2}
@@ -500,7 +500,7 @@ def test_a_router_that_knows_no_gateway_location_does_not_bid():
 
 
 def test_a_router_that_knows_only_the_place_of_the_gateway_bids_for_flying_there():
-    """Else a group of such drones would stay for ever (the place to fly to without neighbours)."""
+    """Otherwise a group of such drones would stay for ever."""
     rig = Rig()
     rig.engine.place = Location(12.0, 0.0, 0.0)
     rig.connect_through(2)
@@ -521,7 +521,7 @@ def test_a_router_that_does_not_know_its_location_does_not_bid():
     assert rig.sent(BID) == [own_bid(3, -1.0)]
 
 
-def test_a_gateway_that_says_it_is_beyond_all_bounds_does_not_break_the_bids():
+def test_a_gateway_with_an_impossible_place_does_not_break_the_bids():
     rig = group_rig(3)
     rig.hear("00 03 01 01 01 ff ff 7f 7f ff ff 7f 7f", "00 03 04 01 01 01 00 05")
     rig.wait_until(100.0)
@@ -617,7 +617,7 @@ def test_becoming_connected_ends_a_negotiation():
 
 
 def test_old_bids_do_not_count():
-    """Node 4 bid more once, and is not there any more."""
+    """Node 4 bid more, and has disappeared since."""
     rig = group_rig(3)
     rig.mesh.on_msg(packet(bid(4, 99.0)), rig.now_s)
     rig.antenna.dead = {2, 4}
@@ -943,7 +943,7 @@ def test_the_last_leg_ends_at_the_goal_and_not_just_before_it():
     assert rig.engine.goals == [BESIDE_GATEWAY]
 
 
-def test_in_flight_it_does_not_take_up_a_connection():
+def test_in_flight_it_accepts_no_connection():
     rig = flying_rig()
     fly(rig, Location(10.0, 0.0, 2.0))
     rig.hear("00 09 04 01 01 01 00 01")
@@ -1014,7 +1014,7 @@ def test_a_router_learns_where_the_gateway_is_from_an_answer_that_it_forwards():
     assert [payload[4] for payload in rig.sent(LOCATION)] == [5, 5]
 
 
-def test_news_of_the_gateway_that_are_older_change_nothing():
+def test_older_news_of_the_gateway_changes_nothing():
     rig = Rig()
     rig.connect_through(2)
     rig.hear("00 02 01 01 01 00 00 80 3f")

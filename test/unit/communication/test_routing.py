@@ -52,6 +52,6 @@ def test_an_unknown_name_is_refused_with_a_list_of_what_is_known(name):
         "drone_mesh.communication.routing_interfaces:IRoutingTechnique",
     ],
 )
-def test_what_cannot_be_loaded_is_refused_by_its_name(name):
+def test_what_cannot_be_loaded_is_refused_by_name(name):
     with pytest.raises(ConfigurationError, match=f"routing technique '?{name}'? "):
         create_routing_technique(name)

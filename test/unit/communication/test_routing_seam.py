@@ -56,7 +56,7 @@ def test_extension_bytes_follow_the_body_of_a_heartbeat(rig):
     assert rig.antenna.taken[-1] == packet("01 01 04 02 02 00 ff 00 aa bb")
 
 
-def test_a_technique_is_told_how_many_bytes_fit(rig):
+def test_a_technique_learns_how_many_bytes_fit(rig):
     rig.hear("02 02 03 01 fe 00 01")
     rig.mesh.search_other_nodes_in_range()
     assert rig.routing.rooms == {3: 23, 4: 24}
@@ -84,7 +84,7 @@ def test_a_technique_hears_each_packet_and_may_drop_it(rig):
     assert len(rig.antenna.taken) == taken
 
 
-def test_a_technique_is_told_the_result_and_the_transmissions_of_each_send(rig):
+def test_a_technique_learns_the_result_and_the_transmissions_of_each_send(rig):
     rig.hear("02 02 03 01 fe 00 01")
     rig.antenna.losing = 1
     rig.mesh.send_heartbeat(2)

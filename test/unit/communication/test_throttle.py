@@ -17,7 +17,7 @@ def test_each_reason_is_due_once_a_period_and_always_counted():
     assert throttle.counts == {"bad": 4, "worse": 1}
 
 
-def test_a_clock_that_went_back_silences_nothing():
+def test_a_clock_that_jumped_back_silences_nothing():
     throttle = Throttle(period_s=10.0)
     throttle.count("bad", 500.0)
     assert throttle.count("bad", 1.0)

@@ -73,7 +73,7 @@ def test_afterwards_the_speed_and_the_other_drones_are_as_before():
     assert fleet.is_off == {2}
 
 
-def test_with_two_gateways_the_second_one_rests():
+def test_with_two_gateways_the_second_one_takes_no_part():
     fleet, demonstration = Fleet(gateways=2, routers=5), RepairDemonstration()
     fleet.watch(demonstration)
     told = texts(demonstration)

@@ -88,7 +88,7 @@ def frame(store):
     return json.loads(store.frame_since(0))
 
 
-def test_each_question_is_for_the_events_after_the_last_one(gateway):
+def test_each_request_asks_for_the_events_after_the_last_one(gateway):
     store = FrameStore()
     feed = GatewayFeed(GatewayClient(gateway.url, "secret"), store, PromptRunner())
     feed.ask()
@@ -126,14 +126,14 @@ def test_a_gateway_that_was_restarted_is_asked_from_the_start(gateway):
         (200, {**MESH, "gateway": None}, "invalid answer"),
     ],
 )
-def test_a_gateway_that_does_not_answer_well_is_named_in_the_page(gateway, status, answer, said):
+def test_a_gateway_with_an_invalid_answer_is_named_on_the_page(gateway, status, answer, said):
     gateway.status, gateway.answer = status, answer
     store = FrameStore()
     GatewayFeed(GatewayClient(gateway.url), store, PromptRunner()).ask()
     assert said in frame(store)["link"]
 
 
-def test_no_gateway_at_all_is_named_in_the_page():
+def test_a_gateway_that_does_not_answer_is_named_on_the_page():
     store = FrameStore()
     GatewayFeed(GatewayClient("http://127.0.0.1:1"), store, PromptRunner()).ask()
     assert frame(store)["link"].startswith("no answer from http://127.0.0.1:1")
@@ -150,7 +150,7 @@ def test_an_order_of_the_page_is_posted_and_a_refusal_comes_back(gateway):
         controls.fly(3, 0.0, 0.0, 0.0)
 
 
-def test_what_is_for_a_simulation_is_refused():
+def test_orders_that_only_a_simulation_knows_are_refused():
     controls = GatewayControls(GatewayClient("http://127.0.0.1:1"))
     for refused in (
         lambda: controls.power(1, True),
@@ -167,7 +167,7 @@ def test_an_error_page_without_a_reason_is_named_by_its_status(gateway):
         GatewayClient(gateway.url).mesh(0)
 
 
-def test_an_address_that_is_none_ends_the_program_with_a_reason(capsys):
+def test_an_invalid_address_ends_the_program_with_a_reason(capsys):
     with pytest.raises(SystemExit):
         main(["--gateway", "pi:9080"], {})
     assert "must begin with http:// or https://" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""What a page can look at again."""
+"""The recorded part of a run, to which a page can return."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_state_comes_back_as_it_was():
     assert history.state(0) == given
 
 
-def test_of_a_live_run_thirty_minutes_are_kept():
+def test_thirty_minutes_of_a_live_run_are_kept():
     history = History()
     for second in range(2000):
         history.add(mesh(float(second)), wall_s=float(second))
@@ -48,7 +48,7 @@ def test_of_a_live_run_thirty_minutes_are_kept():
     assert history.times[-1] == 1999.0
 
 
-def test_states_of_a_crowd_are_kept_as_far_as_there_is_room():
+def test_states_of_many_nodes_are_kept_as_far_as_memory_allows():
     history = History(kept_bytes=20_000)
     for second in range(200):
         history.add(mesh(float(second), size=50), wall_s=float(second))

@@ -130,7 +130,7 @@ def test_a_page_is_greeted_and_then_gets_everything():
     run(scenario)
 
 
-def test_a_page_that_takes_nothing_is_cut_off_while_another_goes_on(
+def test_a_page_that_reads_nothing_is_disconnected_while_another_continues(
     monkeypatch: pytest.MonkeyPatch,
 ):
     monkeypatch.setattr(server_module, "SEND_TIMEOUT_S", 0.3)
@@ -265,7 +265,7 @@ def test_a_watched_node_comes_with_its_neighbours():
 @pytest.mark.parametrize(
     "headers", [{"origin": "http://evil.example"}, {"host": "evil.example"}, {"origin": ""}]
 )
-def test_a_stranger_is_closed_before_anything_is_said(headers):
+def test_a_stranger_is_disconnected_before_any_message(headers):
     async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
         page = FakePage(server, **headers).open()
         await until("closed", lambda: page.closed_with)
@@ -275,7 +275,7 @@ def test_a_stranger_is_closed_before_anything_is_said(headers):
     run(scenario)
 
 
-def test_so_many_pages_and_no_more_and_the_place_of_one_that_vanished_is_free():
+def test_pages_above_the_limit_are_refused_and_a_vanished_page_frees_its_place():
     async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
         pages = [FakePage(server).open() for _ in range(MOST_PAGES)]
         await until("all are greeted", lambda: all(page.received for page in pages))

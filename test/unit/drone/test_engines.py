@@ -60,7 +60,7 @@ def test_an_own_engine_is_made_with_the_id_of_the_node_and_can_fly() -> None:
         ("mavlink:tcp:127.0.0.1:1", "MAVLink address tcp:127.0.0.1:1: .*refused"),
     ],
 )
-def test_an_engine_that_cannot_be_had_is_refused_with_a_reason(drone: str, why: str) -> None:
+def test_an_unavailable_engine_is_refused_with_a_reason(drone: str, why: str) -> None:
     with pytest.raises(ConfigurationError, match=why):
         create_engine(4, HERE, FlightOptions(drone=drone, origin=ORIGIN))
 
@@ -82,6 +82,6 @@ def test_a_drone_with_an_autopilot_needs_an_origin() -> None:
         ({"hover_m": 51.0}, "--hover 51 is outside"),
     ],
 )
-def test_limits_that_make_no_sense_are_refused_by_the_name_of_their_option(limits, why) -> None:
+def test_invalid_limits_are_refused_by_the_name_of_their_option(limits, why) -> None:
     with pytest.raises(ConfigurationError, match=why):
         FlightLimits(**limits)

@@ -1,4 +1,4 @@
-"""MavlinkEngine over UDP, in the time of the wall."""
+"""MavlinkEngine over UDP, in wall time."""
 
 from __future__ import annotations
 

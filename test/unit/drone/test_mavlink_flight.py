@@ -91,7 +91,7 @@ def test_the_same_goal_again_changes_nothing() -> None:
     assert bench.place.latitude > 12.0
 
 
-def test_it_flies_as_fast_as_it_was_told_to() -> None:
+def test_it_flies_at_the_speed_that_was_set() -> None:
     bench = Bench(limits=FlightLimits(speed_m_s=3.0)).ready()
     bench.goal(100.0, 0.0, 12.0)
     bench.run_until("it is on its way", lambda: bench.place.latitude > 20.0)

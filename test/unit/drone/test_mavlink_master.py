@@ -1,4 +1,4 @@
-"""Who is master: the pilot. What ends a flight, and what this program may not do."""
+"""The pilot has priority: what ends a flight, and what this program may not do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Other people's MAVLink software: MAVSDK and MAVProxy fly our vehicle, MAVSDK is our vehicle."""
+"""Foreign MAVLink software: MAVSDK and MAVProxy fly our vehicle; our engine reads MAVSDK's."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_mavproxy_guides_arms_takes_off_and_reads_the_parameters(tmp_path: Path)
 class Relay(threading.Thread):
     """Between MAVSDK's vehicle and the engine; names the autopilot and the type in heartbeats.
 
-    MAVSDK's Python configuration can be nothing but a "generic" vehicle.
+    MAVSDK's Python configuration can only be a "generic" vehicle.
     """
 
     def __init__(self, engine_port: int, autopilot: int | None) -> None:

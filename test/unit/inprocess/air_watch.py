@@ -1,4 +1,4 @@
-"""Counts, at the air, how often each packet is sent on."""
+"""Counts, at the air, how often each packet is forwarded."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class AirWatch:
         return taken
 
     def sent_on(self, kind):
-        """(from, to) of each time that a packet of this type was sent on by another node."""
+        """(from, to) of each time that another node forwarded a packet of this type."""
         return self._sent_on[kind]
 
     def most_often_sent_on(self):
-        """How often the packet was sent on that was sent on most often."""
+        """How often the packet that was forwarded most often was forwarded."""
         return max(
             (
                 sent_on / max(1, made)

@@ -1,4 +1,4 @@
-"""Networks that more than one test builds, and questions that more than one test asks."""
+"""Networks and checks that several tests share."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def assert_hops_are_paths(network, above_shortest=1):
 
 
 def run_until(network, condition, within_s, step_s=5.0):
-    """As Network.run_until, looking less often."""
+    """As Network.run_until, checking less often."""
     end_s = network.clock.now_s + within_s
     while not condition():
         if network.clock.now_s >= end_s:

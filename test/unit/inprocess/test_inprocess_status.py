@@ -42,7 +42,7 @@ def test_a_status_stays_as_it_was(line):
     assert [node.connected for node in after.nodes] == [True, False, False, False]
 
 
-def test_a_drone_in_flight_has_the_rest_of_its_way(line):
+def test_a_drone_in_flight_has_the_rest_of_its_path(line):
     assert line.order(3, x=12.0, y=6.0)
     line.run_for(0.5)
     (flying,) = [node for node in line.status().nodes if len(node.path)]

@@ -70,7 +70,7 @@ def test_a_gateway_that_starts_last_connects_all():
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("loss", "within_s"), [(0.1, 15.0), (0.2, 30.0)])
-def test_a_lossy_and_jittery_air_connects_them_all_the_same(loss, within_s, seed):
+def test_nodes_also_connect_over_a_lossy_and_jittery_air(loss, within_s, seed):
     network = fleet(16, gridsize=4, seed=seed, loss=loss, jitter_s=0.02)
     assert network.run_until(network.all_connected, within_s)
     network.run_for(60.0)
@@ -188,7 +188,7 @@ def test_in_a_quiet_network_no_packet_goes_round():
 
 
 class Stranger(ChildTableTree):
-    """Somebody else's technique: chosen as test_network_connects:Stranger."""
+    """A technique from outside the package: chosen as test_network_connects:Stranger."""
 
     made = 0
 
@@ -219,7 +219,7 @@ def test_an_id_is_given_once():
         ({"jitter_s": math.inf}, "invalid jitter_s inf"),
     ],
 )
-def test_numbers_that_no_radio_has_are_refused(options, why):
+def test_invalid_numbers_for_the_radio_are_refused(options, why):
     with pytest.raises(ConfigurationError, match=why):
         Network(**options)
 

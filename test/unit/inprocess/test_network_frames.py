@@ -51,7 +51,7 @@ def test_places_never_cross_the_border_between_two_frames(two_frames, caplog):
     assert network.nodes[3].drone.get_location().longitude == pytest.approx(18.0, abs=6.1)
 
 
-def test_a_mesh_with_one_origin_is_repaired_as_ever(monkeypatch):
+def test_a_mesh_with_one_origin_is_repaired_as_usual(monkeypatch):
     monkeypatch.setattr(InProcessDrone, "frame_digest", lambda self: ONE)
     network = line(2, spacing=8.0)
     network.run_for(40.0)

@@ -1,4 +1,4 @@
-"""Seeded misfortune: kill sequences, packets that would circulate, arbitrary packets."""
+"""Seeded faults: kill sequences, packets that would circulate, arbitrary packets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people read while a mesh repairs itself: layout 202, router 1 switched off."""
+"""The sentences shown while a mesh repairs itself: layout 202, router 1 switched off."""
 
 from __future__ import annotations
 

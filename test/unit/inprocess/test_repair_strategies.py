@@ -44,7 +44,7 @@ def test_a_drone_that_is_cut_off_flies_and_is_connected(repair):
 
 
 @pytest.mark.parametrize("repair", FLYING)
-def test_no_drone_is_harmed_in_sequences_of_misfortunes(repair):
+def test_no_drone_is_harmed_in_sequences_of_faults(repair):
     outcomes = [run_sequence(seed, repair, largest=12) for seed in range(8)]
     assert [outcome for outcome in outcomes if harm(outcome)] == []
 
@@ -127,7 +127,7 @@ def test_with_thesis_that_drone_waits_five_times_as_long():
 
 
 @pytest.mark.parametrize("silence_s", [45.0, 52.0, 120.0, 600.0])
-def test_with_scout_all_drones_stand_after_a_silence_where_they_stood(silence_s):
+def test_with_scout_all_drones_are_back_at_their_places_after_a_silence(silence_s):
     """At 45 and 52 s some are on their way, and some listen."""
     network = fleet(8, 3, repair="scout")
     network.run_for(30.0)
@@ -156,7 +156,7 @@ def test_with_field_the_drones_move_towards_the_gateway_leg_by_leg():
     assert network.location(3).longitude < 8.0 + RANGE_M
 
 
-def test_a_strategy_of_ones_own_is_created_by_its_module_and_class():
+def test_a_users_own_strategy_is_created_by_its_module_and_class():
     network = Network(repair="drone_mesh.communication.strategies.stay:Stay")
     network.add_router(1, 0.0, 0.0)
     assert isinstance(create_repair_strategy("stay"), IRepairStrategy)

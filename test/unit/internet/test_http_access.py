@@ -1,4 +1,4 @@
-"""Who may ask a gateway over HTTP, how much, and from where."""
+"""Access to a gateway over HTTP: which clients, from where, and how large a request."""
 
 from __future__ import annotations
 
@@ -84,14 +84,14 @@ def test_an_address_that_is_not_available_is_refused_with_the_reason(address, po
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "192.0.2.1", "["])
-def test_a_name_of_elsewhere_that_points_here_is_refused(mesh, host):
+def test_a_foreign_name_that_points_here_is_refused(mesh, host):
     answer = mesh.client.get("/ready", headers={"Host": host})
     assert answer.status_code == 403
     assert "not a loopback name" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", "http://["])
-def test_a_page_of_elsewhere_in_a_browser_of_this_machine_moves_no_drone(mesh, origin):
+def test_a_foreign_page_in_a_browser_of_this_machine_moves_no_drone(mesh, origin):
     sent = mesh.sent()
     answer = mesh.client.post(ORDER, headers={"Origin": origin})
     assert answer.status_code == 403
@@ -149,7 +149,7 @@ def test_an_address_that_is_too_long_is_refused(mesh):
         b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nx",
     ],
 )
-def test_what_is_no_http_is_answered_400_and_the_connection_closed(mesh, request_bytes):
+def test_invalid_http_is_answered_400_and_the_connection_closed(mesh, request_bytes):
     with socket.create_connection(("127.0.0.1", mesh.internet.port), timeout=20.0) as connection:
         connection.sendall(request_bytes)
         answer = b""

@@ -44,7 +44,7 @@ def test_a_goal_in_degrees_arrives_in_metres_and_the_answer_has_both(make_mesh):
         ({"latitude": 1, "longitude": 0, "height": 1, "speed": 9}, "Extra|extra"),
     ],
 )
-def test_a_goal_that_is_none_is_refused_with_a_reason(mesh, goal, why):
+def test_an_invalid_goal_is_refused_with_a_reason(mesh, goal, why):
     answer = mesh.client.post("/drones/1/goal", json=goal)
     assert answer.status_code == 422
     assert re.search(why, answer.json()["detail"])

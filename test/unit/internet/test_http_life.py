@@ -24,7 +24,7 @@ PATIENCE_S = 20.0  # for threads; nothing here takes a tenth of it
 
 
 class SlowGateway(IGatewayCommands):
-    """Does not finish an order before it is let go."""
+    """Does not finish an order before it is released."""
 
     def __init__(self):
         self.begun, self.go_on = threading.Event(), threading.Event()
@@ -61,7 +61,7 @@ def http_threads():
     return [thread for thread in threading.enumerate() if thread.name == "http"]
 
 
-def test_an_order_that_the_gateway_has_not_come_to_is_refused_and_never_done(make_mesh):
+def test_an_order_that_the_gateway_has_not_started_is_refused_and_never_carried_out(make_mesh):
     mesh = make_mesh(answer_within_s=0.2)
     sent, go_on = mesh.sent(), threading.Event()
     mesh.executor.submit(lambda _now_s: go_on.wait(PATIENCE_S))
@@ -140,7 +140,7 @@ def test_disconnecting_right_after_connecting_ends(make_mesh):
     assert len(http_threads()) == before
 
 
-def test_a_client_that_says_nothing_does_not_hold_up_the_end(make_mesh):
+def test_a_silent_client_does_not_delay_the_end(make_mesh):
     mesh = make_mesh()
     silent = http.client.HTTPConnection("127.0.0.1", mesh.internet.port, timeout=PATIENCE_S)
     silent.connect()

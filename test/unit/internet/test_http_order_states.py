@@ -1,4 +1,4 @@
-"""A gateway says over HTTP what became of its orders."""
+"""A gateway reports the outcome of its orders over HTTP."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ def certificate(tmp_path) -> Certificate:
     return Certificate(cert, key)
 
 
-def test_with_a_certificate_it_speaks_https(make_mesh, certificate):
+def test_with_a_certificate_it_serves_https(make_mesh, certificate):
     mesh = make_mesh(certificate=certificate)
     assert mesh.internet.url.startswith("https://")
     trust = ssl.create_default_context(cafile=str(certificate.cert))

@@ -292,7 +292,7 @@ def test_data_goes_over_tls_with_a_password(secure_broker, tmp_path):
         (PASSWORD, False, "is not trusted: self"),  # "self signed" with OpenSSL 1.1
     ],
 )
-def test_a_broker_that_refuses_or_is_not_trusted_shows_in_one_line(
+def test_a_broker_that_refuses_or_is_not_trusted_gives_one_line(
     secure_broker, tmp_path, caplog, password, trusted, reason
 ):
     where = Broker("127.0.0.1", secure_broker.port, True, "field", "field", password)

@@ -12,7 +12,7 @@ from drone_mesh.internet.mqtt_topics import Broker, Destination, Topics, parse_b
         ("mqtts://me@10.0.0.1/", Broker("10.0.0.1", 8883, True, "mesh", "me", "secret")),
     ],
 )
-def test_an_address_says_where_the_broker_is(url, broker):
+def test_an_address_names_the_broker(url, broker):
     assert parse_broker(url, "secret" if broker.user else "") == broker
 
 

@@ -206,7 +206,7 @@ def test_a_bad_argument_is_named(tmp_path: Path, argument: str, words: str) -> N
         (b"", "expected 'key: value' lines"),
     ],
 )
-def test_a_file_that_is_no_experiment_is_refused(tmp_path: Path, data: bytes, words: str) -> None:
+def test_an_invalid_experiment_file_is_refused(tmp_path: Path, data: bytes, words: str) -> None:
     path = tmp_path / "trial.yaml"
     path.write_bytes(data)
     with pytest.raises(ConfigurationError, match="trial.yaml") as caught:
@@ -248,7 +248,7 @@ class Fails(IRepairStrategy):
         ("metrics", "parts:f", "has no attribute 'f'"),
     ],
 )
-def test_a_module_of_the_users_that_fails_is_one_line(
+def test_a_users_module_that_fails_gives_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, value: str, words: str
 ) -> None:
     folder = tmp_path / "modules"

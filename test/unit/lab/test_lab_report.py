@@ -138,7 +138,7 @@ def test_metrics_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.count("\n") == len(METRICS)
 
 
-def test_rviz_without_ros_is_one_line(
+def test_rviz_without_ros_gives_one_line(
     results_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("PATH", str(results_folder))

@@ -172,7 +172,7 @@ def test_shards_of_different_experiments_are_not_merged(
     assert "different experiments" in capsys.readouterr().err
 
 
-def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_go_on(
+def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_continue(
     bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = SMALL.replace("[0, 0.2]", "[0]") + "metrics: ['own_lab_parts:boom']\n"
@@ -361,7 +361,7 @@ def test_a_killed_worker_loses_nothing(
 
 
 @pytest.mark.slow
-def test_a_run_that_always_kills_its_worker_is_a_failure_and_the_others_go_on(
+def test_a_run_that_always_kills_its_worker_is_a_failure_and_the_others_continue(
     bench: Callable[..., Path], tmp_path: Path
 ) -> None:
     path = bench("metrics: ['own_lab_parts:deadly']\n")
@@ -512,7 +512,7 @@ def test_jobs_of_slurm_do_the_runs_and_are_cancelled_at_the_end(
 
 
 @pytest.mark.slow
-def test_what_slurm_lacks_is_one_line(
+def test_a_missing_part_of_slurm_gives_one_line(
     slow: Path, slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("DASK_JOBQUEUE__SLURM__CORES")
@@ -524,7 +524,7 @@ def test_what_slurm_lacks_is_one_line(
 
 
 @pytest.mark.slow
-def test_ctrl_c_keeps_everything_and_prints_how_to_go_on(
+def test_ctrl_c_keeps_everything_and_prints_how_to_continue(
     slow: Path, slow_rows: bytes, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
@@ -552,7 +552,7 @@ def test_a_results_folder_is_needed_to_repeat_a_run(
     assert "not a results folder" in capsys.readouterr().err
 
 
-def test_show_repeats_the_very_run(
+def test_show_repeats_exactly_that_run(
     bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run(bench(), tmp_path / "out", "seeds=1")
@@ -564,7 +564,7 @@ def test_show_repeats_the_very_run(
     assert "fault: kill" in shown
 
 
-def test_show_says_why_it_is_another_run(
+def test_show_says_why_the_run_differs(
     bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run(bench(), tmp_path / "out", "seeds=1")

@@ -1,4 +1,4 @@
-"""Random misfortunes: the repair never harms, and heals what can be healed."""
+"""Random faults: the repair does no harm, and heals what can be healed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_the_same_seed_gives_the_same_outcome():
     assert run_sequence(3) == run_sequence(3)
 
 
-def test_the_command_goes_on_where_it_was_stopped(tmp_path, capsys):
+def test_the_command_continues_where_it_was_stopped(tmp_path, capsys):
     table = tmp_path / "outcomes.csv"
     assert main(["--runs", "2", "--csv", str(table)]) == 0
     assert main(["--runs", "3", "--csv", str(table)]) == 0

@@ -112,7 +112,7 @@ def test_what_cannot_be_sent_is_not_sent(lab, nodes, bad):
     assert len(lab.trace.frames) == frames
 
 
-def test_an_antenna_that_fell_silent_sends_nothing_and_says_so_at_once(lab, nodes):
+def test_an_antenna_that_fell_silent_sends_nothing_and_reports_it_at_once(lab, nodes):
     nodes[0].antenna.fall_silent()
     began_ns = lab.clock.now_ns
     assert not nodes[0].antenna.send_message_to(packet(1))
@@ -132,7 +132,7 @@ def test_an_antenna_that_falls_silent_drops_what_waits(lab, nodes):
     assert nodes[0].mesh.undelivered == []
 
 
-def test_an_antenna_that_is_off_neither_sends_nor_hears_and_says_so_to_the_mesh(lab, nodes):
+def test_an_antenna_that_is_off_neither_sends_nor_hears_and_reports_it_to_the_mesh(lab, nodes):
     off = nodes[1].antenna
     off.switch_power(False)
     assert not off.on()

@@ -64,7 +64,7 @@ def test_the_page_shows_routes_places_and_why_a_drone_cannot_fly(network):
     assert more[2]["earth"][2] == 3.0
 
 
-def test_a_node_that_falls_silent_is_shown_so(network):
+def test_a_node_that_falls_silent_is_shown_as_silent(network):
     network.power(2, False)
     network.run_for(120.0)
     mesh, _more = real_mesh(answer(network))

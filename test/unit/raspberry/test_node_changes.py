@@ -27,7 +27,7 @@ class Watched:
         self.said.append((event.node, event.kind.value, event.detail))
 
     def run_for(self, duration_s: float) -> list[tuple[int, str, str]]:
-        """What is said within that time."""
+        """The events reported within that time."""
         self.said.clear()
         for _ in range(round(duration_s)):
             self.network.run_for(1.0)

@@ -1,4 +1,4 @@
-"""raspberry_radio on emulated chips: what a good radio shows, and what each fault is called."""
+"""raspberry_radio on emulated chips: its output for a good radio and for each fault."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def test_a_node_that_only_acknowledges_is_not_taken_for_lost_packets(pair, monke
             list(lines)
 
 
-def test_a_far_end_that_is_not_there_is_named(pair, monkeypatch):
+def test_a_missing_far_end_is_named(pair, monkeypatch):
     monkeypatch.setattr(range_test, "JOIN_WITHIN_S", 0.0)
     lines = range_test.measure_range(pair.near, FAR_ID, 1, rates=(DataRate.MBPS_1,))
     with pytest.raises(RadioError, match="no answer from node 5 at 250 kbit/s: start"):

@@ -104,7 +104,7 @@ def test_a_signal_ends_a_node_that_listens_and_powers_its_radio_down(wired, numb
     assert signal.getsignal(number) is handler
 
 
-def test_without_a_chip_it_ends_with_one_line_and_gives_everything_back(wired, capfd):
+def test_without_a_chip_it_ends_with_one_line_and_releases_everything(wired, capfd):
     wired.faults.miso_stuck_at = 0x00
     threads = threading.active_count()
     line = "--id 7 --spi 0.1 --ce 5 --irq 6"
@@ -116,7 +116,7 @@ def test_without_a_chip_it_ends_with_one_line_and_gives_everything_back(wired, c
     assert threading.active_count() == threads
 
 
-def test_a_gateway_that_cannot_serve_gives_the_radio_back(wired, capfd):
+def test_a_gateway_that_cannot_serve_releases_the_radio(wired, capfd):
     with socket.create_server(("127.0.0.1", 0)) as other:
         line = f"--spi 0.1 --ce 5 --port {other.getsockname()[1]}"
         assert run_until(never, parse_gateway, line) == 1

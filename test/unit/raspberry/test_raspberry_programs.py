@@ -32,7 +32,7 @@ NO_SPI = (
 
 
 class Program:
-    """A running program and what it says."""
+    """A running program and its output."""
 
     def __init__(self, name, *arguments):
         self._process = subprocess.Popen(
@@ -53,7 +53,7 @@ class Program:
         self._lines.put(None)
 
     def wait_for(self, pattern):
-        """What the first line that matches says; fails with all that was said until then."""
+        """The first line that matches; fails with the whole output until then."""
         deadline = time.monotonic() + PATIENCE_S
         while True:
             try:
@@ -109,7 +109,7 @@ def free_port():
         ("raspberry_gateway", "--spi 99.0", NO_SPI),
     ],
 )
-def test_what_is_missing_is_said_in_one_line_with_what_to_do(name, line, reason):
+def test_what_is_missing_is_reported_in_one_line_with_what_to_do(name, line, reason):
     with Program(name, *line.split()) as program:
         assert program.result() == 1
         assert program.said.startswith(f"{name}: {reason}")
@@ -136,7 +136,7 @@ def test_emulated_routers_connect_over_several_hops_and_end_on_ctrl_c(tmp_path):
         assert trace.read_bytes().startswith(bytes.fromhex("0a0d0d0a"))  # pcapng
 
 
-def test_a_second_program_with_the_same_nodes_says_so_in_one_line():
+def test_a_second_program_with_the_same_nodes_reports_it_in_one_line():
     lines = [f"--emulated 3 --port {free_port()}".split() for _ in range(2)]
     with Program("raspberry_gateway", *lines[0]) as first:
         first.wait_for("node 2: started")
@@ -203,7 +203,7 @@ def test_single_nodes_on_a_shared_air_can_be_killed_and_restarted():
         assert "Traceback" not in gateway.said
 
 
-def test_an_air_that_nobody_serves_is_said_in_one_line_with_what_to_do():
+def test_an_air_that_no_process_serves_gives_one_line_with_what_to_do():
     line = f"--id 3 --emulated-air {free_port()} --log-level error"
     with Program("raspberry_router", *line.split()) as program:
         assert program.result() == 1

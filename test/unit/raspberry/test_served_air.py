@@ -1,4 +1,4 @@
-"""Who can join an emulated air that a gateway serves."""
+"""Which processes can join an emulated air that a gateway serves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_mesh.raspberry.shared_air import serving_node
 
 
 @pytest.mark.parametrize(("address", "warns"), [("0", False), ("0.0.0.0:0", True)])
-def test_an_air_is_served_on_this_machine_only_unless_told_and_then_with_a_warning(
+def test_an_air_is_served_on_this_machine_only_unless_requested_and_then_with_a_warning(
     address, warns, caplog
 ):
     options = parse_gateway(["--emulated-air-serve", address], {})

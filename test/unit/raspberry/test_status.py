@@ -1,4 +1,4 @@
-"""What a node says of itself, to people, over HTTP and to systemd; and that it stops at once."""
+"""A node reports its status in its log, over HTTP and to systemd; and it stops at once."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
     json.dumps(status)  # nothing but JSON values
 
 
-def test_a_status_that_cannot_be_had_is_one_line_and_a_failure(capsys):
+def test_an_unavailable_status_gives_one_line_and_a_failure(capsys):
     assert main([f"http://127.0.0.1:{free_port()}"]) == 1
     assert capsys.readouterr().err.endswith(": [Errno 111] Connection refused\n")
 
@@ -152,7 +152,7 @@ def test_a_status_that_cannot_be_had_is_one_line_and_a_failure(capsys):
         (200, b"<", "line 1"),
     ],
 )
-def test_another_server_than_a_node_is_named_in_one_line(code, page, said, capsys):
+def test_a_server_that_is_not_a_node_gives_one_line(code, page, said, capsys):
     class Other(http.server.BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             self.send_response(code)
@@ -178,7 +178,7 @@ def test_a_node_whose_thread_hangs_is_not_alive(monkeypatch):
         wait_for("it is alive again", node.is_alive)
 
 
-def test_systemd_is_told_when_it_is_ready_alive_and_stopping(tmp_path: Path):
+def test_systemd_is_notified_when_it_is_ready_alive_and_stopping(tmp_path: Path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(str(tmp_path / "notify"))
         systemd.settimeout(10.0)

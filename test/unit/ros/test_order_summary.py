@@ -1,4 +1,4 @@
-"""What became of the orders of a layout, in one line."""
+"""The outcome of the orders of a layout, in one line."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from drone_mesh.ros.graph.present_drones import PresentDrones
 G, R = Role.GATEWAY, Role.ROUTER
 
 
-def test_drones_are_the_same_after_their_way_through_a_parameter():
+def test_drones_are_the_same_after_a_round_trip_through_a_parameter():
     drones = PresentDrones({0: R, 3: G, 7: R, 9: G}, {7: "/mesh_host_1", 9: ""})
     parameter = drones.to_parameter()
     assert parameter == {

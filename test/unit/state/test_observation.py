@@ -1,4 +1,4 @@
-"""Looking at real components and drones."""
+"""Observing real components and drones."""
 
 from __future__ import annotations
 

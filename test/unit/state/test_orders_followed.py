@@ -18,7 +18,7 @@ def watch(*events):
 SENT = (0, "order sent", "order 7: to x 1.00 m, y 2.00 m, z 3 m")
 
 
-def test_an_order_is_followed_from_the_question_to_the_arrival():
+def test_an_order_is_followed_from_the_request_to_the_arrival():
     assert watch(SENT).words(5) == "asked: to x 1.00 m, y 2.00 m, z 3 m"
     assert watch(SENT, (0, "order accepted", "order 7")).words(5) == "under way"
     assert watch(SENT, (0, "order arrived", "order 7")).words(5) == "arrived"

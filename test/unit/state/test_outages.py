@@ -65,7 +65,7 @@ def test_a_loss_without_a_power_off_has_no_cause():
     assert outage.cause_node is None
 
 
-def test_a_power_off_long_ago_is_no_cause():
+def test_a_power_off_long_ago_is_not_a_cause():
     (outage,) = find_outages(story((1.0, 2, "power off"), (90.0, 1, "disconnected", 0)))
     assert outage.cause_node is None
 

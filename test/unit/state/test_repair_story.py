@@ -1,4 +1,4 @@
-"""A repair, told in sentences."""
+"""A repair, described in sentences."""
 
 from __future__ import annotations
 
@@ -90,5 +90,5 @@ def test_a_drone_without_neighbours_flies_without_a_negotiation():
     assert story.steps[-1].text.startswith("2 is connected again")
 
 
-def test_ids_are_listed_as_people_do():
+def test_ids_are_listed_as_in_a_sentence():
     assert [and_(ids) for ids in ([3], [4, 3], [5, 3, 4])] == ["3", "3 and 4", "3, 4 and 5"]

@@ -36,7 +36,7 @@ def rig():
         one.stop()
 
 
-def test_ping_says_hops_time_and_loss(rig, capsys):
+def test_ping_prints_hops_time_and_loss(rig, capsys):
     assert ping_command.main(["--node", "0", "-c", "2", "-i", "0", "2"]) == 0
     assert capsys.readouterr().out == (
         "node 2: number 1, 2 hops, 8.0 ms\n"
@@ -45,20 +45,20 @@ def test_ping_says_hops_time_and_loss(rig, capsys):
     )
 
 
-def test_ping_of_a_node_without_a_route_says_so(rig, capsys):
+def test_ping_of_a_node_without_a_route_reports_it(rig, capsys):
     assert ping_command.main(["--node", "0", "-c", "1", "77"]) == 1
     assert capsys.readouterr().out == (
         "node 77: number 1: no route to node 77\n1 sent, 0 answered, 100 % lost\n"
     )
 
 
-def test_trace_names_the_nodes_on_the_way(rig, capsys):
+def test_trace_names_the_nodes_on_the_route(rig, capsys):
     assert trace_command.main(["--node", "0", "2"]) == 0
     assert capsys.readouterr().out == ("  1  node 1\n  2  node 2\nround trip: 8.0 ms\n")
 
 
 @pytest.mark.parametrize("to", ["gateway", "0"])
-def test_send_says_that_the_message_arrived(rig, capsys, to):
+def test_send_reports_that_the_message_arrived(rig, capsys, to):
     assert send_command.main(["--node", "2", to, "21.5 degrees"]) == 0
     assert "delivered" in capsys.readouterr().out
     assert [message.payload for message in rig.network.received[0]] == [b"21.5 degrees"]
@@ -84,7 +84,7 @@ def test_send_takes_any_bytes_from_standard_input(rig, monkeypatch):
         (["--node", "9", "0", "x"], "no node answers at"),
     ],
 )
-def test_what_is_wrong_with_a_message_is_one_line(rig, capsys, arguments, reason):
+def test_an_error_about_a_message_is_one_line(rig, capsys, arguments, reason):
     assert send_command.main(arguments) == 1
     said = capsys.readouterr()
     assert reason in said.out + said.err
@@ -115,7 +115,7 @@ def test_without_a_node_the_command_says_what_to_start(capsys):
     assert "no node runs here" in capsys.readouterr().err
 
 
-def test_a_node_that_was_killed_is_none_to_choose_from(rig, capsys):
+def test_a_killed_node_is_not_offered(rig, capsys):
     for left in (4, 5):
         with socket.socket(socket.AF_UNIX) as dead:
             dead.bind(str(socket_path(left)))
@@ -135,13 +135,13 @@ def test_a_message_far_too_large_is_named_as_that(rig, capsys):
     assert "too large: 9000 bytes" in capsys.readouterr().err
 
 
-def test_an_invalid_receiver_is_named_with_all_that_are_possible(capsys):
+def test_an_invalid_receiver_is_named_with_all_valid_ones(capsys):
     with pytest.raises(SystemExit):
         send_command.main(["banana", "21.5"])
     assert "invalid node 'banana': must be 0..253, gateway or all" in capsys.readouterr().err
 
 
-def test_a_node_in_the_environment_that_is_none_is_one_line(monkeypatch, capsys):
+def test_an_invalid_node_in_the_environment_gives_one_line(monkeypatch, capsys):
     monkeypatch.setenv("DRONE_MESH_NODE", "five")
     assert trace_command.main(["3"]) == 1
     assert capsys.readouterr().err == (
@@ -157,7 +157,7 @@ def test_a_node_in_the_environment_that_is_none_is_one_line(monkeypatch, capsys)
         (["3", "-W", "nan"], "invalid time 'nan': must be 0..86400 s"),
     ],
 )
-def test_numbers_that_make_no_sense_are_refused(capsys, arguments, reason):
+def test_invalid_numbers_are_refused(capsys, arguments, reason):
     with pytest.raises(SystemExit):
         ping_command.main(arguments)
     assert reason in capsys.readouterr().err
@@ -196,7 +196,7 @@ def test_a_socket_that_a_dead_program_left_is_replaced(rig, tmp_path):
 
 
 @pytest.mark.parametrize("request_line", [b"\n", b"{}\n", b"[1]\n", b'{"do": "fly"}\n', b"\xff\n"])
-def test_a_request_that_makes_no_sense_is_answered(rig, request_line):
+def test_an_invalid_request_is_answered(rig, request_line):
     with socket.socket(socket.AF_UNIX) as client:
         client.connect(str(socket_path(0)))
         client.sendall(request_line)

@@ -1,4 +1,4 @@
-"""Who may use the console."""
+"""Access to the console."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def test_without_a_token_the_machine_s_own_names_are_answered(host):
 @pytest.mark.parametrize(
     "host", ["evil.example:8080", "192.168.1.5:8080", "", "127.0.0.1.evil.example", "[::1", "a@b"]
 )
-def test_without_a_token_any_other_name_is_turned_away(host):
+def test_without_a_token_any_other_name_is_refused(host):
     with pytest.raises(AccessDenied, match="is not a loopback name"):
         Access().check_host(host)
 
 
-def test_with_a_token_any_name_will_do():
+def test_with_a_token_any_name_is_accepted():
     Access(TOKEN).check_host("drones.example:8080")
 
 
@@ -65,5 +65,5 @@ def test_a_token_that_can_be_guessed_is_refused():
         access_for("127.0.0.1", "secret")
 
 
-def test_the_machine_itself_needs_no_token():
+def test_this_machine_itself_needs_no_token():
     assert access_for("127.0.0.1", "").token is None

@@ -46,7 +46,7 @@ def answering():
     ],
     ids=["not HTTP", "nothing", "half of it", "not JSON"],
 )
-def test_an_answer_that_is_none_is_one_line_with_the_address(answering, answer, why):
+def test_an_invalid_answer_gives_one_line_with_the_address(answering, answer, why):
     url = answering(answer)
     with pytest.raises(NoAnswer) as error:
         ask_json(url, 5.0)
@@ -72,7 +72,7 @@ def test_a_refusal_has_the_reason_of_the_server_if_it_arrives(answering, body, t
 
 
 @pytest.mark.parametrize("url", ["10.0.0.5/mesh", "http://[::1/mesh", "http://pi:port/mesh"])
-def test_an_address_that_is_none_is_named(url):
+def test_an_invalid_address_is_named(url):
     with pytest.raises(NoAnswer) as error:
         ask_json(url, 5.0)
     assert str(error.value).startswith(f"no answer from {url}: ")

@@ -1,4 +1,4 @@
-"""The server's patience with clients that say nothing; HTTP is tested in test_http_patience."""
+"""The server's time limits for silent clients; HTTP is tested in test_http_patience."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""BulletWorld: time, bodies, more than one world; and what it shares with StillWorld."""
+"""BulletWorld: time, bodies, several worlds; and what it shares with StillWorld."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_a_flying_drone_moves_its_body(bullet):
     assert place_of(bullet, drone.box) == pytest.approx((3.0, 4.0, 0.05))
 
 
-def test_two_worlds_know_nothing_of_each_other(bullet):
+def test_two_worlds_are_independent_of_each_other(bullet):
     with BulletWorld() as other:
         here = bullet.add_box((1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
         there = other.add_box((1.0, 1.0, 1.0), (2.0, 2.0, 2.0))

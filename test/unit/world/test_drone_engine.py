@@ -136,7 +136,7 @@ def test_a_goal_just_further_than_arrived_is_flown_to(world, engine):
         ((0.0, 0.0, 501), "height 501 m is outside"),
     ],
 )
-def test_a_goal_that_is_no_place_is_refused_with_a_reason(world, engine, goal, why):
+def test_an_invalid_goal_is_refused_with_the_reason(world, engine, goal, why):
     with pytest.raises(GoalRefused, match=why):
         engine.set_goal(*goal)
     world.step()

@@ -98,6 +98,6 @@ def test_debug_is_handed_on():
         ({"spacing": math.inf}, "invalid spacing inf"),
     ],
 )
-def test_a_parameter_that_makes_no_fleet_is_named(changes, why):
+def test_a_parameter_for_an_impossible_fleet_is_named(changes, why):
     with pytest.raises(ConfigurationError, match=why):
         make(**changes)

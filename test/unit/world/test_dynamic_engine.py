@@ -150,7 +150,7 @@ def test_a_drone_that_runs_empty_lands_where_it_is_and_does_not_fly_again(world)
         engine.set_goal(1.0, 1.0, 1)
 
 
-def test_a_drone_is_flat_when_standing_has_used_the_rest_and_that_is_told_once(world):
+def test_a_drone_is_flat_when_standing_has_used_the_rest_and_this_is_reported_once(world):
     engine = drone(world, limits=BodyLimits(standby_s=5.0))
     told, noted = [], []
     engine.add_listener(lambda _state: told.append(engine.is_flat))
@@ -163,7 +163,7 @@ def test_a_drone_is_flat_when_standing_has_used_the_rest_and_that_is_told_once(w
     assert noted == [MeshEventKind.BATTERY_EMPTY]
 
 
-def test_where_it_comes_to_rest_is_told_even_to_a_listener_that_skips_most_of_it(world):
+def test_where_it_comes_to_rest_is_reported_even_to_a_listener_that_skips_most_of_it(world):
     engine = drone(world, z=2.0)  # it falls, and bounces
     told = []
 

@@ -7,7 +7,7 @@ from drone_mesh.world.drones import RouterDrone
 from drone_mesh.world.still_world import StillWorld
 
 
-def test_a_followed_drone_is_where_it_was_last_reported_and_its_listeners_are_told() -> None:
+def test_a_followed_drone_is_where_it_was_last_reported_and_its_listeners_are_notified() -> None:
     world = StillWorld()
     drone = RouterDrone(world, 1, 0.0, 0.0)
     states = []

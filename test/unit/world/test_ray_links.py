@@ -58,7 +58,7 @@ def test_a_thousand_random_pairs_have_the_same_links_by_ray_and_in_process(block
     assert 0.2 * PAIRS < linked < 0.9 * PAIRS  # neither an empty town nor a solid one
 
 
-def test_many_places_are_looked_at_at_once_and_give_what_each_one_gives() -> None:
+def test_many_places_checked_at_once_give_the_same_as_one_by_one() -> None:
     rng = random.Random(6)
     obstacles = Obstacles(a_town(rng), blocks=False)
     rays = RayLinks(obstacles, RANGE_M)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from drone_mesh.world.under_way import PATIENCE_S, UnderWay
 
 
-def test_it_waits_for_packets_that_are_worked_off_one_after_the_other():
+def test_it_waits_for_packets_that_are_processed_one_after_the_other():
     under_way = UnderWay()
     assert under_way.is_none(0, True, 0.0)
     counts = [3, 2, 4, 1]  # on a slow machine, each just within the patience
@@ -24,7 +24,7 @@ def test_a_packet_that_never_arrives_is_waited_for_once():
     assert under_way.is_none(1, True, 2.1)
 
 
-def test_a_simulator_that_delivers_nothing_stops_time_ever_more_briefly():
+def test_a_simulator_that_delivers_nothing_stops_time_for_ever_shorter_periods():
     under_way = UnderWay()
     wall_s, waited_s = 0.0, []
     for count in range(1, 12):
@@ -36,7 +36,7 @@ def test_a_simulator_that_delivers_nothing_stops_time_ever_more_briefly():
     assert waited_s[0] >= PATIENCE_S > 0.03 > waited_s[-1]
 
 
-def test_after_a_packet_that_arrives_it_has_its_patience_again():
+def test_a_packet_that_arrives_restores_the_full_wait():
     under_way = UnderWay()
     wall_s = 0.0
     for count in (1, 2, 3):

@@ -16,18 +16,18 @@ def test_a_message_waits_for_an_earlier_one():
     assert taken(order, message(8, behind=1), message(9, 2), message(7)) == [[], [], [7, 8, 9]]
 
 
-def test_a_message_comes_once():
+def test_a_message_is_delivered_once():
     order = PortOrder()
     assert taken(order, message(7), message(7), message(8), message(7)) == [[7], [], [8], []]
 
 
-def test_what_the_sender_gave_up_is_not_waited_for():
+def test_a_message_that_the_sender_gave_up_is_not_waited_for():
     order = PortOrder()
     assert taken(order, message(7), message(9, behind=1)) == [[7], []]
     assert taken(order, message(10, behind=1)) == [[9, 10]]
 
 
-def test_the_order_goes_on_across_the_wrap():
+def test_the_order_continues_across_the_wrap():
     order = PortOrder()
     assert taken(order, message(65535), message(1, 1), message(0)) == [[65535], [], [0, 1]]
 

@@ -34,13 +34,13 @@ def test_a_further_fragment_has_one_byte_of_header():
         (1024, 20, 55),
     ],
 )
-def test_a_message_takes_so_many_fragments(length, room, count):
+def test_the_length_of_a_message_decides_its_number_of_fragments(length, room, count):
     assert packets.count_of(length, room) == count
 
 
 @pytest.mark.parametrize("room", [20, 27])
 @pytest.mark.parametrize("length", [0, 1, 17, 18, 500, 1024])
-def test_a_payload_comes_out_of_its_fragments(room, length):
+def test_a_payload_is_reassembled_from_its_fragments(room, length):
     payload = bytes(n % 251 for n in range(length))
     head = HEAD._replace(length=length)
     count = packets.count_of(length, room)
@@ -56,7 +56,7 @@ def test_a_head_with_an_impossible_length_is_refused():
         packets.head_of(bytes.fromhex("03 01 02 07 ff 07 04 05 08 09"))
 
 
-def test_an_ack_and_a_poll_have_these_bytes_and_fit_the_least_room():
+def test_an_ack_and_a_poll_have_these_bytes_and_fit_the_smallest_space():
     ack = Ack(session=0x0201, nonce=5, number=3, has=0b101, newest=2, done=0b11)
     assert packets.ack_body(ack) == bytes.fromhex(
         "01 02 05 03 05 00 00 00 00 00 00 00 02 03 00 00 00"

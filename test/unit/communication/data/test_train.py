@@ -1,4 +1,4 @@
-"""Trains: what leaves for a node behind relays, on a channel that all share."""
+"""Trains: packets to a node behind relays, on a shared channel."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def lengths_of_trains(chain, count, reliable):
 
 
 @pytest.mark.parametrize("reliable", [True, False])
-def test_behind_relays_no_more_than_a_train_leaves_without_an_answer(chain, reliable):
+def test_behind_relays_at_most_one_train_is_sent_without_an_answer(chain, reliable):
     lengths = lengths_of_trains(chain, 4, reliable)
     assert lengths[0] == FIRST_LENGTH
     assert max(lengths) <= MOST_LENGTH
@@ -79,7 +79,7 @@ def test_a_message_of_one_fragment_is_one_packet(chain):
     assert kinds == [packets.FRAGMENTS[0]]
 
 
-def test_to_a_neighbour_everything_leaves_without_waiting(chain):
+def test_packets_to_a_neighbour_are_sent_without_waiting(chain):
     kinds = left_node(chain, 1)
     tickets = [chain.send(1, 0, bytes(1024), reliable=False) for _ in range(4)]
     assert chain.run_until(lambda: all(ticket.final for ticket in tickets), 30.0)

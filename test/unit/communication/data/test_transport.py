@@ -44,7 +44,7 @@ def test_a_message_for_the_gateway_goes_to_the_one_that_the_node_uses(network):
     assert ticket.state is TicketState.DELIVERED
 
 
-def test_a_message_to_all_comes_to_each_node_once(network):
+def test_a_message_to_all_reaches_each_node_once(network):
     ticket = network.send(1, TO_ALL, b"to everyone in the whole mesh")
     network.run_for(1.0)
     assert {node: len(got) for node, got in network.received.items()} == {0: 1, 2: 1, 3: 1}
@@ -148,7 +148,7 @@ def test_after_a_restart_of_the_sender_its_messages_are_not_taken_for_old_ones(n
     assert payloads(network, 0) == [b"before", b"after"]
 
 
-def test_an_echo_says_how_far_a_node_is_and_over_which_nodes(network):
+def test_an_echo_reports_the_hops_and_the_nodes_on_the_route(network):
     answers = []
     assert network.echo(0, 3, answers.append)
     network.run_for(1.0)
@@ -165,7 +165,7 @@ def test_a_neighbour_counts_as_lost_only_after_nine_lost_packets_of_a_user(netwo
     assert len([payload for payload in tried if is_data(payload) and payload[3] == 0]) == 9
 
 
-def test_packets_of_the_mesh_go_before_those_of_users():
+def test_packets_of_the_mesh_are_sent_before_those_of_users():
     access = MediumAccess(AccessRules.for_cycle(0.002), rng=None)
     for name in (b"d1", b"d2"):
         access.offer(5, name, 0.0, Priority.DATA)

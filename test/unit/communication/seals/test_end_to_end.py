@@ -31,7 +31,7 @@ def relayed(payload, from_=3, to=5):
 
 
 @pytest.mark.parametrize("made", [ORDER, LOCATION, ANSWER], ids=["order", "place", "heartbeat"])
-def test_what_a_gateway_makes_is_believed_once(pair, made):
+def test_a_gateways_packet_is_accepted_once(pair, made):
     gateway, drone = pair
     sealed = relayed(gateway.seal(made, 0.0))
     assert drone.open(sealed) == relayed(made)
@@ -90,7 +90,7 @@ def test_a_captured_router_cannot_order_others(pair):
         drone.open(captured.seal(as_gateway, 0.0))
 
 
-def test_a_captured_router_is_no_gateway(pair):
+def test_a_captured_router_cannot_pose_as_a_gateway(pair):
     _, drone = pair
     captured = end(7, KEY.for_node(7))
     captured.open(drone.seal(PRESENT, 0.0))
@@ -98,7 +98,7 @@ def test_a_captured_router_is_no_gateway(pair):
         drone.open(captured.seal(packet("07 07 04 05 05 01 07 00"), 0.0))
 
 
-def test_an_order_outlives_no_restart_of_its_drone(pair):
+def test_an_order_is_invalid_after_a_restart_of_its_drone(pair):
     gateway, _ = pair
     recorded = gateway.seal(ORDER, 0.0)
     restarted = end(5, KEY.for_node(5), seed=1)
@@ -118,7 +118,7 @@ def test_an_order_outlives_only_the_next_two_nonces(pair):
         drone.open(kept[1])
 
 
-def test_the_tries_and_copies_of_a_packet_are_one(pair):
+def test_tries_and_copies_of_a_packet_count_as_one(pair):
     gateway, drone = pair
     copies = [gateway.seal(relayed(ORDER, 0, to), 0.01 * to) for to in (1, 2, 3)]
     assert len({copy[4:] for copy in copies}) == 1
@@ -141,7 +141,7 @@ def test_a_request_for_a_place_carries_the_nonce_that_the_answer_needs():
     assert asker.open(answerer.seal(LOCATION, 0.0)) == LOCATION
 
 
-def test_a_broadcast_place_of_a_gateway_is_not_believed(pair):
+def test_a_broadcast_place_of_a_gateway_is_not_accepted(pair):
     gateway, drone = pair
     broadcast = packet("00 00 01 05 fe 00 00 80 3f 00 00 00 40 03 00")
     assert drone.open(broadcast) == broadcast  # node 0 might be a router
@@ -150,7 +150,7 @@ def test_a_broadcast_place_of_a_gateway_is_not_believed(pair):
         drone.open(broadcast)
 
 
-def test_users_data_and_bids_are_left_as_they_are(pair):
+def test_users_data_and_bids_are_not_changed(pair):
     gateway, drone = pair
     for made in (
         packet("00 00 80 05 05")[:5] + bytes(20) + bytes(7),

@@ -1,4 +1,4 @@
-"""A node that cannot understand its neighbours says that the key is the likely reason."""
+"""A node that cannot understand its neighbours names the key as the likely reason."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_a_message_for_the_gateway_does_so_too():
     )
 
 
-def test_after_the_key_was_corrected_nothing_is_said_of_it():
+def test_after_the_key_was_corrected_it_is_not_mentioned():
     keys = {0: KEY, 1: OTHER_KEY}
     network = Network(seed=1, key=keys.__getitem__)
     network.add_gateway(0, 0.0, 0.0)

@@ -12,7 +12,7 @@ from drone_mesh.raspberry.key_command import main
 KEY = MeshKey(bytes(range(16)))
 
 
-def test_keys_derive_so_on_every_node():
+def test_every_node_derives_the_same_keys():
     assert KEY.network.hex() == "b7733346657bbb89f23ca1eb2d4a3911"
     assert KEY.authority_over(3).hex() == "e5f289e9f2fe9886ed0685f6d69f6096"
     assert KEY.pair(3, 200).hex() == "4569c191826ee01e9ec362d7cc1bbf35"
@@ -25,7 +25,7 @@ def test_a_node_has_its_own_share_of_the_mesh_key():
     assert node.pair(3, 7) == node.pair(7, 3) == KEY.pair(7, 3)
 
 
-def test_a_node_has_nothing_that_is_for_others():
+def test_a_node_has_no_keys_of_others():
     node = KEY.for_node(3)
     assert node.authority_over(7) is None
     assert node.pair(7, 8) is None
@@ -77,7 +77,7 @@ def test_a_key_is_never_overwritten(tmp_path):
         KEY.for_node(3).to_text().replace("node 3", "node 254"),
     ],
 )
-def test_what_holds_no_keys_is_refused_without_quoting_it(text):
+def test_a_file_without_keys_is_refused_without_quoting_it(text):
     with pytest.raises(
         ConfigurationError, match="not a key file: make one with raspberry_key"
     ) as e:
@@ -85,7 +85,7 @@ def test_what_holds_no_keys_is_refused_without_quoting_it(text):
     assert "0001" not in str(e.value)
 
 
-def test_no_key_shows_in_a_log_line():
+def test_no_key_appears_in_a_log_line():
     for keys in (KEY, KEY.for_node(3)):
         assert "0001" not in repr(keys)
         assert KEY.network.hex() not in repr(keys)
@@ -107,7 +107,7 @@ def test_two_new_keys_differ(tmp_path):
     assert (tmp_path / "one").read_text() != (tmp_path / "other").read_text()
 
 
-def test_the_keys_of_a_node_make_no_keys_for_others(tmp_path, capsys):
+def test_the_keys_of_a_node_cannot_make_keys_for_others(tmp_path, capsys):
     write_key_file(tmp_path / "node", KEY.for_node(3))
     assert main(["node", str(tmp_path / "node"), "4", str(tmp_path / "other")]) == 1
     assert "not a mesh key" in capsys.readouterr().err
@@ -118,7 +118,7 @@ def test_a_mesh_key_that_cannot_be_read_is_named_by_its_argument(tmp_path, capsy
     assert capsys.readouterr().err == f"raspberry_key: mesh_key {tmp_path}: Is a directory\n"
 
 
-def test_a_key_file_that_is_not_there_is_one_line(tmp_path, capsys):
+def test_a_missing_key_file_gives_one_line(tmp_path, capsys):
     with pytest.raises(ConfigurationError) as error:
         read_key_file(tmp_path / "none")
     assert str(error.value) == f"{tmp_path}/none: No such file or directory"
@@ -128,7 +128,7 @@ def test_a_key_file_that_is_not_there_is_one_line(tmp_path, capsys):
     )
 
 
-def test_a_file_of_other_bytes_is_no_key_file(tmp_path):
+def test_a_file_of_other_bytes_is_refused(tmp_path):
     path = tmp_path / "key"
     path.write_bytes(b"\xff\xfe")
     path.chmod(0o600)

@@ -60,7 +60,7 @@ def test_a_changed_bit_does_not_open(at):
         (KEY, 5, 0, b"\x34\x12\x07\x06\x00"),
     ],
 )
-def test_nothing_opens_elsewhere(key, creator, to, place):
+def test_nothing_opens_at_another_place(key, creator, to, place):
     sealed = MessageSeal(KEY).seal(5, 0, PLACE, b"close")
     assert MessageSeal(key).open(creator, to, place, sealed) is None
 

@@ -75,7 +75,7 @@ def test_the_counter_goes_on_after_its_low_bytes_have_wrapped(link):
     assert receiver.open(first, 1.0) is None
 
 
-def test_nothing_of_a_stranger_opens():
+def test_no_packet_of_a_stranger_opens():
     receiver, sender = node(1), node(5)
     assert receiver.open(sender.seal(HEARTBEAT), 0.0) is None
 
@@ -109,7 +109,7 @@ def test_a_recorded_answer_to_a_challenge_is_worthless(link):
     assert not restarted.knows(5, 6.0)
 
 
-def test_an_answer_without_a_challenge_is_not_taken(link):
+def test_an_answer_without_a_challenge_is_ignored(link):
     receiver, sender = link
     challenge = receiver.challenge(5, 5.0)
     answer = sender.answer(challenge)
@@ -123,7 +123,7 @@ def test_a_node_with_another_key_neither_answers_nor_is_answered():
     assert receiver.answer(stranger.challenge(1, 0.0)) is None
 
 
-def test_what_was_kept_from_its_receiver_is_worthless_after_a_silence(link):
+def test_a_withheld_packet_is_worthless_after_a_silence(link):
     receiver, sender = link
     kept = sender.seal(HEARTBEAT)
     assert receiver.open(kept, FRESH_S + 0.1) is None

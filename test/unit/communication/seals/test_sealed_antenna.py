@@ -105,7 +105,7 @@ def test_a_relay_cannot_change_a_message(changes):
     assert arrived == ([] if changes else [b"shut"])
 
 
-def test_two_keys_are_two_meshes(caplog):
+def test_nodes_with_different_keys_form_separate_meshes(caplog):
     caplog.set_level(logging.WARNING)
     network = line(4, lambda node: KEY if node < 2 else OTHER_KEY)
     network.run_for(60.0)
@@ -193,7 +193,7 @@ def test_a_relay_takes_no_place_that_only_its_addressee_can_check():
     assert relay.places.gateway == network.location(0)
 
 
-def test_a_radio_that_acknowledges_a_challenge_and_does_not_answer_it_becomes_no_neighbour():
+def test_a_radio_that_only_acknowledges_a_challenge_does_not_become_a_neighbour():
     network = line(3, radio="shared")
     assert network.run_until(network.all_connected, within_s=30.0)
     node = network.nodes[2]
@@ -203,7 +203,7 @@ def test_a_radio_that_acknowledges_a_challenge_and_does_not_answer_it_becomes_no
     assert 0 not in node.component.get_neighbours()
 
 
-def test_a_packet_that_comes_twice_now_and_then_is_not_reported_as_replayed(caplog):
+def test_occasional_duplicates_are_not_reported_as_replayed(caplog):
     network = line(2)
     record = []
     node = network.nodes[1]

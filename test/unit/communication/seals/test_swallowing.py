@@ -38,7 +38,7 @@ def grid():
     return network, relay
 
 
-def test_the_nodes_behind_it_take_another_way_and_their_messages_and_orders_arrive(grid):
+def test_the_nodes_behind_it_take_another_route_and_their_messages_and_orders_arrive(grid):
     network, relay = grid
     lost = network.send(8, TO_GATEWAY, b"swallowed")
     assert not delivered(network, lost, within_s=10.0)
@@ -61,7 +61,7 @@ def test_they_do_not_come_back_to_it(grid):
         assert network.all_connected()
 
 
-def test_where_there_is_no_other_way_a_node_stays_connected_as_it_is():
+def test_without_another_route_a_node_keeps_its_connection():
     network = Network(seed=1, key=own_keys)
     network.add_gateway(0, 0.0, 0.0)
     network.add_router(1, 6.0, 0.0)
@@ -73,7 +73,7 @@ def test_where_there_is_no_other_way_a_node_stays_connected_as_it_is():
         assert network.connected(2)
 
 
-def test_a_gateway_that_never_said_where_it_is_accuses_no_relay():
+def test_no_relay_is_suspected_if_the_gateway_never_reported_its_place():
     swallowing = Swallowing(check_period_s=10.0)
     for check in range(20):
         swallowing.asked(10.0 * check)

@@ -35,7 +35,7 @@ def test_a_neighbour_that_is_heard_more_often_wins(batman):
     assert next_hop(batman) == 5
 
 
-def test_what_is_older_than_the_window_counts_no_more(batman):
+def test_what_is_older_than_the_window_no_longer_counts(batman):
     hear(batman, 5, originator(1, 250))
     hear(batman, 6, originator(7, 10))
     assert next_hop(batman) == 6
