@@ -102,17 +102,17 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         try:
             creator, from_, kind, to, forward = messages.header(payload)
         except struct.error:  # cheaper than checking the length of each packet
-            self._drop(f"expected {PAYLOAD_BYTES} bytes, got {len(payload)}", payload)
+            self._drop(f"a packet of {len(payload)} bytes instead of {PAYLOAD_BYTES}", payload)
             return
         me = self._node_id
         if creator > MAX_NODE_ID or from_ > MAX_NODE_ID or from_ == me or forward > BROADCAST:
-            self._drop("bad ids", payload)
+            self._drop("a packet with invalid ids", payload)
             return
         if to != me:
-            self._drop("not for this node", payload)
+            self._drop("a packet for another node", payload)
             return
         if kind in TYPES_WITH_NUMBERS and not messages.is_finite(payload):
-            self._drop("not a finite number", payload)
+            self._drop("a packet with a number that is not finite", payload)
             return
         if self._neighbours.heard(from_, now_s):
             self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
@@ -257,7 +257,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         elif kind in messages.REPORT_TYPES:
             self._on_report(payload, creator, kind)
         else:
-            self._drop("a type that is not processed", payload)
+            self._drop("a packet of a type that this node does not process", payload)
 
     def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
         """A report, or the request for one, for this node."""
@@ -269,7 +269,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             reason = f"a neighbour, node {creator}, has a mesh key and this node has none"
             self.complaints.foreign(reason, payload, self._deadlines.now_s)
         else:
-            self._drop("a type that is not processed", payload)
+            self._drop("a packet of a type that this node does not process", payload)
 
     def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
         """`creator` reports that it cannot reach the node `missing`."""
@@ -289,7 +289,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
                 if self._antenna.reserved_bytes(MessageType.LOCATION):
                     self._delivery.send_own(extension.to_payload(me, me, asker, asker))
                 else:
-                    answer = extension.behind(answer)
+                    answer = extension.appended_to(answer)
             self._delivery.send_own(answer)
 
     # Flight ----------------------------------------------------------------------------------

@@ -175,7 +175,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         """Ignored: a gateway does not fly for the mesh."""
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
-        self._neighbours.is_at(node, location, self._deadlines.now_s)
+        self._neighbours.set_place(node, location, self._deadlines.now_s)
 
     def _took_off(self) -> None:
         """Nothing changes: a gateway is connected wherever it is."""

@@ -297,7 +297,7 @@ class GatewayPlace(NamedTuple):
     place: Location
     age_s: float  # how long ago it was there
 
-    def behind(self, payload: bytes) -> bytes:
+    def appended_to(self, payload: bytes) -> bytes:
         """The same packet with this extension after its body."""
         body = self._body()
         at = _GATEWAY_PLACE_AT[payload[TYPE_AT]]

@@ -77,7 +77,7 @@ class Neighbours:
 
     # Reported by the nodes themselves--------------------------------------------------------
 
-    def uses_gateway(self, node: int, gateway: int) -> None:
+    def set_gateway(self, node: int, gateway: int) -> None:
         """`node` is connected to `gateway`."""
         self._gateways[node] = gateway
 
@@ -85,7 +85,7 @@ class Neighbours:
         """The gateway that `node` reported last, or NO_ROUTE."""
         return self._gateways.get(node, NO_ROUTE)
 
-    def has_hops(self, node: int, hops: int) -> None:
+    def set_hops(self, node: int, hops: int) -> None:
         """`node` introduced itself with `hops` to its gateway; 255: it has none."""
         self._hops[node] = hops
 
@@ -93,7 +93,7 @@ class Neighbours:
         """The hops that `node` reported last; 255: none."""
         return self._hops.get(node, NO_ROUTE)
 
-    def is_at(self, node: int, place: Location, now_s: float) -> None:
+    def set_place(self, node: int, place: Location, now_s: float) -> None:
         """`node`, a neighbour or not, reports its place."""
         self._places[node] = HeardPlace(place, now_s)
 

@@ -16,12 +16,12 @@ class KnownPlaces:
         self.good_id = NO_ROUTE  # the node at that place
         self.good_seen_s = 0.0  # when it was there
 
-    def gateway_is_at(self, place: Location, seen_s: float) -> None:
+    def update_gateway(self, place: Location, seen_s: float) -> None:
         """The preferred gateway was at `place` at `seen_s`; older information is ignored."""
         if self.gateway is None or seen_s >= self.gateway_seen_s:
             self.gateway, self.gateway_seen_s = place, seen_s
 
-    def next_hop_is_at(self, node: int, place: Location, seen_s: float) -> None:
+    def update_next_hop(self, node: int, place: Location, seen_s: float) -> None:
         """The next hop towards the gateway is `node`; it was at `place` at `seen_s`."""
         self.good, self.good_id, self.good_seen_s = place, node, seen_s
 

@@ -182,7 +182,7 @@ class ConnectionRepair(RepairViews):
         creator = me if node is None else node
         packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
         if about is not None:
-            packet = GatewayPlace(self._connection.gateway, about, 0.0).behind(packet)
+            packet = GatewayPlace(self._connection.gateway, about, 0.0).appended_to(packet)
         for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
             self._parts.delivery.send_own(addressed(packet, neighbour))
 

@@ -21,8 +21,9 @@ FRESH_S = 5.0  # our choice: a drone may have moved this long after reporting it
 class RepairFlight:
     """One flight of one drone, from take-off until it is clear of other drones.
 
-    Once a second it asks all nodes in range for their places. If one is at its goal it diverts to a
-    spot beside that, and no farther than it needs to be connected. On the ground it asks again.
+    Once a second it asks all nodes in range for their places. If one of them is at the goal, the
+    drone diverts to a spot beside the goal and lands earlier if it is connected on the way. On the
+    ground it asks again.
     """
 
     def __init__(
@@ -111,10 +112,10 @@ class RepairFlight:
     def _fly_on(self) -> None:
         """Continue towards the goal.
 
-        A flight that may end where the drone is connected consists of legs: it climbs by half of
-        each leg, and higher up it would hear no node on the ground. No leg ends within
-        LANDED_WITHIN_M of the goal, because the drone would rest there although only the goal is
-        clear of the others.
+        A flight that may end where the drone is connected consists of legs. The drone climbs by
+        half the length of a leg; from higher up it would hear no node on the ground. No leg ends
+        within LANDED_WITHIN_M of the goal, because the drone would rest there although only the
+        goal is clear of the others.
         """
         here = self._parts.pilot.location()
         self._leg_from = here

@@ -137,7 +137,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair.on_antenna_off()
 
     def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
-        self._neighbours.has_hops(neighbour, hops)
+        self._neighbours.set_hops(neighbour, hops)
         if not self._repair.may_connect(neighbour, know_gateway):
             return
         if know_gateway and hops <= self._connection.hops:
@@ -154,7 +154,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if creator == self._node_id:
             return  # its own heartbeat came back, which proves nothing
         if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
-            self._neighbours.uses_gateway(creator, preferred_gateway)
+            self._neighbours.set_gateway(creator, preferred_gateway)
         if not self._repair.may_connect(from_, know_gateway):
             return
         if creator == preferred_gateway:
@@ -180,7 +180,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if self._antenna.reserved_bytes(MessageType.LOCATION):
             return
         if creator == self._connection.gateway:
-            self.places.gateway_is_at(place_in(payload), self._deadlines.now_s)
+            self.places.update_gateway(place_in(payload), self._deadlines.now_s)
 
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
@@ -191,15 +191,15 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
         now_s = self._deadlines.now_s
-        self._neighbours.is_at(node, location, now_s)
+        self._neighbours.set_place(node, location, now_s)
         connection = self._connection
         if node == connection.gateway:
-            self.places.gateway_is_at(location, now_s)
+            self.places.update_gateway(location, now_s)
             connection.gateway_sent_place()
         elif gateway is not None:
             self._on_gateway_place(gateway)
         if node == connection.next_hop():
-            self.places.next_hop_is_at(node, location, now_s)
+            self.places.update_next_hop(node, location, now_s)
         self._repair.on_place(node, location)
 
     def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
@@ -209,7 +209,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
         if self._connection.may_use(gateway.gateway):
             seen_s = self._deadlines.now_s - gateway.age_s
-            self.places.gateway_is_at(gateway.place, seen_s)
+            self.places.update_gateway(gateway.place, seen_s)
 
     def _on_neighbour_found(self, node: int) -> None:
         self._repair.on_neighbour_found(node)

@@ -209,7 +209,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
     def _not_opened(self, payload: bytes, now_s: float) -> None:
         from_, kind = messages.sender(payload), messages.type_of(payload)
         if from_ > MAX_NODE_ID or from_ == self._node_id:
-            self.complaints.dropped("bad ids", payload, now_s)
+            self.complaints.dropped("a packet with invalid ids", payload, now_s)
         elif kind == _CHALLENGE:
             self._on_challenge(payload, from_, now_s)
         elif kind == _ANSWER:

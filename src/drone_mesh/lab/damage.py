@@ -119,7 +119,7 @@ def _in_words(damage: Sequence[Damage]) -> str:
 
 
 def keys_of(node_id: int) -> Keys | None:
-    """Routers have their own keys; the one of the stranger beside the mesh has none."""
+    """Each router has its own keys; the stranger's router beside the mesh has none."""
     if node_id == BESIDE:
         return None
     return MeshKey(_SECRET) if node_id == 0 else KEY.for_node(node_id)

@@ -23,7 +23,7 @@ class RadioStatistics:
     irq_fallbacks: int = 0  # the IRQ pin failed; polling instead
     airtime_s: float = 0.0  # of the frames that it sent, including acknowledgements
     waiting: int = 0  # packets in the queue now
-    contention: float = 0.0  # share of first tries that failed lately, as the sender estimates it
+    contention: float = 0.0  # share of first tries that failed recently, as the sender estimates it
     duplicates: int = 0  # packets that the antenna received again from the same node, at once
 
     @property

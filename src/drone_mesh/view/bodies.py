@@ -67,7 +67,7 @@ class Bodies:
         return body
 
     def turn_rotors(self, body: int, drone: DronePicture, time_s: float) -> None:
-        """Show how the rotors of a drone stand at this time, if it flies."""
+        """Turn the rotors of a drone to their angle at this time, if it flies."""
         if drone.is_flying and self._shape is Shape.QUADROCOPTER:
             pybullet.resetJointStatesMultiDof(
                 body,

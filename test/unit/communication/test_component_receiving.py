@@ -53,7 +53,7 @@ def test_a_flood_of_bad_input_is_one_line_in_the_log(caplog):
         for tenth in range(100):
             rig.mesh.on_msg(BAD["creator 255"], tenth / 10)
     assert [record.getMessage() for record in caplog.records] == [
-        "node 1: dropped bad ids: " + BAD["creator 255"].hex() + " (1 so far)"
+        "node 1: dropped a packet with invalid ids: " + BAD["creator 255"].hex() + " (1 so far)"
     ]
     rig.mesh.on_msg(BAD["creator 255"], 40.0)
     assert caplog.records[-1].getMessage().endswith("(101 so far)")

@@ -46,12 +46,12 @@ class Inbox:
             self.ack_due_s = min(now_s + ACK_DELAY_S, self._ack_latest_s)
         number, reassembly = body[0], self._reassembly
         if reassembly.is_done(number):
-            self._say_again(number, now_s)
+            self._repeat_ack(number, now_s)
             return []
         whole = reassembly.add(index, body, now_s)
         if whole is None:
             if reassembly.lacks_only_earlier(number, index):
-                self._say_again(number, now_s)
+                self._repeat_ack(number, now_s)
             return []
         reassembly.done(number)
         if whole.head.reliable:
@@ -116,7 +116,7 @@ class Inbox:
                 self._ack_latest_s = now_s + ACK_LATEST_S
             self.ack_due_s = min(now_s + ACK_DELAY_S, self._ack_latest_s)
 
-    def _say_again(self, number: int, now_s: float) -> None:
+    def _repeat_ack(self, number: int, now_s: float) -> None:
         if now_s - self._repeated_s >= REPEAT_S:
             self._repeated_s = now_s
             self._acknowledge(self._ack(number, 0, self._session))

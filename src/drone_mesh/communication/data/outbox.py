@@ -225,7 +225,7 @@ class Outbox:
         """Stop sending this message."""
         self._close(message, TicketState.GIVEN_UP, reason)
 
-    def hindered(self, reason: str) -> None:
+    def blocked(self, reason: str) -> None:
         """Nothing can be sent now: reliable messages wait, the others are given up."""
         if self._train is not None:
             self._train.is_open = False

@@ -128,7 +128,7 @@ class Outboxes:
         if self._parts.antenna.on() and self._direction(outbox.to) != NO_ROUTE:
             return True
         outbox.not_before_s = now_s + ROUTE_PERIOD_S
-        outbox.hindered(self.unreachable(outbox.to))
+        outbox.blocked(self.unreachable(outbox.to))
         return False
 
     def _direction(self, to: int) -> int:

@@ -51,8 +51,8 @@ class Babel(GatewayRoutes):
         me, packed = self._essentials.get_node_id(), []
         if self._essentials.get_preferred_gateway() == me:
             packed.append(UPDATE.pack(me + 1, self._own_sequence, 0))
-        for gateway, said in self._routes.advertise():
-            packed.append(UPDATE.pack(gateway + 1, *said))
+        for gateway, update in self._routes.advertise():
+            packed.append(UPDATE.pack(gateway + 1, *update))
         return b"".join(packed[: room // UPDATE.size])
 
     def next_hop_to_gateway(self, gateway: int) -> int:
@@ -88,12 +88,12 @@ class Babel(GatewayRoutes):
                 again = REQUEST.pack(gateway, sequence, hops_left - 1)
                 self._essentials.send_packet(REQUEST_TYPE, to, again)
 
-    def _hear(self, gateway: int, neighbour: int, said: Distance) -> None:
+    def _hear(self, gateway: int, neighbour: int, update: Distance) -> None:
         assert self._essentials is not None
         if gateway == self._essentials.get_node_id():
             return
         had_route = self.next_hop_to_gateway(gateway) != NO_ROUTE
-        self._routes.hear(gateway, neighbour, said)
+        self._routes.hear(gateway, neighbour, update)
         has_route = self.next_hop_to_gateway(gateway) != NO_ROUTE
         if had_route and not has_route:
             self._starve(gateway)

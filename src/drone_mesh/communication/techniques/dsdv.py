@@ -83,15 +83,15 @@ class Dsdv(GatewayRoutes):
         assert self._essentials is not None
         self._essentials.search_other_nodes_in_range()
 
-    def _hear(self, gateway: int, said: Entry) -> None:
+    def _hear(self, gateway: int, heard: Entry) -> None:
         assert self._essentials is not None
         if gateway == self._essentials.get_node_id():
             return
         known = self._vectors.get(gateway)
-        new = said._replace(hops=min(said.hops + 1, INFINITE_HOPS))
-        age = 1 if known is None else _newer_by(said.sequence, known.sequence)
+        new = heard._replace(hops=min(heard.hops + 1, INFINITE_HOPS))
+        age = 1 if known is None else _newer_by(heard.sequence, known.sequence)
         broken = new.hops == INFINITE_HOPS
-        if broken and (known is None or known.next_hop != said.next_hop):
+        if broken and (known is None or known.next_hop != heard.next_hop):
             return  # about a route that this node does not use
         if known is None or age > 0 or (age == 0 and new.hops < known.hops):
             self._vectors[gateway] = new

@@ -67,9 +67,9 @@ class EtxTree(GatewayRoutes):
     def next_hop_to_gateway(self, gateway: int) -> int:
         """The parent, replaced only by one that is better by SWITCH_BELOW."""
         costs = {
-            neighbour: said.rank + RANK_PER_ETX * self.links.etx(neighbour)
-            for neighbour, said in self._advertised.items()
-            if said.gateway == gateway
+            neighbour: advertised.rank + RANK_PER_ETX * self.links.etx(neighbour)
+            for neighbour, advertised in self._advertised.items()
+            if advertised.gateway == gateway
         }
         if not costs:
             self._parents.pop(gateway, None)
@@ -82,13 +82,15 @@ class EtxTree(GatewayRoutes):
 
     def forget_neighbour(self, neighbour: int) -> None:
         """Drop its advertisement; solicit others if it was the last one."""
-        said = self._advertised.pop(neighbour, None)
-        if said is not None and self.next_hop_to_gateway(said.gateway) == NO_ROUTE:
+        advertised = self._advertised.pop(neighbour, None)
+        if advertised is not None and self.next_hop_to_gateway(advertised.gateway) == NO_ROUTE:
             self._solicit()
 
     def forget_gateway(self, gateway: int) -> None:
         """Drop all advertisements for it until they are repeated."""
-        for neighbour in [n for n, said in self._advertised.items() if said.gateway == gateway]:
+        for neighbour in [
+            n for n, advertised in self._advertised.items() if advertised.gateway == gateway
+        ]:
             del self._advertised[neighbour]
         self._solicit()
 

@@ -34,27 +34,27 @@ class FeasibleRoutes:
         self._updates: dict[int, dict[int, Distance]] = {}  # by gateway, by neighbour
         self._feasibility: dict[int, Distance] = {}  # by gateway: the best ever advertised
 
-    def hear(self, gateway: int, neighbour: int, said: Distance) -> None:
+    def hear(self, gateway: int, neighbour: int, update: Distance) -> None:
         """Store an update from a neighbour."""
-        self._updates.setdefault(gateway, {})[neighbour] = said
+        self._updates.setdefault(gateway, {})[neighbour] = update
 
     def best(self, gateway: int) -> int:
         """The feasible neighbour with the smallest sum of its metric and the link's cost."""
         updates, limit = self._updates.get(gateway, {}), self._feasibility.get(gateway)
         costs = {
-            n: self._cost(n, said)
-            for n, said in updates.items()
-            if said.metric != INFINITE and (limit is None or said.better_than(limit))
+            n: self._cost(n, update)
+            for n, update in updates.items()
+            if update.metric != INFINITE and (limit is None or update.better_than(limit))
         }
         return min(costs, key=lambda n: (costs[n], n)) if costs else NO_ROUTE
 
     def advertise(self) -> list[tuple[int, Distance]]:
         """(gateway, own distance) of each gateway. Advertised distances bound what is feasible."""
         found = [(gateway, self._distance(gateway)) for gateway in self._updates]
-        for gateway, said in found:
+        for gateway, update in found:
             limit = self._feasibility.get(gateway)
-            if said.metric != INFINITE and (limit is None or said.better_than(limit)):
-                self._feasibility[gateway] = said
+            if update.metric != INFINITE and (limit is None or update.better_than(limit)):
+                self._feasibility[gateway] = update
         return found
 
     def forget_neighbour(self, neighbour: int) -> list[int]:
@@ -79,8 +79,8 @@ class FeasibleRoutes:
         if to == NO_ROUTE:
             limit = self._feasibility.get(gateway, Distance(0, INFINITE))
             return Distance(limit.sequence, INFINITE)
-        said = self._updates[gateway][to]
-        return Distance(said.sequence, self._cost(to, said))
+        update = self._updates[gateway][to]
+        return Distance(update.sequence, self._cost(to, update))
 
-    def _cost(self, neighbour: int, said: Distance) -> int:
-        return min(said.metric + round(COST_PER_ETX * self._links.etx(neighbour)), INFINITE - 1)
+    def _cost(self, neighbour: int, update: Distance) -> int:
+        return min(update.metric + round(COST_PER_ETX * self._links.etx(neighbour)), INFINITE - 1)

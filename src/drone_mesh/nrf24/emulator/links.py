@@ -78,7 +78,7 @@ def bit_error_rate(margin_db: float) -> float:
 
 
 class LogDistance(LinkModel):
-    """Power falls with a power of the distance; bits get wrong near the receiver's sensitivity."""
+    """Power falls with a power of the distance; bits are damaged near the sensitivity limit."""
 
     def __init__(
         self,
