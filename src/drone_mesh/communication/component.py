@@ -127,7 +127,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             and not self._frame.heard(creator, payload)
             and not self.complaints.foreign_neighbour(now_s)  # its digest may be part of a seal
         ):
-            self.complaints.add("another origin", f"that of node {creator}", now_s)
+            self.complaints.add("a neighbour has another origin", f"node {creator}", now_s)
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node with another or an unknown origin", payload)
             return

@@ -156,8 +156,8 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         now_s = self._clock()
         proven = self._end_to_end.seal(payload, now_s)
         if proven is None:
-            detail = f"node {payload[FORWARD_AT]} has not been heard by this node"
-            self.complaints.add("not sent: no nonce of the addressee", detail, now_s)
+            detail = f"no nonce of node {payload[FORWARD_AT]} was received yet"
+            self.complaints.add("a packet could not be sealed", detail, now_s)
         return proven
 
     # For the antenna -------------------------------------------------------------------------

@@ -44,7 +44,7 @@ def test_places_never_cross_the_border_between_two_frames(two_frames, caplog):
     assert network.order(3, 1.0, 1.0)  # there is a route; the order is dropped on it
     network.run_for(10.0)
     assert all(node.drone.path is None for node in network.nodes.values())
-    assert "another origin: that of node 2" in caplog.text
+    assert "a neighbour has another origin: node 2" in caplog.text
     network.power(1, False)
     network.run_for(300.0)
     assert network.nodes[2].drone.get_location().longitude == 12.0

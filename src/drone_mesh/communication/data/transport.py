@@ -169,7 +169,7 @@ class Transport:
             else:
                 self._complaints.dropped("data of an unknown type", payload, now_s)
         except PacketError as error:
-            self._complaints.dropped(f"data: {error}", payload, now_s)
+            self._complaints.dropped(f"invalid data: {error}", payload, now_s)
         self._work()
 
     def on_due(self) -> None:
