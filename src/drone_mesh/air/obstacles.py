@@ -13,8 +13,8 @@ from drone_mesh.drone.goal import MAX_HEIGHT_M
 
 METRE_DB = 0.4  # dB per metre inside, the same source as brick
 NO_PATH = "no path past the obstacles"  # reason for refusing a goal
-CLEARANCE_M = 0.5  # our choice: least distance between a flight and a box, above and beside it
-ABOVE_M = CLEARANCE_M + 1e-6  # height above a box at which a flight is just clear of it
+BOX_CLEARANCE_M = 0.5  # our choice: least distance between a flight and a box, above and beside it
+ABOVE_M = BOX_CLEARANCE_M + 1e-6  # height above a box at which a flight is just clear of it
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Obstacles:
         usual = FlightPath(start, goal, start_s, speed_m_s)
         lowest_m = max(usual.above_start[2], usual.above_goal[2])
         tops = {box.top_m + ABOVE_M for box in self._met(usual)}
-        wide = [box.grown(CLEARANCE_M) for box in self.boxes]
+        wide = [box.grown(BOX_CLEARANCE_M) for box in self.boxes]
         for height_m in sorted({lowest_m, *(top for top in tops if top > lowest_m)}):
             corners = way_round(wide, start[:2], goal[:2], height_m)
             if corners is not None:
@@ -110,7 +110,7 @@ class Obstacles:
         return [
             box
             for box in self.boxes
-            if box.grown(CLEARANCE_M).chord(path.above_start, path.above_goal) is not None
+            if box.grown(BOX_CLEARANCE_M).chord(path.above_start, path.above_goal) is not None
         ]
 
     def _rises_freely(self, path: FlightPath) -> bool:

@@ -21,8 +21,8 @@ import psutil
 from drone_mesh.bench.observation import PROBE, WATCH, Watch, from_line
 from drone_mesh.bench.processes import Use, family, take_use
 from drone_mesh.errors import MeshError
+from drone_mesh.web import LOOPBACK
 
-LOOPBACK = "127.0.0.1"
 PART_WITHIN_S = 30.0  # wall; our choice, for master and probe
 END_WITHIN_S = 20.0  # wall; roslaunch itself waits 15 s before it kills a node
 LOG_LINES_SHOWN = 15

@@ -11,13 +11,12 @@ import hashlib
 import hmac
 from typing import Callable
 
+from drone_mesh.communication.data.packets import MESSAGE_TAG_BYTES
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.keys import Keys
+from drone_mesh.communication.keys import KEY_BYTES, Keys
 from drone_mesh.errors import ConfigurationError
 
-TAG_BYTES = 6
 ACK_TAG_BYTES = 3  # all the room that is left in an ACK
-_KEY_BYTES = 16
 _BLOCK_BYTES = 16
 
 Encrypt = Callable[[bytes, bytes, bytes], bytes]
@@ -45,11 +44,11 @@ class MessageSeal:
         key = self._key(creator, to)
         if key is None:
             return sealed
-        if len(sealed) < TAG_BYTES:
+        if len(sealed) < MESSAGE_TAG_BYTES:
             return None
         context = bytes((creator, to)) + place
-        tag = sealed[-TAG_BYTES:]
-        payload = self._encrypted(key, context + tag, sealed[:-TAG_BYTES])
+        tag = sealed[-MESSAGE_TAG_BYTES:]
+        payload = self._encrypted(key, context + tag, sealed[:-MESSAGE_TAG_BYTES])
         return payload if hmac.compare_digest(_tag(key, context, payload), tag) else None
 
     def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
@@ -68,7 +67,7 @@ class MessageSeal:
 
 def _tag(key: bytes, context: bytes, payload: bytes) -> bytes:
     made = context + payload
-    return hashlib.blake2s(made, key=key, digest_size=TAG_BYTES, person=b"message").digest()
+    return hashlib.blake2s(made, key=key, digest_size=MESSAGE_TAG_BYTES, person=b"message").digest()
 
 
 def _aes_in_counter_mode() -> Encrypt:
@@ -83,7 +82,7 @@ def _aes_in_counter_mode() -> Encrypt:
         ) from error
 
     def encrypted(key: bytes, nonce: bytes, text: bytes) -> bytes:
-        own = hashlib.blake2s(key=key, digest_size=_KEY_BYTES, person=b"encrypt").digest()
+        own = hashlib.blake2s(key=key, digest_size=KEY_BYTES, person=b"encrypt").digest()
         first_block = nonce.ljust(_BLOCK_BYTES, b"\0")  # its last bytes count the blocks
         cipher = Cipher(AES(own), CTR(first_block)).encryptor()
         return cipher.update(text) + cipher.finalize()

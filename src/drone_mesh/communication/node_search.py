@@ -19,7 +19,7 @@ from drone_mesh.communication.parts import NodeParts
 BODY = struct.Struct("<BH")  # the node, the number of the search
 SEARCH_EVERY_S = 0.3  # our choice: each search is one broadcast by every node
 SAME_SEARCH_S = 10.0  # our choice: far longer than a search takes to pass through a mesh
-NUMBERS_PER_S = 16  # a restarted gateway starts at another number
+NUMBERS_PER_S = 16  # our choice, for orders too: a restarted gateway starts at another number
 
 
 class NodeSearch:

@@ -13,7 +13,7 @@ from typing import Callable
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import GoToLocationMessage, with_order_number
-from drone_mesh.communication.node_search import SEARCH_EVERY_S
+from drone_mesh.communication.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_messages import OrderOutcome, OrderQuery, OrderReply
 from drone_mesh.communication.order_record import OrderRecord, OrderState
@@ -23,7 +23,6 @@ from drone_mesh.drone.interfaces import Location
 
 OLD_ORDERS_KEPT = 100  # our choice: besides the latest of each drone
 HIGHEST_NUMBER = 2**16 - 1
-NUMBERS_PER_S = 16  # our choice: a restarted gateway starts at another number
 REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # our choice: pauses between tries without a reply
 FOUND_WITHIN_S = 1.0  # our choice: a search passes through 100 nodes within half a second
 MOST_SEARCHES = 3  # our choice: per order; the path that a search found may break at once
@@ -48,7 +47,6 @@ _STATE_AFTER = {
     OrderOutcome.GIVEN_UP: OrderState.GIVEN_UP,
     OrderOutcome.UNKNOWN: OrderState.GIVEN_UP,
 }
-_OPEN = frozenset((OrderState.ASKED, OrderState.UNDER_WAY))
 
 
 @dataclass
@@ -243,9 +241,7 @@ class OrderBook:
 
     def _open_for(self, drone: int) -> list[_Order]:
         return [
-            order
-            for order in self._orders.values()
-            if order.drone == drone and order.state in _OPEN
+            order for order in self._orders.values() if order.drone == drone and order.state.is_open
         ]
 
     def _forget_old(self) -> None:

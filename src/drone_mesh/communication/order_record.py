@@ -18,6 +18,11 @@ class OrderState(enum.Enum):
     ARRIVED = "arrived"
     GIVEN_UP = "given up"
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the order may still change."""
+        return self in (OrderState.ASKED, OrderState.UNDER_WAY)
+
 
 class OrderRecord(NamedTuple):
     """One order as known to its gateway."""

@@ -8,6 +8,7 @@ from typing import Iterable, Iterator
 from drone_mesh.drone.interfaces import Location
 
 BLOCK = 16  # one spot for each of the 256 ids
+WITHIN_REACH = 0.9  # our choice, of the range: how far behind a node that moved a drone stays
 PITCH = 1.1  # distance of spots in clearances, with a margin for rounding
 
 

@@ -13,6 +13,7 @@ import time
 from functools import partial
 from typing import Mapping, Sequence
 
+from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
 from drone_mesh.console.history import History
@@ -21,6 +22,7 @@ from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import MeshError
 from drone_mesh.stopping import StopRequest
+from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import access_for, is_loopback
 
 ASK_PERIOD_S = 1.0  # our choice
@@ -84,12 +86,15 @@ def main(
     )
     parser.add_argument(
         "--bind",
-        default="127.0.0.1",
+        default=LOOPBACK,
         metavar="ADDRESS",
         help="address to listen on (default: %(default)s)",
     )
     parser.add_argument(
-        "--port", type=int, default=8080, help="TCP port (default: %(default)s; 0: any free one)"
+        "--port",
+        type=int,
+        default=DEFAULT_PORT,
+        help="TCP port (default: %(default)s; 0: any free one)",
     )
     options = parser.parse_args(arguments)
     if not options.gateway.startswith(("http://", "https://")):

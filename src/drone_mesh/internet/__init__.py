@@ -3,5 +3,4 @@
 No ROS and no hardware. Nothing is imported here: a gateway without HTTP loads no web server.
 """
 
-DEFAULT_ADDRESS = "127.0.0.1"
 DEFAULT_PORT = 9080  # docs/raspberry-pi.md, "HTTP"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
+from drone_mesh.internet import DEFAULT_PORT
+from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import Access, access_for, own_names
 
 if TYPE_CHECKING:  # it loads ssl, which only HTTPS needs
@@ -16,7 +17,7 @@ if TYPE_CHECKING:  # it loads ssl, which only HTTPS needs
 class HttpSettings:
     """The address of a node's HTTP server, and its access rules."""
 
-    address: str = DEFAULT_ADDRESS
+    address: str = LOOPBACK
     port: int = DEFAULT_PORT  # 0: any free one
     token: str = ""  # empty: none; then only this machine may send requests
     names: tuple[str, ...] = ()  # of this machine, besides its host name

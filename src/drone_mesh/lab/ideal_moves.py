@@ -8,13 +8,13 @@ from __future__ import annotations
 from typing import AbstractSet, Dict, Sequence
 
 from drone_mesh.communication.spots import towards
+from drone_mesh.communication.strategies.inward import MOVES
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.lab.random_layouts import Point
 
 Places = Dict[int, Location]
 Flown = Dict[int, float]  # node -> metres
 
-MOVES = 2  # of `inward` towards one place
 ROUNDING_M = 1e-9  # drones at half the range on opposite sides of a point are in range
 
 

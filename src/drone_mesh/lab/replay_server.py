@@ -11,9 +11,9 @@ from drone_mesh.console.orders import RecordingControls
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.state.model import EventRecord, MeshStatus
+from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import Access
 
-LOOPBACK = "127.0.0.1"
 POLL_PERIOD_S = 0.5  # period of checks for Ctrl-C
 
 

@@ -10,12 +10,11 @@ from typing import Callable, Mapping
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.repair_options import DEFAULT_REPAIR
+from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.random_layouts import cut_vertices, random_layout
 
 SMALLEST, LARGEST = 8, 60  # nodes of a mesh
-CLEARANCE_M = 0.5  # two drones at rest that are nearer than this are stacked
 NOTICED_S = 12.0  # time in which each node checks its connection
 HEALED_WITHIN_S = 120.0
 SETTLED_S = 60.0  # time without changes

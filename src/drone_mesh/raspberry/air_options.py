@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.web import LOOPBACK
 from drone_mesh.web.listening import MAX_PORT
-
-LOCAL = "127.0.0.1"
 
 
 class AirAddress(NamedTuple):
@@ -41,7 +40,7 @@ def add_air_options(node: argparse._ActionsContainer, gateway: bool) -> None:
             "--emulated-air-serve",
             metavar="[HOST:]PORT",
             help="without hardware: run this node on an emulated air, and serve that air to other "
-            f"processes; without a password, so only on this machine by default ({LOCAL})",
+            f"processes; without a password, so only on this machine by default ({LOOPBACK})",
         )
 
 
@@ -62,4 +61,4 @@ def _address(option: str, text: str | None) -> AirAddress | None:
     host, _, port = text.rpartition(":")
     if not (port.isascii() and port.isdigit() and int(port) <= MAX_PORT):
         raise ConfigurationError(f"invalid {option} {text!r}: use [HOST:]PORT, as in 9100")
-    return AirAddress(host.strip("[]") or LOCAL, int(port))
+    return AirAddress(host.strip("[]") or LOOPBACK, int(port))

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Mapping
 
 from drone_mesh.errors import ConfigurationError, naming_argument
-from drone_mesh.internet import DEFAULT_ADDRESS, DEFAULT_PORT
+from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.raspberry.secret_file import read_secret
 from drone_mesh.raspberry.wiring_options import whole
+from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT
 from drone_mesh.web.tls import Certificate
@@ -23,7 +24,7 @@ def add_http_options(http: argparse._ArgumentGroup) -> None:
     http.add_argument(
         "--bind",
         metavar="ADDRESS",
-        default=DEFAULT_ADDRESS,
+        default=LOOPBACK,
         help="address to listen on; an address that other machines can reach needs a token "
         "(default: %(default)s)",
     )

@@ -37,8 +37,8 @@ LOG_LEVELS = ("debug", "info", "warning", "error")
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
 
-CLEARANCE_M = 5.0  # our choice: satellite positions are accurate to a few metres
-RANGE_M = 100.0  # our choice: hardly any packet was lost there (nrf24/emulator/nrf24_range.csv)
+OUTDOOR_CLEARANCE_M = 5.0  # our choice: satellite positions are accurate to a few metres
+OUTDOOR_RANGE_M = 100.0  # our choice: hardly any loss so near (nrf24/emulator/nrf24_range.csv)
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     mesh.add_argument(
         "--clearance",
         type=float,
-        default=CLEARANCE_M,
+        default=OUTDOOR_CLEARANCE_M,
         metavar="M",
         help="minimum distance in metres between drones at rest after a repair "
         "(default: %(default)g)",
@@ -209,7 +209,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     mesh.add_argument(
         "--range",
         type=float,
-        default=RANGE_M,
+        default=OUTDOOR_RANGE_M,
         metavar="M",
         help="range of the radio in metres, which the repair uses; raspberry_radio range measures "
         "it (default: %(default)g, for 250k)",

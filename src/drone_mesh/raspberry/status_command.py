@@ -10,6 +10,7 @@ from typing import Sequence
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.raspberry.http_options import TOKEN_VARIABLE
 from drone_mesh.raspberry.node_status import table
+from drone_mesh.web import LOOPBACK
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 10.0
@@ -25,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "url",
         nargs="?",
-        default=f"http://127.0.0.1:{DEFAULT_PORT}",
+        default=f"http://{LOOPBACK}:{DEFAULT_PORT}",
         help="address of the node (default: %(default)s)",
     )
     url = parser.parse_args(arguments).url.rstrip("/")

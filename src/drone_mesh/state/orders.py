@@ -21,8 +21,6 @@ _STATE_OF = {
 
 BEING_SENT = "being sent"  # no gateway has reported the order yet
 
-_OPEN = (OrderState.ASKED, OrderState.UNDER_WAY)
-
 
 class OrderProgress:
     """Follows one order until it ends, through all gateways that sent it."""
@@ -44,7 +42,7 @@ class OrderProgress:
     @property
     def is_over(self) -> bool:
         """Whether the drone has arrived, or no gateway's order is open any more."""
-        return self.state not in _OPEN
+        return not self.state.is_open
 
     def take(self, event: EventRecord) -> None:
         """Process a new event; events of other orders are ignored."""
@@ -61,8 +59,8 @@ class OrderProgress:
 
     def _conclude(self, state: OrderState, reason: str) -> None:
         """Update the outcome; `state` is that of the order that changed last."""
-        ended = all(other not in _OPEN for other in self._orders.values())
-        if state in _OPEN or state is OrderState.ARRIVED or ended:
+        ended = not any(other.is_open for other in self._orders.values())
+        if state.is_open or state is OrderState.ARRIVED or ended:
             self.state, self.reason = state, reason
 
 

@@ -17,11 +17,11 @@ from drone_mesh.view.palette import FRAME, LIGHT, ROTOR, Colour, rgb
 from drone_mesh.view.picture import DronePicture, Scene, Shape
 from drone_mesh.view.quadrocopter import MOTORS, BodyPart, solid_of, turned_rad
 from drone_mesh.view.solids import normal
+from drone_mesh.world.bullet_world import UPRIGHT
 
 LIGHT_FROM = (-3.0, -6.0, 12.0)
 OBSTACLE_OPACITY = 0.7
 NOTHING = -1  # pybullet's body number for pixels without a body
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 BASE = -1  # pybullet's number for a body without its links
 
 _Triangles = Tuple[Sequence[Vector], Sequence[Vector]]  # corners, and the normal at each

@@ -2,3 +2,5 @@
 
 Nothing is imported here: access rules need no web server, and a Pi's router has none.
 """
+
+LOOPBACK = "127.0.0.1"  # the default address of each server: only programs of this machine reach it

@@ -15,6 +15,7 @@ from typing import Iterable
 from urllib.parse import urlsplit
 
 from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.web import LOOPBACK
 
 SHORTEST_TOKEN = 16  # characters; our choice: too long to be guessed over a network
 
@@ -69,7 +70,7 @@ def access_for(bind_address: str, token: str, names: Iterable[str] = ()) -> Acce
         raise ConfigurationError(f"token: must have at least {SHORTEST_TOKEN} characters")
     if not token and not is_loopback(bind_address):
         raise ConfigurationError(
-            f"address {bind_address}: other machines can reach it; set a token, or use 127.0.0.1"
+            f"address {bind_address}: other machines can reach it; set a token, or use {LOOPBACK}"
         )
     return Access(token or None, frozenset(name.lower() for name in names))
 

@@ -8,7 +8,7 @@ import random
 import pytest
 
 from drone_mesh.air.box import Box
-from drone_mesh.air.obstacles import CLEARANCE_M, Obstacles
+from drone_mesh.air.obstacles import BOX_CLEARANCE_M, Obstacles
 
 WALL = Box(center=(5.0, 0.0, 1.5), size=(0.2, 4.0, 3.0))
 
@@ -78,7 +78,7 @@ def test_a_flight_climbs_over_what_is_long() -> None:
     path = Obstacles([LONG_HOUSE]).plan_flight((0, 0, 0), (20, 0, 0), 0.0, 2.0)
     assert path is not None
     assert path.around == ()
-    assert path.above_start[2] == pytest.approx(20 + CLEARANCE_M, abs=1e-3)
+    assert path.above_start[2] == pytest.approx(20 + BOX_CLEARANCE_M, abs=1e-3)
     assert path.duration_s == pytest.approx((20 + 2 * (20.5 - 10)) / 2.0, abs=1e-3)
     for share in range(101):
         place = path.position_at(path.duration_s * share / 100)
@@ -101,7 +101,7 @@ def test_a_flight_goes_round_what_is_high_and_takes_the_time_of_the_detour(
     assert path.duration_s == pytest.approx(round_m / 2.0)
     for share in range(101):
         place = path.position_at(path.duration_s * share / 100)
-        assert not TOWER.grown(CLEARANCE_M).contains(place)
+        assert not TOWER.grown(BOX_CLEARANCE_M).contains(place)
 
 
 def test_a_low_wall_with_a_tower_in_it_is_crossed_over_the_wall() -> None:

@@ -16,7 +16,7 @@ from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RE
 from drone_mesh.errors import MessageRefused, PacketError
 
 MAX_MESSAGE_BYTES = 1024
-SEAL_BYTES = 6  # after the payload of a message in a mesh with a key
+MESSAGE_TAG_BYTES = 6  # after the payload of a message in a mesh with a key
 FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
 ACK = 192  # the fragments of a message that its creator has
 POLL = 193  # asks for an ACK, and ends a train
@@ -120,7 +120,7 @@ def head_of(body: bytes) -> Head:
     """The header in the body of fragment 0. Raises PacketError for an impossible length."""
     number, session, port, meta, order, check = _HEAD.unpack_from(body)
     length = meta & (1 << _LENGTH_BITS) - 1
-    if length > MAX_MESSAGE_BYTES + SEAL_BYTES:
+    if length > MAX_MESSAGE_BYTES + MESSAGE_TAG_BYTES:
         raise PacketError(f"a message of {length} bytes: at most {MAX_MESSAGE_BYTES} are allowed")
     return Head(
         number, session, port, length, bool(meta & _RELIABLE), meta >> _BEHIND_SHIFT, order, check

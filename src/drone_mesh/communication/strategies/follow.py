@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from drone_mesh.communication.repair_interfaces import Step
 from drone_mesh.communication.router_states import RepairState
-from drone_mesh.communication.spots import towards
+from drone_mesh.communication.spots import WITHIN_REACH, towards
 from drone_mesh.communication.strategies.nearest import Nearest
 from drone_mesh.drone.interfaces import Location
-
-KEPT = 0.9  # of the range: greatest distance behind its next hop; our choice
 
 
 class Follow(Nearest):
@@ -25,8 +23,8 @@ class Follow(Nearest):
         may_follow = not (mesh.connected or mesh.why_not_fly() or mesh.state is RepairState.FLYING)
         if node != mesh.lost_next_hop or here is None or not may_follow:
             super().on_place(node, place)
-        elif here.distance_m(place) > KEPT * mesh.range_m:
-            self._fly(Step(towards(place, here, KEPT * mesh.range_m), node))
+        elif here.distance_m(place) > WITHIN_REACH * mesh.range_m:
+            self._fly(Step(towards(place, here, WITHIN_REACH * mesh.range_m), node))
         else:
             super().on_place(node, place)
 

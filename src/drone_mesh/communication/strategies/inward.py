@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from drone_mesh.communication.repair_interfaces import Step
 from drone_mesh.communication.router_states import RepairState
-from drone_mesh.communication.spots import towards
+from drone_mesh.communication.spots import WITHIN_REACH, towards
 from drone_mesh.communication.strategies.home import Home
 from drone_mesh.drone.interfaces import Location
 
-KEPT = 0.9  # of the range: greatest distance behind a neighbour that moved; our choice
 MOVES = 2  # towards one lost next hop
 WAITS = 6  # our choice: checks; the drones beside the dead node have moved twice by then
 
@@ -55,7 +54,7 @@ class Inward(Home):
         if here is None or not may_move or node not in mesh.neighbours() or self._moves_itself():
             return
         if here.distance_m(place) > mesh.range_m:
-            self._move_to(Step(towards(place, here, KEPT * mesh.range_m), node))
+            self._move_to(Step(towards(place, here, WITHIN_REACH * mesh.range_m), node))
 
     def _moves_itself(self) -> bool:
         """Whether it is beside the dead node and may still move."""

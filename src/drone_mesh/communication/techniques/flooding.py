@@ -11,11 +11,11 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.timing import CIRCULATION_S
 
 REMEMBERED = 512  # our choice: packets that a node recognises; heartbeats live for a second
 REACHABLE_S = 20.0  # our choice: two check periods
 SEQUENCE = struct.Struct("<H")
-SAME_PACKET_S = 0.5  # docs/protocol.md, "Circulating packets": after that it is another packet
 
 
 class Flooding(ChildTableTree):
@@ -40,7 +40,7 @@ class Flooding(ChildTableTree):
         assert self._essentials is not None
         self._heard_s[creator] = self._essentials.now_s()
         now_s, copy = self._essentials.now_s(), _identity(payload, kind)
-        is_first = now_s - self._seen_s.get(copy, -SAME_PACKET_S) >= SAME_PACKET_S
+        is_first = now_s - self._seen_s.get(copy, -CIRCULATION_S) >= CIRCULATION_S
         if is_first:
             self._seen_s[copy] = now_s
             self._seen_s.move_to_end(copy)

@@ -19,6 +19,7 @@ from rospy.impl.validators import ParameterInvalid
 from drone_mesh.errors import MeshError
 
 CALL_TIMEOUT_S = 2  # our choice: wall seconds without an answer until a service is gone
+SINGLE_CALL_TIMEOUT_S = 10  # the same for `call_once`: the DroneManager may wait for a gateway
 _READ_BYTES = 4096  # more than any answer here
 # TCPROS (wiki.ros.org/ROS/TCPROS): a request is its length and its fields. An answer has a status
 # byte first; after status 0 an error text follows in place of the fields.
@@ -142,13 +143,10 @@ class PersistentService(Generic[Request, Response]):
 
 
 def call_once(
-    name: str, service_class: ServiceClass[Request, Response], request: Request, timeout_s: int
+    name: str, service_class: ServiceClass[Request, Response], request: Request
 ) -> Response:
-    """Call a service on a connection of its own. Raises ServiceGone and ServiceRefused.
-
-    `timeout_s`: whole wall seconds to wait for the answer.
-    """
-    service = PersistentService(name, service_class, timeout_s)
+    """Call a service on a connection of its own. Raises ServiceGone and ServiceRefused."""
+    service = PersistentService(name, service_class, SINGLE_CALL_TIMEOUT_S)
     try:
         service.connect()
         return service.call(request)

@@ -34,7 +34,6 @@ from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
 from drone_mesh.state.orders import OrderProgress
 
 POLL_PERIOD_S = 1.0  # wall; our choice: how often the drones are compared with the actions
-ORDER_TIMEOUT_S = 10  # wall; longer than the DroneManager waits for a gateway
 SENT_WITHIN_S = 30.0  # wall; our choice: a gateway reports an order within a second
 CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the processes of this node and of a gateway
 
@@ -228,9 +227,7 @@ def _order(drone: int, goal: Location) -> None:
         drone, goal.latitude, goal.longitude, whole_metres(goal.height)
     )
     try:
-        status = call_once(
-            names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request, ORDER_TIMEOUT_S
-        ).status
+        status = call_once(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request).status
     except ServiceGone:
         raise _Refused(FlyResult.NO_ROUTE, "the DroneManager does not answer") from None
     except ServiceRefused as error:

@@ -31,8 +31,6 @@ from drone_mesh.srv import (
 
 log = logging.getLogger(__name__)
 
-ORDER_TIMEOUT_S = 10  # wall time; longer than the DroneManager waits for a gateway
-
 
 class RosControls:
     """A MeshControls. Any thread; each call opens a connection of its own and closes it."""
@@ -93,7 +91,7 @@ class RosControls:
 
 def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
     try:
-        return call_once(name, service_class, request, ORDER_TIMEOUT_S)
+        return call_once(name, service_class, request)
     except ServiceGone as error:
         log.warning("console: order failed: %s", error)
         raise OrderRefused(f"no answer from {name}: is the simulation running?") from error

@@ -13,6 +13,7 @@ from pathlib import Path
 import rosgraph
 import rospy
 
+from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.dots import make_dots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
@@ -29,11 +30,12 @@ from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import manager_layouts
 from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.ros.views.recording import Recording
+from drone_mesh.ros.views.state_source import OLD_STATE_S
 from drone_mesh.stopping import StopRequest
+from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import access_for, is_loopback
 
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
-OLD_STATE_S = 3.0  # wall time without a state after which the page shows a warning
 TOKEN_BYTES = 18
 REPAIR_DEMO = "repair"
 EVERYWHERE = ("0.0.0.0", "::")  # addresses that mean all addresses of this machine
@@ -148,8 +150,8 @@ def main() -> None:
 def _run() -> int:
     rospy.init_node("mesh_console")
     show_library_logs_on_rosout()
-    address = str(rospy.get_param("~address", "127.0.0.1"))
-    port = _port(rospy.get_param("~port", 8080))
+    address = str(rospy.get_param("~address", LOOPBACK))
+    port = _port(rospy.get_param("~port", DEFAULT_PORT))
     token = str(rospy.get_param("~token", ""))
     if not token and not is_loopback(address):
         token = secrets.token_urlsafe(TOKEN_BYTES)

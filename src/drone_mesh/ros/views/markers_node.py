@@ -23,8 +23,6 @@ from drone_mesh.state.model import NodeStatus, position_is_known
 
 Send = Callable[[object], None]
 
-_UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # x y z w
-
 
 class MeshMarkers:
     """Shows the mesh in rviz.
@@ -99,7 +97,7 @@ def _transform(node: NodeStatus, stamp: rospy.Time) -> TransformStamped:
     message.header.stamp = stamp
     translation, rotation = message.transform.translation, message.transform.rotation
     translation.x, translation.y, translation.z = node.position
-    rotation.x, rotation.y, rotation.z, rotation.w = _UPRIGHT
+    rotation.w = 1.0  # upright
     return message
 
 

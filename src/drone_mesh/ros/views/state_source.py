@@ -15,6 +15,7 @@ from drone_mesh.ros.views.bag import BagUnusable, no_states, read_states
 from drone_mesh.state.model import MeshStatus
 
 WAIT_S = 5.0  # wall time for a live state: it is latched, so it arrives at once or not at all
+OLD_STATE_S = 3.0  # wall time without a state after which the tools and the page show a warning
 
 
 class NoState(MeshError):

@@ -17,6 +17,7 @@ from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import mesh_status
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.views.state_source import (
+    OLD_STATE_S,
     WAIT_S,
     NoState,
     live_state,
@@ -28,7 +29,6 @@ from drone_mesh.state.trouble import all_connected, find_trouble
 from drone_mesh.view.table import mesh_table
 
 WATCH_PERIOD_S = 1.0
-OLD_STATE_S = 3.0  # wall time without a state after which --watch shows a warning
 CLEAR_SCREEN = "\x1b[H\x1b[2J"
 
 
