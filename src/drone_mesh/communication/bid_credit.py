@@ -18,7 +18,7 @@ class BidCredit:
     """The neighbours that a router trusts to relay bids."""
 
     def __init__(self) -> None:
-        self._brought_by: dict[int, int] = {}  # creator of a bid -> neighbour that brought it
+        self._brought_by: dict[int, int] = {}  # creator of a bid -> neighbour that relayed it
         self._in_vain: Counter[int] = Counter()  # by neighbour: winners that did not fly
 
     def believes(self, node: int, score: float, from_: int, most: float) -> bool:

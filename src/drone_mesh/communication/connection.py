@@ -20,13 +20,9 @@ from drone_mesh.communication.swallowing import Detours, Swallowing
 _log = logging.getLogger(__name__)
 
 _HOPS_UNTIL_KNOWN = 10  # our choice: the number of hops for which to wait for the first answer
-
-
 MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
-
-
-AVOIDED_S = 60.0  # our choice: for a neighbour whose shortcut brought no answer
-SWALLOWER_AVOIDED_S = 600.0  # our choice: one that may carry heartbeats only
+AVOIDED_S = 60.0  # our choice: for a neighbour through which no answer came
+SWALLOWER_AVOIDED_S = 600.0  # our choice: for a neighbour that seems to swallow packets
 
 
 class Shortcut(NamedTuple):
@@ -55,7 +51,7 @@ class GatewayConnection:
         self._answered_s = -math.inf
         self._shown_connected = False
         self._shortcut: Shortcut | None = None
-        self._tried = NO_ROUTE  # the neighbour of the latest heartbeat's shortcut
+        self._tried = NO_ROUTE  # the neighbour of the latest heartbeat's shortcut or detour
         self._detours = Detours(parts.neighbours)
         self._swallowing = Swallowing(parts.timing.check_period_s)
         self._detour = NO_ROUTE  # the neighbour over which the next heartbeat goes
@@ -69,7 +65,7 @@ class GatewayConnection:
         return self._parts.routing.get_direction_to_node(self.gateway)
 
     def may_use(self, gateway: int) -> bool:
-        """Whether `gateway` is relevant: it is the preferred one, or there is none yet."""
+        """Whether `gateway` is the preferred one. If there is none yet, it becomes that."""
         if self.gateway == NO_ROUTE and gateway <= MAX_NODE_ID and gateway != self._parts.node_id:
             self.gateway = gateway
         return gateway == self.gateway

@@ -189,7 +189,7 @@ class Delivery:
     def report_missing(
         self, missing: int, first: int = NO_ROUTE, reported_by: int = NO_ROUTE
     ) -> None:
-        """MISSING to every neighbour, `first` before the others and `reported_by` not at all.
+        """Send MISSING to every neighbour, to `first` before the others, not to `reported_by`.
 
         A neighbour that does not take the packet is itself lost. Its loss is queued, not handled
         within this call, so that the call depth does not grow with the number of neighbours.

@@ -241,7 +241,7 @@ class EndToEnd:
     # Both ------------------------------------------------------------------------------------
 
     def _state(self, form: _Form, node: int) -> hashlib.blake2s | None:
-        """The hash state for such proofs; None: this node does not have the key."""
+        """The hash state for proofs of this form; None: this node does not have the key."""
         if form.by_authority:
             key = self._keys.authority_over(node)
         else:

@@ -46,9 +46,7 @@ class Pilot:
         self._deadlines = deadlines
         self._complaints = complaints
         self._flight: Flight | None = None
-        self._origin: Location | None = (
-            None  # where the flight started; of several in a row, the first
-        )
+        self._origin: Location | None = None  # start of the flight, or of the first of several
 
     @property
     def goal(self) -> Location | None:

@@ -83,8 +83,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
-        """Send a drone to a place (metres). True: a next hop took the order.
+        """Send a drone to a place (metres).
 
+        True: a next hop took the order, a search for the drone has begun, or it is its own drone.
         Raises GoalRefused for an invalid node id or place, or if its own drone cannot fly.
         """
         self._deadlines.now_s = now_s

@@ -165,7 +165,7 @@ class GroupRepair(IRepairStrategy):
         return all(view.age_s <= waited_s for view in asked.values())
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
-        """A node of the group bids for the flight or took off; `from_` relays that."""
+        """A node of the group bids for the flight or took off; `from_` sent or relayed that."""
         if score in (TOOK_OFF, TOOK_OFF_HOME):
             self._on_take_off_of(node, score, from_, about)
             return

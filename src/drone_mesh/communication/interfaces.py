@@ -96,9 +96,10 @@ class IGatewayCommands(abc.ABC):
     def send_goal_request_to_drone(
         self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
     ) -> bool:
-        """Send a drone to a place (metres). True: a next hop took the order.
+        """Send a drone to a place (metres). Raises GoalRefused for an invalid order.
 
-        `get_orders` returns the outcome. Raises GoalRefused for an invalid order.
+        True: a next hop took the order, or a search for the drone has begun. `get_orders` returns
+        the outcome.
         """
 
     @abc.abstractmethod

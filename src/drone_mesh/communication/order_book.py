@@ -108,7 +108,10 @@ class OrderBook:
         return number
 
     def send(self, number: int) -> bool:
-        """Send it for the first time. False: there was no route; it is not tried again."""
+        """Send an order for the first time, or search for its drone.
+
+        False: there is no route and no search; it is not tried again.
+        """
         order = self._orders[number]
         if self._parts.delivery.send_own(self._packet(order)):
             self._wait(order, REPEAT_AFTER_S[0])

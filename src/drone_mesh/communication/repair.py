@@ -223,9 +223,9 @@ class ConnectionRepair(RepairViews):
     def may_connect(self, node: int, know_gateway: bool) -> bool:
         """Whether the router may now connect through `node`.
 
-        In flight for a repair it would be a relay that is soon gone, so it stays unconnected,
-        unless it may stop where it is connected. It also stops if the group that it left behind has
-        a gateway.
+        During a repair flight it would be a relay that is soon gone, so it stays unconnected
+        unless the flight may end at a connection. A flight may also do so as soon as a node of the
+        group that it left has a gateway.
         """
         flight = self._flight
         if flight is None:

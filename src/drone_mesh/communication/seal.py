@@ -27,15 +27,15 @@ TAG_BYTES = 5
 SEAL_BYTES = 2 + TAG_BYTES
 SEAL_AT = PAYLOAD_BYTES - SEAL_BYTES
 TAG_AT = PAYLOAD_BYTES - TAG_BYTES
-LAST_COUNT = 2**32 - 1  # of an epoch; an answer carries 4 bytes
-WAITING_CHALLENGES = 16  # our choice: greatest number of nodes at once
-CHALLENGE_AGAIN_S = 2.0  # our choice: least time between two to the same node
-CHALLENGE_OUT_S = 0.5  # our choice: after that another node may take its slot
+LAST_COUNT = 2**32 - 1  # the last counter of an epoch: an answer carries 4 bytes
+WAITING_CHALLENGES = 16  # our choice: most unanswered challenges
+CHALLENGE_AGAIN_S = 2.0  # our choice: least time between two challenges to one node
+CHALLENGE_OUT_S = 0.5  # our choice: after this time another challenge may replace it
 
 _EPOCH_BITS, _NONCE_BITS = 64, 64
 _CHALLENGE = struct.Struct("<Q")  # nonce
 _ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
-_LOW_BYTES = 2**16 - 1  # of a counter: those in a packet
+_LOW_BYTES = 2**16 - 1  # the part of a counter that a packet carries
 
 # Each takes the whole packet (or all of it from `forward` on) and keeps only the bytes before its
 # seal: one call is cheaper than joining slices.
@@ -206,7 +206,10 @@ class HopSeal:
         return compare_digest(proof, payload[TAG_AT:])
 
     def _proof(self, packet: bytes, other: int) -> bytes:
-        """Covers all but byte 3, which differs for each receiver of a broadcast challenge."""
+        """The tag of a challenge or an answer.
+
+        It covers all but byte 3, which differs for each receiver of a broadcast challenge.
+        """
         key = self._pair_key(other)
         covered = packet[:TO_AT] + packet[FORWARD_AT:]
         tag = hashlib.blake2s(covered, key=key, digest_size=TAG_BYTES, person=b"epochs")

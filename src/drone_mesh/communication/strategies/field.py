@@ -12,7 +12,7 @@ from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
 from drone_mesh.communication.spots import towards
 from drone_mesh.drone.interfaces import Location
 
-TO_NEIGHBOURS = 0.1  # weights of the field, as in MDSG-APF
+TO_NEIGHBOURS = 0.1  # weight of the neighbours against the gateway, as in MDSG-APF
 LEG = 0.5  # of the range: distance between two requests for places; our choice
 PAUSE_S = 2.0  # our choice: time to hear a gateway between two legs
 

@@ -32,7 +32,7 @@ class Scout(Thesis):
         self._lost: set[int] = set()  # neighbours that were not heard again
 
     def patience(self, silent: bool) -> float:
-        """The first look is early; a second one as late as the flights of others."""
+        """In silence, look around early once, then wait like Thesis. Later rounds come sooner."""
         if silent:
             return SILENCE_PATIENCE if self._looked else 1.0
         return LATER_ROUNDS if self._drone_flew else 1.0
@@ -65,7 +65,7 @@ class Scout(Thesis):
         self._stood_at = None
 
     def on_neighbour_lost(self, node: int) -> None:
-        """It may have died, or the medium is down."""
+        """Remember it: it may have died, or the medium is down."""
         super().on_neighbour_lost(node)
         self._lost.add(node)
 
