@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import random
 from dataclasses import replace
 from typing import Callable, Iterable
@@ -30,17 +29,15 @@ from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.drone.roles import Role
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.inprocess.airs import create_air
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.node import InProcessNode, NoInternet
 from drone_mesh.inprocess.oracle import Oracle
-from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAir, InProcessAntenna
-from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAntenna
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.inprocess.shortest_path import SHORTEST_PATH, LinkMap, ShortestPath
 from drone_mesh.inprocess.status import event_records, mesh_status
-from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel
-from drone_mesh.nrf24.settings import RadioSettings, data_rate
+from drone_mesh.nrf24.emulator.links import LinkModel
 from drone_mesh.state.model import EventRecord, MeshStatus
 
 ORACLE = "oracle"  # the repair strategy with global knowledge
@@ -85,7 +82,6 @@ class Network:
         `key`: the key of the mesh, for every node, or a function that returns the keys of each
         node. None: no seals, of that node or of all.
         """
-        _check_numbers(max_distance_m, loss, delay_s, jitter_s)
         self._seed = seed
         self._rng = random.Random(seed)
         self._timing = timing or MeshTiming()
@@ -96,22 +92,9 @@ class Network:
         self._repair_options = repair_options
         self._key = key
         self.clock = VirtualClock()
-        self.air: InProcessAir | SharedAir
-        if radio == "shared":
-            settings = RadioSettings(data_rate=data_rate(rate))
-            links = links or IdealDisc(max_distance_m)
-            self.air = SharedAir(self.clock, links, settings, max_distance_m)
-        elif radio == "disc":
-            self.air = InProcessAir(
-                self.clock,
-                random.Random(self._rng.random()),
-                max_distance_m,
-                loss,
-                delay_s,
-                jitter_s,
-            )
-        else:
-            raise ConfigurationError(f"invalid radio {radio!r}: use disc or shared")
+        self.air = create_air(
+            radio, self.clock, self._rng, max_distance_m, loss, delay_s, jitter_s, rate, links
+        )
         self._link_map = LinkMap(self.clock, self.links)
         self.nodes: dict[int, InProcessNode] = {}
         self.events: list[MeshEvent] = []
@@ -313,17 +296,8 @@ class Network:
 
     def shortest_hops(self) -> dict[int, int]:
         """By id: hops on the shortest path to a gateway, for all nodes with a path."""
-        hops = {n: 0 for n, node in self.nodes.items() if node.is_gateway and node.antenna.powered}
-        edge = list(hops)
-        while edge:
-            reached = []
-            for node_id in edge:
-                for other, antenna in self.air.in_range(node_id).items():
-                    if antenna.powered and other not in hops:
-                        hops[other] = hops[node_id] + 1
-                        reached.append(other)
-            edge = reached
-        return hops
+        gateways = [n for n, node in self.nodes.items() if node.is_gateway and node.antenna.powered]
+        return self._link_map.hops_from(gateways)
 
     def path_to_gateway(self, node_id: int) -> list[int] | None:
         """The path of a packet to the node's gateway; None: it would not arrive."""
@@ -353,14 +327,3 @@ class Network:
 
     def _observe(self, event: MeshEvent) -> None:
         self.events.append(event)
-
-
-def _check_numbers(max_distance_m: float, loss: float, delay_s: float, jitter_s: float) -> None:
-    """Raises ConfigurationError; also for NaN, which is neither below nor above a bound."""
-    if not max_distance_m > 0:
-        raise ConfigurationError(f"invalid max_distance_m {max_distance_m}: must be above 0")
-    if not 0 <= loss <= 1:
-        raise ConfigurationError(f"invalid loss {loss}: must be a share, 0..1")
-    for name, value in (("delay_s", delay_s), ("jitter_s", jitter_s)):
-        if not 0 <= value < math.inf:
-            raise ConfigurationError(f"invalid {name} {value}: must be 0 or more")

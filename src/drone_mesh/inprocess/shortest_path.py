@@ -36,6 +36,20 @@ class LinkMap:
             self._next_hops[destination] = self._paths_to(destination)
         return self._next_hops[destination].get(node, NO_ROUTE)
 
+    def hops_from(self, starts: Iterable[int]) -> dict[int, int]:
+        """Hops of the shortest path from one of `starts`, by node; only nodes with a path."""
+        hops = dict.fromkeys(starts, 0)
+        edge = list(hops)
+        while edge:
+            reached = []
+            for node in edge:
+                for other in self._links(node):
+                    if other not in hops:
+                        hops[other] = hops[node] + 1
+                        reached.append(other)
+            edge = reached
+        return hops
+
     def _paths_to(self, destination: int) -> dict[int, int]:
         next_hops: dict[int, int] = {}
         edge = [destination]
