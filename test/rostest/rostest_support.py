@@ -53,6 +53,13 @@ def pid_of(node: str) -> int | None:
         return None
 
 
+def receives(node: str, topic: str, publisher: str) -> bool:
+    """Whether `node` is connected to a topic of `publisher`; the master knows that too early."""
+    uri = rosgraph.Master("/rostest").lookupNode(publisher)
+    _code, _text, connections = ServerProxy(uri).getBusInfo("/rostest")
+    return any(other == node and name == topic for _, other, _, _, name, *_ in connections)
+
+
 def kill_and_wait_for_respawn(node: str) -> None:
     """SIGKILL; returns when roslaunch has started it again."""
     old_pid = pid_of(node)
@@ -104,6 +111,12 @@ class MeshWatch:
         hops = self.hops()
         wanted = range(self.count) if node_ids is None else node_ids
         return all(hops.get(node_id) is not None for node_id in wanted)
+
+    def forget(self, *node_ids: int) -> None:
+        """Forget what these nodes reported: only what they report from now on counts."""
+        for node_id in node_ids:
+            self._infos.pop(node_id, None)
+            self._unconnected_in_a_row.pop(node_id, None)
 
     def lost(self, *node_ids: int) -> bool:
         """Whether these nodes reported twice in a row, a second apart, that they are not connected.

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, call, wait_for
+from rostest_support import WALL_LIMIT_S, call, receives, wait_for
 
 from drone_mesh.msg import MeshState
 from drone_mesh.srv import PowerSwitch
@@ -55,16 +55,11 @@ class ExamplesTest(unittest.TestCase):
         wait_for(
             "the example's subscription",
             WALL_LIMIT_S,
-            lambda: "/caretaker" in dict(rospy_subscribers()).get("/mesh/events", []),
+            lambda: receives("/caretaker", "/mesh/events", "/DroneFactory"),
         )
         call("/Nodes/1/powerSwitch", PowerSwitch, False)
         wait_for("1 is off", WALL_LIMIT_S, lambda: self.state and not self.state.nodes[1].on)
         wait_for("1 is on again", WALL_LIMIT_S, lambda: self.state.nodes[1].on)
-
-
-def rospy_subscribers() -> list[tuple[str, list[str]]]:
-    """(topic, nodes) of all subscriptions that the master knows."""
-    return rospy.get_master().getSystemState()[2][1]
 
 
 if __name__ == "__main__":

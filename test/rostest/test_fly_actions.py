@@ -107,6 +107,7 @@ class FlyActionsTest(unittest.TestCase):
         x, _, height = self.mesh.place(1)
         self.assertLess(x, 9.0)
         self.assertEqual(height, 5)
+        self.mesh.wait("1 connected again", 60, lambda: self.mesh.connected([1]))
         state, _ = self.result_of(self.fly(1, 0.0, 0.0))
         self.assertEqual(state, GoalStatus.SUCCEEDED)
 
@@ -118,7 +119,11 @@ class FlyActionsTest(unittest.TestCase):
     def test_4_another_order_ends_a_flight(self) -> None:
         self.speed(SLOW)
         client = self.fly(2, -4.0, 6.0)
-        wait_for("the flight", WALL_LIMIT_S, lambda: self.feedback)
+        wait_for(
+            "the flight",
+            WALL_LIMIT_S,
+            lambda: self.feedback and self.feedback[-1].state == "under way",
+        )
         self.speed(FAST)
         call("/DroneManager/requestDroneMovement", RequestDroneFlight, 2, 4.0, 6.0, 0)
         state, result = self.result_of(client)

@@ -45,6 +45,8 @@ class KeyTest(unittest.TestCase):
         mesh.wait("packets for node 1", 15, lambda: len(heard) > 10)
         of_others = [payload for payload in heard if payload[1] != 1]
         self.assertTrue(all(any(payload[25:]) for payload in of_others), "packets without a seal")
+        # The subscriptions of this test and of node 1.
+        wait_for("node 1 to hear the forger", WALL_LIMIT_S, lambda: forge.get_num_connections() > 1)
         place = mesh.place(1)
         for _ in range(5):
             forge.publish(NRF24(FORGED_ORDER))

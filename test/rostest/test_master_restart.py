@@ -18,6 +18,7 @@ from rostest_support import free_port, wait_for
 
 STARTED_WITHIN_S = 60.0
 FOUND_WITHIN_S = 30.0
+ONLY_2 = "near: [2]"
 
 
 class MasterRestartTest(unittest.TestCase):
@@ -56,6 +57,10 @@ class MasterRestartTest(unittest.TestCase):
             check=False,
             text=True,
         )
+
+    def called(self, service: str, *arguments: str) -> str:
+        """What `rosservice call` prints."""
+        return self.run_tool("rosservice", "call", service, *arguments).stdout
 
     def all_connected(self) -> bool:
         """Whether `status` works, which needs the state's topic and the simulated time."""
@@ -102,13 +107,13 @@ class MasterRestartTest(unittest.TestCase):
             wait_for("another table", FOUND_WITHIN_S, lambda: "connected" in tables.read())
             simulated = self.run_tool("rosparam", "get", "/use_sim_time")
             self.assertEqual(simulated.stdout.strip(), "true")
+            # Each process registers its services again at a moment of its own.
             order = ("/DroneManager/requestDroneMovement", "2", "3", "3", "0")
-            ordered = self.run_tool("rosservice", "call", *order)
-            self.assertIn("status: 1", ordered.stdout)
-            switched = self.run_tool("rosservice", "call", "/Nodes/1/powerSwitch", "false")
-            self.assertEqual(switched.returncode, 0, switched.stdout)
-            seen = self.run_tool("rosservice", "call", "/SignalSimulator/othersinRange", "0")
-            self.assertNotIn("[1", seen.stdout)
+            wait_for("an order taken", FOUND_WITHIN_S, lambda: "status: 1" in self.called(*order))
+            off = ("/Nodes/1/powerSwitch", "false")
+            wait_for("1 switched off", FOUND_WITHIN_S, lambda: "ERROR" not in self.called(*off))
+            asker = ("/SignalSimulator/othersinRange", "0")
+            wait_for("2 alone in range", FOUND_WITHIN_S, lambda: ONLY_2 in self.called(*asker))
 
 
 if __name__ == "__main__":

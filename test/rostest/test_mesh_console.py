@@ -56,6 +56,9 @@ class Page:
             for node, fields in message.get("nodes", {}).items():
                 self.nodes.setdefault(node, {}).update(fields)
 
+    def all_connected(self) -> bool:
+        return all(n["condition"] == "connected" for n in list(self.nodes.values()))
+
     def ask(self, **request: object) -> None:
         self._socket.send(json.dumps(request))
 
@@ -96,18 +99,12 @@ class MeshConsoleTest(unittest.TestCase):
     def test_1_orders_are_carried_out(self) -> None:
         log = LogWatch()
         page = open_page()
-        wait_for(
-            "two connected routers",
-            WALL_LIMIT_S,
-            lambda: all(n["condition"] == "connected" for n in list(page.nodes.values())),
-        )
+        wait_for("two connected routers", WALL_LIMIT_S, page.all_connected)
         self.assertIn([202, "202: 5 drones"], [layout[:2] for layout in page.layouts])
         self.assertTrue(page.order(do="power", node=1, on=False)["done"])
         wait_for("1 is off", WALL_LIMIT_S, lambda: not page.nodes["1"]["on"])
         self.assertTrue(page.order(do="power", node=1, on=True)["done"])
-        wait_for(
-            "1 is connected", WALL_LIMIT_S, lambda: page.nodes["1"]["condition"] == "connected"
-        )
+        wait_for("all connected again", WALL_LIMIT_S, page.all_connected)
         self.assertTrue(page.order(do="fly", node=2, x=5.0, y=4.0, z=0)["done"])
         wait_for("2 arrived", WALL_LIMIT_S, lambda: page.nodes["2"]["position"] == [5.0, 4.0, 0.0])
         self.assertTrue(page.order(do="speed", paused=True, factor=0)["done"])

@@ -77,6 +77,7 @@ class ProgressTest(unittest.TestCase):
             slow.publish(late)
             time.sleep(REPEAT_S)
             self.assertEqual(self.now_s, stands_at_s)
+        wait_for("a line", WALL_LIMIT_S, lambda: self.log.lines("time stands still"))
         self.assertIn(
             f"waiting for host {rospy.get_name()}", self.log.lines("time stands still")[0]
         )

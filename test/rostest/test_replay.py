@@ -110,8 +110,9 @@ class ReplayTest(unittest.TestCase):
         last_s = BEGIN_S + LENGTH_S - 0.2
         wait_for("the last state", 60, lambda: states and states[-1] >= last_s - 1e-6)
         wait_for("the clock at its end", WALL_LIMIT_S, lambda: ticks and ticks[-1] >= last_s)
-        self.assertEqual(ticks, sorted(ticks))
-        self.assertGreaterEqual(ticks[0], BEGIN_S - 0.1)
+        heard = list(ticks)  # more may arrive while this list is looked at
+        self.assertEqual(heard, sorted(heard))
+        self.assertGreaterEqual(heard[0], BEGIN_S - 0.1)
         refused, _ = self.launch(f"bag:={self.bag}").communicate(timeout=60)
         self.assertIn("/mesh_replay already publishes /clock", refused)
 

@@ -154,9 +154,11 @@ class SimulatorTest(unittest.TestCase):
             self.a._publisher.publish(DroneInfo(255, (1.0, 0.0, 0.0), "", True))
             self.a._publisher.publish(DroneInfo(1, (1.0, 0.0, 0.0), "no topic", True))
             self.a._publisher.publish(DroneInfo(1, (1.0, 0.0, 0.0), "/rosout", True))
-        self.a.announce((1.0, 0.5, 0.1))  # comes after them on the same connection
+        self.far.announce((9.0, 0.0, 0.1))  # comes after them on the same connection
+        wait_for("3 did not move", WALL_LIMIT_S, lambda: self.in_range(1) == [2, 3])
+        self.far.announce((10.5, 0.0, 0.1))
+        wait_for("3 did not move back", WALL_LIMIT_S, lambda: self.in_range(1) == [2])
         wait_for("no line about it", 10, lambda: self.log.lines("DroneInfo dropped"))
-        self.assertEqual(self.in_range(1), [2])
         self.assertTrue(self.b.send(packet(2, 1)))
         self.assertLessEqual(len(self.log.lines("DroneInfo dropped")), 2)
         self.assertEqual(self.log.failures(), [])

@@ -14,11 +14,10 @@ from pathlib import Path
 
 import genpy.dynamic
 import rosbag
-import rosgraph
 import rospkg
 import rospy
 import rostest
-from rostest_support import WALL_LIMIT_S, call, wait_for
+from rostest_support import WALL_LIMIT_S, call, receives, wait_for
 
 from drone_mesh.msg import MeshState
 from drone_mesh.srv import PowerSwitch, SetSpeed
@@ -64,9 +63,8 @@ def record_in_an_older_definition(path: Path) -> None:
 
 def recorder_listens() -> bool:
     """Whether state and events go to the recorder; it looks for topics once a second."""
-    _publishers, subscribers, _services = rosgraph.Master("/test").getSystemState()
-    of_topic = dict(subscribers)
-    return all("/mesh_recorder" in of_topic.get(t, []) for t in ("/mesh/state", "/mesh/events"))
+    topics = ("/mesh/state", "/mesh/events")
+    return all(receives("/mesh_recorder", topic, "/DroneFactory") for topic in topics)
 
 
 class ToolsTest(unittest.TestCase):
@@ -154,10 +152,12 @@ class ToolsTest(unittest.TestCase):
             self.assertNotIn("\x1b", finished.stdout)
             self.assertEqual(run("snapshot", f"{self.folder}/live.png").returncode, 0)
             call("/Nodes/2/powerSwitch", PowerSwitch, False)
+            # At full speed the repair could mend it before the world is paused.
+            call("/DroneFactory/setSpeed", SetSpeed, False, 1.0)
             wait_for("3 is lost", WALL_LIMIT_S, lambda: self.connected() == 2)
-            call("/DroneFactory/setSpeed", SetSpeed, True, 0.0)  # before the repair mends it
+            call("/DroneFactory/setSpeed", SetSpeed, True, 0.0)
             self.assertEqual(run("status").returncode, 1)
-            call("/DroneFactory/setSpeed", SetSpeed, False, 0.0)
+            call("/DroneFactory/setSpeed", SetSpeed, False, 8.0)
             wait_for("the repair", 2 * WALL_LIMIT_S, lambda: self.connected() == 3)
             self.assertEqual(run("status").returncode, 0)
         finally:
