@@ -1,6 +1,6 @@
 """The fenced blocks of README and docs, and how each of them is tested.
 
-A comment line before a block says so, and is not shown: `<!-- test: simulation -->` for commands
+A comment line before a block, which is not shown, decides: `<!-- test: simulation -->` for commands
 that test/rostest/test_documentation.py runs beside a simulation, `<!-- test: none, REASON -->` for
 what cannot run on a bare machine. Blocks of Python need no comment: the unit tests run them all.
 """

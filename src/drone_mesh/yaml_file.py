@@ -73,9 +73,8 @@ def read_mapping_text(text: str, path: str | Path, limited: bool = True) -> Yaml
     if content is None:
         content = {}
     if not isinstance(content, dict):
-        raise ConfigurationError(
-            f"{path}: expected 'key: value' lines, not a {type(content).__name__}"
-        )
+        kind = "list" if isinstance(content, list) else "single value"
+        raise ConfigurationError(f"{path}: expected 'key: value' lines, not a {kind}")
     return YamlFile(path, content, lines)
 
 

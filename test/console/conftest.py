@@ -123,8 +123,8 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
-# What a person does with an order that is held, and with the toast of the next one: done in the
-# page, because a slow machine may take longer than the five seconds for which these are shown.
+# The user's reactions to a held order and to the next toast run in the page, because a slow machine
+# may take longer than the five seconds for which these are shown.
 ANSWER_HELD = """(button) => {
   const held = document.querySelector("#held");
   window.heldText = null;

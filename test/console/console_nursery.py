@@ -32,7 +32,7 @@ def start(arguments: list[str]) -> None:
     except BaseException:
         traceback.print_exc()
     finally:
-        os._exit(code)  # a child has nothing to tidy up for its parent
+        os._exit(code)  # a child must not run its parent's clean-up
 
 
 def end(pid: int) -> int | None:

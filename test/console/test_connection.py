@@ -55,7 +55,7 @@ def test_254_drones_are_shown_without_falling_behind(start_console, visit):
     page = visit(console.url)
     page.wait_for_drones(254)
     page.page.wait_for_timeout(3000)
-    # A page that cannot keep up would show an older and older past.
+    # A page that cannot keep up would lag further and further behind.
     with connect(console) as other:
         newest = json.loads(other.recv(timeout=5.0))
         while newest["type"] != "frame":

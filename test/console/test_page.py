@@ -143,7 +143,7 @@ def test_a_layout_starts(page):
     page.page.select_option("#layout", "0")
     page.undo_next()
     page.page.click("#layout-form button")
-    page.wait_for_toasts("ordered layout 0")  # after five seconds it goes by itself
+    page.wait_for_toasts("ordered layout 0")  # sent after five seconds
     page.wait_for(
         "many fly", lambda: page.page.locator("#nodes tr[data-condition=flying]").count() >= 10
     )

@@ -103,7 +103,7 @@ def press(screen, key):
     xtest.XTestFakeMotionEvent(connection, -1, 600, 400, ctypes.c_ulong(0))
     xtest.XTestFakeKeyEvent(connection, code, 1, ctypes.c_ulong(0))
     x11.XSync(connection, 0)
-    time.sleep(0.3)  # for how long a finger stays on a key
+    time.sleep(0.3)  # how long the key stays pressed
     xtest.XTestFakeKeyEvent(connection, code, 0, ctypes.c_ulong(0))
     x11.XCloseDisplay(connection)
 
@@ -114,7 +114,7 @@ def test_the_drones_are_on_the_screen_in_their_colours_until_it_is_stopped(scree
     for colour in (LIGHT.connected, LIGHT.disconnected):
         wait_until(lambda colour=colour: pixels_like(screen, colour) > 100, f"{colour} on it")
     window.stop()
-    # The screen's server hears of it a moment later.
+    # The screen's server notices it a moment later.
     wait_until(lambda: pixels_like(screen, LIGHT.gateway) == 0, "an empty screen")
 
 

@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import HealthCheck, settings
 
-# How long one draw or one example takes says something about the machine's load, not about a test.
+# The time of one draw or one example depends on the machine's load, so it has no limit.
 settings.register_profile(
     "busy machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )

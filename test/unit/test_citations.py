@@ -12,7 +12,7 @@ SUFFIXES = {"", ".py", ".js", ".html", ".css", ".launch", ".test", ".xml", ".yam
 
 CITATION = re.compile(r'\b(docs/[\w-]+\.md)((?:,? (?:(?:and|or|to) )?"[^"]+")*)')
 LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
-# Words by which the documents were cited that a reader of the repository does not have.
+# Citations of documents that are not in the repository.
 ELSEWHERE = re.compile(
     r"\b[Rr]eference,? (?:sections? )?\d|\bSDD\b|\bformula \d|\bsections? \d"
     r"|\bChecklist row|(?<!docs/)\b(?:nrf24|lab|style|reference|sdd\.nl)\.md\b"

@@ -154,7 +154,7 @@ def test_a_bad_override_is_refused_as_an_argument(write):
         ("routers: 1\nrouters: 2\n", "line 2: duplicate key routers"),
         ("routers: [1\n", "line 2: "),
         ("- routers\n", "expected 'key: value' lines, not a list"),
-        ("routers 3\n", "expected 'key: value' lines, not a str"),
+        ("routers 3\n", "expected 'key: value' lines, not a single value"),
         ("? [1, 2]\n: 3\n", "line 1: "),
         ("routers: !!python/object:os.system {}\n", "line 1: "),
         ("routers: \x00\n", "mine.yaml: "),

@@ -237,7 +237,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "--trace",
         type=Path,
         metavar="FILE",
-        help="with --emulated: write the last 100,000 frames on the air to this file at the end "
+        help="with an emulated air: write its last 100,000 frames to this file at the end "
         "(pcapng, for Wireshark)",
     )
     parser.add_argument(
@@ -265,7 +265,10 @@ def _options(
 ) -> Options:
     serves = parsed.emulated or getattr(parsed, "emulated_air_serve", None)
     if parsed.trace is not None and not serves:
-        parser.error("--trace needs --emulated: a real radio cannot record the frames of others")
+        parser.error(
+            "--trace needs --emulated or, for a gateway, --emulated-air-serve: a real radio cannot "
+            "record the frames of others"
+        )
     if (parsed.latitude is None) != (parsed.longitude is None):
         parser.error("--latitude and --longitude: give both, or neither")
     for name in () if parsed.http else ("bind", "port", "token_file", "name", "cert", "key"):

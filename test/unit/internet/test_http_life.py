@@ -146,13 +146,13 @@ def test_a_silent_client_does_not_delay_the_end(make_mesh):
     silent.connect()
     silent.sock.sendall(b"GET /ready HT")
     mesh.internet.disconnect()
-    with contextlib.suppress(ConnectionResetError):  # the end, too, with bytes not read by then
+    with contextlib.suppress(ConnectionResetError):  # also an end: bytes had not been read by then
         assert silent.sock.recv(1) == b""
     silent.close()
 
 
 def test_a_thousand_requests_in_a_row_leave_no_thread_and_no_memory_behind(make_mesh, caplog):
-    caplog.set_level(logging.CRITICAL)  # what pytest keeps of the log is not to be counted
+    caplog.set_level(logging.CRITICAL)  # so that the log that pytest keeps is not counted
     mesh = make_mesh()
     connection = http.client.HTTPConnection("127.0.0.1", mesh.internet.port, timeout=PATIENCE_S)
 
@@ -162,10 +162,10 @@ def test_a_thousand_requests_in_a_row_leave_no_thread_and_no_memory_behind(make_
             target = targets[number % 4]
             connection.request("POST" if "Drone" in target else "GET", target)
             connection.getresponse().read()
-        mesh.network.events.clear()  # the network of the test keeps what happened in it
+        mesh.network.events.clear()  # which this test's network collects
         gc.collect()
 
-    ask(500)  # what is made once, in the first 200 or so, is made
+    ask(500)  # objects that are created once exist after about 200 requests
     threads, grown_blocks = threading.active_count(), []
     for _ in range(4):
         blocks = sys.getallocatedblocks()
@@ -173,7 +173,7 @@ def test_a_thousand_requests_in_a_row_leave_no_thread_and_no_memory_behind(make_
         grown_blocks.append(sys.getallocatedblocks() - blocks)
     connection.close()
     assert threading.active_count() == threads
-    # One block kept of each request would be 250 each time; what is kept of all comes and goes.
+    # One block leaked per request would add 250 each time; other allocations come and go.
     assert min(grown_blocks) < 50
 
 

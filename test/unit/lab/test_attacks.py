@@ -12,8 +12,8 @@ from drone_mesh.lab.command import main
 from drone_mesh.lab.damage import KEY, Threat, keys_of, table, trial
 from drone_mesh.lab.fuzz import crowd, fuzz, tables
 
-# Of what an attack may not have effects: what the scenario costs by itself differs a little with
-# the moments at which packets travel.
+# Tolerance where an attack must have no effect: the scenario alone has slightly different results
+# when packets travel at other moments.
 SLACK = 0.05
 
 

@@ -85,7 +85,7 @@ export class Mesh extends EventTarget {
     this.#notify("detail");
   }
 
-  /** Whether the page looks at a mesh that takes orders. */
+  /** Whether the page shows a mesh that takes orders. */
   get canOrder() {
     return !this.recording && this.timeline.live !== false;
   }

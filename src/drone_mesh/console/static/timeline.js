@@ -1,5 +1,5 @@
 // The time line: drag to any moment of what the console remembers, play, step, return to the present.
-// On a page that looks at the past, or at a recording, everything that gives orders is hidden.
+// While a page shows the past or a recording, all controls that give orders are hidden.
 
 const byId = (id) => document.getElementById(id);
 

@@ -221,7 +221,7 @@ def main() -> None:
 
         sees = RayLinks(obstacles, max_distance_m).sees
         verb = "block" if obstacles.blocks else "attenuate"
-        _log.info("%d obstacles %s the radio", len(obstacles.boxes), verb)
+        _log.info("obstacles that %s the radio: %d", verb, len(obstacles.boxes))
     WirelessSignalSimulator(max_distance_m, sees)
     _log.info("nodes closer than %g m hear each other", max_distance_m)
     MasterWatch().start()

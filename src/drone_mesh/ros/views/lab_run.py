@@ -31,7 +31,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("results", type=Path, help="results folder of the experiment")
     parser.add_argument("run_id", metavar="RUN", help="id of the run, or the beginning of it")
-    parser.add_argument("--bag", type=Path, metavar="FILE", help="write a bag instead")
+    parser.add_argument(
+        "--bag", type=Path, metavar="FILE", help="write the run to this bag and do not show it"
+    )
     return parser
 
 
