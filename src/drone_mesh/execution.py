@@ -86,7 +86,7 @@ class _Periodic:
 class ExecutorSlot:
     """One component's place in an executor; the antenna uses `submit` before the component exists.
 
-    `submit` may be called by any thread; everything else is done by the executor's worker.
+    Any thread may call `submit` and `call_every`; everything else is for the executor's worker.
     """
 
     def __init__(self, executor: MeshExecutor) -> None:

@@ -1,8 +1,8 @@
 """A whole mesh on emulated radios: the real core on the real driver, under either clock.
 
-Each node has two threads, as on a Raspberry Pi: the antenna's, which receives, and one that runs
-the mesh component. For tests and experiments, the benchmark, and for running the programs without
-hardware.
+Each node has three threads, as on a Raspberry Pi: two of the antenna, which receive and send, and
+one that runs the mesh component. For tests and experiments, the benchmark, and for running the
+programs without hardware.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class _AirTime:
 
 
 class EmulatedNode:
-    """One node. The receiving thread fills its queue and the working thread empties it."""
+    """One node. The antenna's threads fill its queue and the working thread empties it."""
 
     def __init__(
         self,
