@@ -54,11 +54,6 @@ class Route:
         """The last corner."""
         return self._corners[-1]
 
-    @property
-    def highest_m(self) -> float:
-        """The greatest height of the path."""
-        return max(corner.height for corner in self._corners)
-
     def advance(self, here: Location, passed_s: float) -> bool:
         """Move the target for this time; returns whether the drone is at the end of the route."""
         budget_m = self._speed_m_s * passed_s

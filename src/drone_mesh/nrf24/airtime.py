@@ -6,7 +6,6 @@ ns.
 
 from __future__ import annotations
 
-NS_PER_US = 1_000
 NS_PER_S = 1_000_000_000
 
 SETTLING_NS = 130_000  # Tstby2a: standby -> TX or RX, and every turnaround

@@ -1,4 +1,4 @@
-"""World: the interface of BulletWorld and StillWorld, and of what moves in them."""
+"""World: the interface of BulletWorld, and of what moves in it."""
 
 from __future__ import annotations
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pybullet
 import pytest
+from still_world import StillWorld
 
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.drones import RouterDrone
-from drone_mesh.world.still_world import StillWorld
 
 
 @pytest.fixture

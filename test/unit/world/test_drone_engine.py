@@ -6,12 +6,12 @@ import math
 import threading
 
 import pytest
+from still_world import StillWorld
 
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.errors import GoalRefused, MeshError
 from drone_mesh.world.drones import RouterDrone
 from drone_mesh.world.engine import DroneState
-from drone_mesh.world.still_world import StillWorld
 
 
 @pytest.fixture

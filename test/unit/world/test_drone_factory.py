@@ -6,6 +6,7 @@ import math
 
 import pybullet
 import pytest
+from still_world import StillWorld
 
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.interfaces import Location
@@ -14,7 +15,6 @@ from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.drones import GatewayDrone, RouterDrone
 from drone_mesh.world.factory import DroneFactory
-from drone_mesh.world.still_world import StillWorld
 
 
 def make(**changes):

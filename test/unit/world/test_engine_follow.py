@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from still_world import StillWorld
+
 from drone_mesh.drone.interfaces import Location
 from drone_mesh.world.drones import RouterDrone
-from drone_mesh.world.still_world import StillWorld
 
 
 def test_a_followed_drone_is_where_it_was_last_reported_and_its_listeners_are_notified() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from still_world import StillWorld
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
@@ -12,7 +13,6 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import FleetRefused
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.factory import DroneFactory
-from drone_mesh.world.still_world import StillWorld
 
 
 def factory(world=None, gateways=1, routers=3, **more):

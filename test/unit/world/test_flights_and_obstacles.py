@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from still_world import StillWorld
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
@@ -12,7 +13,6 @@ from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.dynamic_engine import DynamicEngine
 from drone_mesh.world.factory import DroneFactory
-from drone_mesh.world.still_world import StillWorld
 
 TOWER = Box((3.0, 0.0, 3.0), (1.0, 1.0, 6.0))  # between the two routers, higher than their climb
 

@@ -88,11 +88,6 @@ class Air:
         """Call `observer` with each frame at its end."""
         self._observers.append(observer)
 
-    def replace_links(self, links: LinkModel) -> None:
-        """Use another link model from now on."""
-        with self.clock.access():
-            self._links = links
-
     def moved(self) -> None:
         """An antenna has moved."""
         self._distances.clear()

@@ -33,7 +33,6 @@ class EmulatedSpiDev:
         self.max_speed_hz = 8_000_000
         self.mode = 0
         self.no_cs = False
-        self.transfers = 0
 
     def open(self, bus: int, device: int) -> None:
         """Any bus and device select the one chip of this object."""
@@ -51,7 +50,6 @@ class EmulatedSpiDev:
             if speed_hz > _FASTEST_HZ or self.mode != 0:
                 target.warn("SPI must be mode 0 with at most 10 MHz")
             self._busy = True
-            self.transfers += 1
             status = target.chip_selected()
         clock.elapse(len(data) * _BITS_PER_NS // speed_hz)
         with clock.access():
