@@ -121,7 +121,7 @@ class MeshWatch:
     def lost(self, *node_ids: int) -> bool:
         """Whether these nodes reported twice in a row, a second apart, that they are not connected.
 
-        One report alone may fall between a heartbeat to the gateway and its answer.
+        One report alone may be of a moment in which the node changes its route.
         """
         return all(self._unconnected_in_a_row.get(node_id, 0) >= 2 for node_id in node_ids)
 

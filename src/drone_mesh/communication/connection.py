@@ -315,7 +315,7 @@ class GatewayConnection:
 
     def _show(self) -> None:
         """Report a change of the connection; cancel the wait for an answer that is not expected."""
-        if self._states.link in (ConnectionState.SEARCHING, ConnectionState.CONNECTED):
+        if self._states.connection in (ConnectionState.SEARCHING, ConnectionState.CONNECTED):
             self._parts.deadlines.set(Due.ANSWER, math.inf)
         connected = self._states.connected
         if connected != self._shown_connected:

@@ -125,12 +125,12 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _check(self, due_s: float) -> None:
         if not self._repair.may_connect(NO_ROUTE, know_gateway=False):
             return
-        link = self._states.link  # as it was before the routing sends its heartbeats
+        before = self._states.connection  # the routing may send a heartbeat to the gateway
         was_connected = self._states.connected
         self._routing.maintain_routing()
         if was_connected:
             self._connection.look_after(self._antenna.patience())
-        elif link is ConnectionState.SEARCHING and self._states.repair is not RepairState.FLYING:
+        elif before is ConnectionState.SEARCHING and self._states.repair is not RepairState.FLYING:
             self._repair.on_unconnected_check(due_s)
 
     def _antenna_is_off(self) -> None:

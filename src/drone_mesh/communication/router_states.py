@@ -59,8 +59,8 @@ class RouterEvent(enum.Enum):
     ANTENNA_OFF = "the antenna has no power"
 
 
-CONNECTED_LINKS = frozenset((ConnectionState.CONNECTED, ConnectionState.AWAITING_ANSWER))
-AWAITING_LINKS = frozenset((ConnectionState.AWAITING_FIRST_ANSWER, ConnectionState.AWAITING_ANSWER))
+_CONNECTED = frozenset((ConnectionState.CONNECTED, ConnectionState.AWAITING_ANSWER))
+_AWAITING = frozenset((ConnectionState.AWAITING_FIRST_ANSWER, ConnectionState.AWAITING_ANSWER))
 
 _ALL_TO_SEARCHING = {state: ConnectionState.SEARCHING for state in ConnectionState}
 _ALL_BUT_FLYING_TO_REST = {
@@ -72,7 +72,7 @@ _ALL_BUT_FLYING_TO_REST = {
     RepairState.FLYING: RepairState.FLYING,
 }
 
-LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[ConnectionState, ConnectionState]] = {
+CONNECTION_TRANSITIONS: Mapping[RouterEvent, Mapping[ConnectionState, ConnectionState]] = {
     RouterEvent.HEARTBEAT_SENT: {
         ConnectionState.SEARCHING: ConnectionState.AWAITING_FIRST_ANSWER,
         ConnectionState.AWAITING_FIRST_ANSWER: ConnectionState.AWAITING_FIRST_ANSWER,
@@ -92,7 +92,7 @@ LINK_TRANSITIONS: Mapping[RouterEvent, Mapping[ConnectionState, ConnectionState]
     RouterEvent.LANDED: _ALL_TO_SEARCHING,
     RouterEvent.ANTENNA_OFF: _ALL_TO_SEARCHING,
 }
-"""An event without an entry leaves the link unchanged."""
+"""An event without an entry leaves the connection unchanged."""
 
 REPAIR_TRANSITIONS: Mapping[RouterEvent, Mapping[RepairState, RepairState]] = {
     RouterEvent.GATEWAY_ANSWERED: _ALL_BUT_FLYING_TO_REST,
@@ -121,7 +121,7 @@ class RouterStates:
     """
 
     def __init__(self) -> None:
-        self.link = ConnectionState.SEARCHING
+        self.connection = ConnectionState.SEARCHING
         self.repair = RepairState.AT_REST
         self.connected = False  # the gateway answered the last heartbeat, or may still answer it
         self.awaiting = False  # a heartbeat to the gateway is under way
@@ -129,16 +129,17 @@ class RouterStates:
 
     def happened(self, event: RouterEvent) -> None:
         """Change the states. Raises RuntimeError and changes nothing if `event` is impossible."""
-        links, repairs = LINK_TRANSITIONS.get(event), REPAIR_TRANSITIONS.get(event)
+        connections = CONNECTION_TRANSITIONS.get(event)
+        repairs = REPAIR_TRANSITIONS.get(event)
         try:
-            link = self.link if links is None else links[self.link]
+            connection = self.connection if connections is None else connections[self.connection]
             repair = self.repair if repairs is None else repairs[self.repair]
         except KeyError:
             raise RuntimeError(
-                f"{event.name} cannot happen to a router that is {self.link.value} "
+                f"{event.name} cannot happen to a router that is {self.connection.value} "
                 f"and {self.repair.value}"
             ) from None
-        self.link, self.repair = link, repair
-        self.connected = link in CONNECTED_LINKS
-        self.awaiting = link in AWAITING_LINKS
+        self.connection, self.repair = connection, repair
+        self.connected = connection in _CONNECTED
+        self.awaiting = connection in _AWAITING
         self.nothing_to_repair = self.connected and repair is RepairState.AT_REST
