@@ -123,15 +123,15 @@ class MeshExecutor:
     """
 
     def __init__(
-        self, clock: Callable[[], float], clock_is_poked: bool, name: str = "mesh"
+        self, clock: Callable[[], float], clock_notifies: bool, name: str = "mesh"
     ) -> None:
         """`clock` gives the time in seconds.
 
-        `clock_is_poked`: the code that advances the clock calls `time_advanced` (simulated time).
+        `clock_notifies`: the code that advances the clock calls `time_advanced` (simulated time).
         Otherwise the clock runs by itself, at one second per second.
         """
         self._clock = clock
-        self._clock_is_poked = clock_is_poked
+        self._clock_notifies = clock_notifies
         self._queue: queue.SimpleQueue[tuple[float, Work, ExecutorSlot | None] | None] = (
             queue.SimpleQueue()
         )
@@ -226,7 +226,7 @@ class MeshExecutor:
     def _take(self, block: bool) -> tuple[float, Work, ExecutorSlot | None] | None:
         """The next submitted function; None: check the deadlines again."""
         timeout_s = None
-        if block and not self._clock_is_poked and self._deadlines:
+        if block and not self._clock_notifies and self._deadlines:
             timeout_s = max(0.0, self._deadlines[0][0] - self._clock())
         try:
             return self._queue.get(block, timeout_s)

@@ -50,7 +50,7 @@ def clock():
 
 @pytest.fixture
 def executor(clock):
-    executor = MeshExecutor(clock, clock_is_poked=True)
+    executor = MeshExecutor(clock, clock_notifies=True)
     executor.start()
     yield executor
     executor.stop()
@@ -184,7 +184,7 @@ def test_lateness_is_measured_in_seconds_of_the_clock(executor, clock):
 
 
 def test_it_reports_when_no_work_is_left_and_not_before(clock):
-    executor = MeshExecutor(clock, clock_is_poked=True)
+    executor = MeshExecutor(clock, clock_notifies=True)
     seen = []
     idle = threading.Event()
     executor.when_idle(lambda: (seen.append("idle"), idle.set()))
@@ -197,7 +197,7 @@ def test_it_reports_when_no_work_is_left_and_not_before(clock):
 
 
 def test_stop_works_off_what_was_submitted_and_joins_the_thread(clock):
-    executor = MeshExecutor(clock, clock_is_poked=True, name="joined")
+    executor = MeshExecutor(clock, clock_notifies=True, name="joined")
     executor.start()
     seen = []
     for number in range(50):
@@ -208,7 +208,7 @@ def test_stop_works_off_what_was_submitted_and_joins_the_thread(clock):
 
 
 def test_a_clock_that_runs_by_itself_needs_no_poke():
-    executor = MeshExecutor(time.monotonic, clock_is_poked=False)
+    executor = MeshExecutor(time.monotonic, clock_notifies=False)
     executor.start()
     called = threading.Event()
     executor.call_every(0.01, lambda _now_s: called.set())

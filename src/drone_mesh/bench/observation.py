@@ -110,7 +110,7 @@ class Watch:
         if self.all_on is None or self.all_connected is None:
             return None
         started = {h.node: h.sim_s for h in self._happenings if h.kind == STARTED}
-        connected_s = first_time_all_are_connected(self._happenings, self._drones - 1)
+        connected_s = first_time_all_connected(self._happenings, self._drones - 1)
         if len(started) == self._drones and connected_s is not None:
             return max(0.0, connected_s - max(started.values()))
         return self.all_connected.sim_s - self.all_on.sim_s
@@ -132,7 +132,7 @@ class Watch:
         return [figures for figures in self.figures.values() if name in figures.values]
 
 
-def first_time_all_are_connected(happenings: Iterable[Happening], routers: int) -> float | None:
+def first_time_all_connected(happenings: Iterable[Happening], routers: int) -> float | None:
     """The simulated second at which `routers` were connected at once; None: never."""
     connected = set()
     for happening in sorted(happenings, key=lambda happening: happening.sim_s):

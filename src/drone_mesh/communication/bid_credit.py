@@ -11,7 +11,7 @@ from collections import Counter
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.drone.interfaces import Location
 
-WINNERS_IN_VAIN = 3  # our choice: a winner may also fail to fly for honest reasons
+WINNERS_WITHOUT_FLIGHT = 3  # our choice: a winner may also fail to fly for honest reasons
 
 
 class BidCredit:
@@ -19,23 +19,23 @@ class BidCredit:
 
     def __init__(self) -> None:
         self._brought_by: dict[int, int] = {}  # creator of a bid -> neighbour that relayed it
-        self._in_vain: Counter[int] = Counter()  # by neighbour: winners that did not fly
+        self._without_flight: Counter[int] = Counter()  # by neighbour: winners that did not fly
 
     def believes(self, node: int, score: float, from_: int, most: float) -> bool:
         """Whether to count a bid of `node` relayed by `from_`; `most`: see highest_plausible."""
-        if score > most or self._in_vain[from_] >= WINNERS_IN_VAIN:
+        if score > most or self._without_flight[from_] >= WINNERS_WITHOUT_FLIGHT:
             return False
         self._brought_by[node] = from_
         return True
 
     def did_not_fly(self, winner: int) -> None:
         """The winner did not take off."""
-        self._in_vain[self._brought_by.get(winner, NO_ROUTE)] += 1
+        self._without_flight[self._brought_by.get(winner, NO_ROUTE)] += 1
 
     def clear(self) -> None:
         """The router is connected: trust all neighbours again."""
         self._brought_by.clear()
-        self._in_vain.clear()
+        self._without_flight.clear()
 
 
 def highest_plausible(own: Location | None, gateway: Location | None, range_m: float) -> float:

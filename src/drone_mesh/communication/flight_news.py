@@ -13,7 +13,7 @@ class FlightNews:
     def __init__(self) -> None:
         self._quiet_until_s = -math.inf
         self._tries: dict[Location, float] = {}  # gateway's place -> when another may fly there
-        self._in_vain_s: dict[int, float] = {}  # node -> when it reported a failed flight there
+        self._failed_s: dict[int, float] = {}  # node -> when it reported a failed flight there
 
     def took_off(self, quiet_until_s: float) -> None:
         """A drone takes off: the others wait for its outcome until `quiet_until_s`."""
@@ -37,14 +37,14 @@ class FlightNews:
             for tried, until_s in self._tries.items()
         )
 
-    def is_new_in_vain(self, node: int, now_s: float, again_s: float) -> bool:
+    def is_new_failure(self, node: int, now_s: float, again_s: float) -> bool:
         """Record a failed flight of `node`; returns whether it is the first within `again_s`."""
-        is_new = now_s >= self._in_vain_s.get(node, -math.inf) + again_s
+        is_new = now_s >= self._failed_s.get(node, -math.inf) + again_s
         if is_new:
-            self._in_vain_s[node] = now_s
+            self._failed_s[node] = now_s
         return is_new
 
     def clear(self) -> None:
-        """A gateway answers: places tried in vain may be tried again."""
+        """A gateway answers: places tried without success may be tried again."""
         self._quiet_until_s = -math.inf
         self._tries.clear()

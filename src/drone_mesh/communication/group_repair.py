@@ -10,7 +10,7 @@ import math
 
 from drone_mesh.communication.bid_credit import BidCredit, highest_plausible
 from drone_mesh.communication.election import (
-    IN_VAIN,
+    HOME_FAILED,
     NO_BID,
     TOOK_OFF,
     TOOK_OFF_HOME,
@@ -170,8 +170,8 @@ class GroupRepair(IRepairStrategy):
             self._on_take_off_of(node, score, from_, about)
             return
         mesh = self.mesh
-        if score == IN_VAIN:
-            self._on_in_vain(node, from_, about)
+        if score == HOME_FAILED:
+            self._on_home_failed(node, from_, about)
             score = NO_BID
         most = highest_plausible(mesh.own_place(), mesh.gateway_place, mesh.range_m)
         if not self._credit.believes(node, score, from_, most):
@@ -204,7 +204,7 @@ class GroupRepair(IRepairStrategy):
         if tried is None:
             mesh.bid(score)
         else:
-            mesh.bid(IN_VAIN, about=tried)
+            mesh.bid(HOME_FAILED, about=tried)
         self._decide()
 
     def _decide(self) -> None:
@@ -250,14 +250,14 @@ class GroupRepair(IRepairStrategy):
         if mesh.state in IN_A_ROUND:
             self._end_round()
 
-    def _on_in_vain(self, node: int, from_: int, about: Location | None) -> None:
+    def _on_home_failed(self, node: int, from_: int, about: Location | None) -> None:
         """A drone found no gateway at the gateway's place: no other of the group flies there."""
         mesh = self.mesh
-        if mesh.connected or not self._news.is_new_in_vain(node, mesh.now_s, TAKE_OFF_WITHIN_S):
+        if mesh.connected or not self._news.is_new_failure(node, mesh.now_s, TAKE_OFF_WITHIN_S):
             return
         rounds_s = 2 * (mesh.connection_lost_after_s + mesh.check_period_s)
         self._news.tries(about or mesh.gateway_place, mesh.now_s, rounds_s)
-        mesh.bid(IN_VAIN, node, but_not_to=from_, about=about)
+        mesh.bid(HOME_FAILED, node, but_not_to=from_, about=about)
 
     def _was_home(self) -> Location | None:
         """The gateway's place, if this drone has been there since it was last connected."""

@@ -77,7 +77,7 @@ class ConnectionRepair(RepairViews):
     def on_connected(self) -> None:
         """A gateway answers again."""
         self._clear()
-        self._in_vain.clear()
+        self._tried_goals.clear()
         self._strategy.reason = ""
         self._strategy.on_gateway_found()
         if self._flight is not None:
@@ -164,7 +164,7 @@ class ConnectionRepair(RepairViews):
         flight.stops_when_connected = until_connected or step.home
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
         if step.owner != self.node_id:
-            self._in_vain.append(step.place)
+            self._tried_goals.append(step.place)
         self._parts.neighbours.forget_all()
         self._parts.routing.node_moved_location()
         flight.start()

@@ -31,7 +31,7 @@ class RepairViews(IRepairActions):
         self._states = states
         self._connection = connection
         self._options = options
-        self._in_vain: list[Location] = []  # goals of this drone since it was last connected
+        self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
 
     @property
     def node_id(self) -> int:
@@ -106,7 +106,7 @@ class RepairViews(IRepairActions):
 
     def was_at(self, step: Step) -> bool:  # noqa: D102
         radius_m = self.clearance_m * (2 * PITCH if step.home else 1.0)
-        return any(step.place.distance_m(place) < radius_m for place in self._in_vain)
+        return any(step.place.distance_m(place) < radius_m for place in self._tried_goals)
 
     def _view(self, node: int) -> NeighbourView:
         heard, hops = self._parts.neighbours.place_of(node), self._parts.neighbours.hops_of(node)

@@ -33,14 +33,14 @@ Attack = Callable[[Stranger], Dict[int, Location]]
 
 
 def order_gateway_away(stranger: Stranger) -> dict[int, Location]:
-    """One order to fly, to the gateway's own drone."""
+    """Send one order to fly to the gateway's own drone."""
     _order(stranger, 0, 0)
     stranger.network.run_for(ATTACK_S)
     return {}
 
 
 def order_all_away(stranger: Stranger) -> dict[int, Location]:
-    """One order to fly to each drone, far ones first."""
+    """Send an order to fly to each drone, far ones first."""
     near = stranger.in_range()
     for node in sorted(stranger.network.nodes, reverse=True):
         _order(stranger, node if node in near else near[-1], node)
@@ -50,7 +50,7 @@ def order_all_away(stranger: Stranger) -> dict[int, Location]:
 
 
 def false_gateway(stranger: Stranger) -> dict[int, Location]:
-    """A radio that claims to be a gateway and answers each heartbeat."""
+    """Claim to be a gateway and answer each heartbeat."""
     me = stranger.node_id
 
     def answer(payload: bytes) -> None:
@@ -66,7 +66,7 @@ def false_gateway(stranger: Stranger) -> dict[int, Location]:
 
 
 def black_hole(stranger: Stranger) -> dict[int, Location]:
-    """A radio that introduces itself as the best route to the gateway but forwards nothing."""
+    """Introduce the radio as the best route to the gateway, and forward nothing."""
     me = stranger.node_id
     for _ in stranger.every(1.0, ATTACK_S):
         for node in stranger.in_range():
@@ -75,7 +75,7 @@ def black_hole(stranger: Stranger) -> dict[int, Location]:
 
 
 def swallowing_relay(stranger: Stranger) -> dict[int, Location]:
-    """A relay that answers and forwards heartbeats, and drops all other packets of others.
+    """Act as a relay that answers and forwards heartbeats, and drops all other packets of others.
 
     In a mesh without a key, and among captured nodes, it is the router on most routes; otherwise it
     runs the mesh software without the key.
@@ -86,7 +86,7 @@ def swallowing_relay(stranger: Stranger) -> dict[int, Location]:
 
 
 def missing_storm(stranger: Stranger) -> dict[int, Location]:
-    """Once a second, with each id as sender: the gateway is missing."""
+    """Report once a second, with each id as sender, that the gateway is missing."""
     for _ in stranger.every(1.0, ATTACK_S):
         for node in stranger.in_range():
             for creator in stranger.network.nodes:
@@ -96,7 +96,7 @@ def missing_storm(stranger: Stranger) -> dict[int, Location]:
 
 
 def invented_ids(stranger: Stranger) -> dict[int, Location]:
-    """Ten heartbeats a second, each from another invented node."""
+    """Send ten heartbeats a second, each from another invented node."""
     chance = random.Random(stranger.node_id)
     for _ in stranger.every(0.1, ATTACK_S):
         creator = chance.randrange(100, 250)
@@ -106,7 +106,7 @@ def invented_ids(stranger: Stranger) -> dict[int, Location]:
 
 
 def far_place(stranger: Stranger) -> dict[int, Location]:
-    """Once: the gateway is far away. Then the gateway is off for a while."""
+    """Claim once that the gateway is far away; then the gateway is off for a while."""
     body = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
     for node in stranger.in_range():
         if node != 0:
@@ -119,7 +119,7 @@ def far_place(stranger: Stranger) -> dict[int, Location]:
 
 
 def highest_bid(stranger: Stranger) -> dict[int, Location]:
-    """The drones behind node 1 are cut off permanently; a higher bid than theirs every 3 s."""
+    """Cut off the drones behind node 1, and send a higher bid than theirs every 3 s."""
     return _bid(stranger, LARGEST_BID)
 
 

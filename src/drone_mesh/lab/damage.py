@@ -73,7 +73,7 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
     stranger.mute = threat is Threat.NONE
     stranger.switch_on()
     if threat is Threat.CAPTURED:
-        _get_acquainted(stranger)
+        _join_neighbours(stranger)
     shares = _Sampler(network, stranger.swallows)
     ordered = attack(stranger)
     cut_off = shares.mean()
@@ -125,7 +125,7 @@ def keys_of(node_id: int) -> Keys | None:
     return MeshKey(_SECRET) if node_id == 0 else KEY.for_node(node_id)
 
 
-def _get_acquainted(stranger: Stranger) -> None:
+def _join_neighbours(stranger: Stranger) -> None:
     """A captured node becomes a neighbour of the others before it attacks."""
     me = stranger.node_id
     stranger.antenna.broadcast_message(present(me, NO_ROUTE, know_gateway=False))
@@ -144,7 +144,7 @@ def _arrives(network: Network, node: int, swallow: AbstractSet[int]) -> bool:
         if step == NO_ROUTE or step in path or step not in network.links(path[-1]):
             return False
         if step not in network.nodes or step in swallow:
-            return False  # the stranger
+            return False  # the stranger, or a node that swallows
         path.append(step)
     return True
 

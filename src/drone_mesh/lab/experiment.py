@@ -107,7 +107,7 @@ def load_experiment(
         raise source.error((), "expected 'key: value' lines")
     for override in overrides:
         _override(content, override, source)
-    extensions.search_in(source.folder)
+    extensions.add_search_folder(source.folder)
     try:
         experiment = Experiment.model_validate(content)
     except ValidationError as error:

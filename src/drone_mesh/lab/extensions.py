@@ -18,12 +18,12 @@ from drone_mesh.lab.record import RunRecord
 OwnMetric = Callable[[RunRecord], float]
 
 
-def search_in(folder: Path) -> None:
+def add_search_folder(folder: Path) -> None:
     """Let `module:Name` find modules beside the experiment file."""
-    search_in_text(str(folder.resolve()))
+    add_search_path(str(folder.resolve()))
 
 
-def search_in_text(folder: str) -> None:
+def add_search_path(folder: str) -> None:
     """The same for an absolute path; nothing changes if the folder is already included."""
     if folder not in sys.path:
         sys.path.insert(0, folder)

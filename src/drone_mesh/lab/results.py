@@ -96,7 +96,7 @@ def load_results(folder: Path) -> Results:
     if not sessions or not (folder / EXPERIMENT).exists():
         raise StoreError(f"{folder}: not a results folder of lab run")
     last = sessions[-1]
-    extensions.search_in_text(str(last["folder"]))
+    extensions.add_search_path(str(last["folder"]))
     loaded = load_experiment(folder / EXPERIMENT, list(last["overrides"]), Path(last["folder"]))
     rows = {row["run"]: row for row in read_rows(folder / RUNS)}
     seeds = _seeds(loaded, rows)

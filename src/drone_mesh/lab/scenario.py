@@ -65,7 +65,7 @@ class Layout(Part):
     places: Optional[List[List[float]]] = None  # its content: id, x, y, 1 for a gateway
 
     @model_validator(mode="after")
-    def _only_what_its_kind_uses(self) -> "Layout":
+    def _has_only_keys_of_its_kind(self) -> "Layout":
         allowed = self.KEYS[self.kind] | {"kind", "gateways", "ids"}
         extra = sorted(self.model_fields_set - allowed)
         if extra:
@@ -80,7 +80,7 @@ class Layout(Part):
         return self
 
     @model_serializer(mode="wrap")
-    def _what_its_kind_uses(self, dump: Any) -> Dict[str, Any]:
+    def _dump_keys_of_its_kind(self, dump: Any) -> Dict[str, Any]:
         kept = self.KEYS[self.kind] | {"kind", "gateways", "ids"}
         return {key: value for key, value in dump(self).items() if key in kept}
 
@@ -95,7 +95,7 @@ class Radio(Part):
     jitter_s: AtLeast0 = 0.0
 
     @model_validator(mode="after")
-    def _only_what_its_kind_uses(self) -> "Radio":
+    def _has_only_keys_of_its_kind(self) -> "Radio":
         if self.kind == "disc" and self.rate is not None:
             raise ValueError("rate is for the shared radio; the disc has delay_s")
         if self.kind == "shared" and self.model_fields_set & {"loss", "delay_s", "jitter_s"}:
@@ -103,7 +103,7 @@ class Radio(Part):
         return self
 
     @model_serializer(mode="wrap")
-    def _what_its_kind_uses(self, dump: Any) -> Dict[str, Any]:
+    def _dump_keys_of_its_kind(self, dump: Any) -> Dict[str, Any]:
         left_out = {"rate"} if self.kind == "disc" else {"loss", "delay_s", "jitter_s"}
         return {key: value for key, value in dump(self).items() if key not in left_out}
 
@@ -135,7 +135,7 @@ class Pick(Part):
     spare: Literal["gateways", "nothing"] = "gateways"
 
     @model_validator(mode="after")
-    def _says_how_many(self) -> "Pick":
+    def _has_one_selection(self) -> "Pick":
         given = [key for key in ("share", "number", "ids") if getattr(self, key) is not None]
         if self.pick == "circle" and self.radius_m is None:
             raise ValueError("pick circle needs radius_m")
@@ -185,7 +185,7 @@ class Battery(Part):
     live_min: Optional[Above0] = None
 
     @model_validator(mode="after")
-    def _ends_somehow(self) -> "Battery":
+    def _has_an_end(self) -> "Battery":
         if self.fly_m is None and self.live_min is None:
             raise ValueError("battery needs fly_m or live_min")
         return self
@@ -209,7 +209,7 @@ class FlightOrders(Part):
     for_s: Optional[Above0] = None
 
     @model_validator(mode="after")
-    def _says_which(self) -> "FlightOrders":
+    def _has_a_target(self) -> "FlightOrders":
         if (self.id is None) != (self.to is None) or (self.id is None) == (self.every_s is None):
             raise ValueError("order needs id and to, or every_s")
         return self
@@ -251,7 +251,7 @@ class Fault(Part):
         return text
 
     @model_validator(mode="after")
-    def _is_one_thing_at_one_time(self) -> "Fault":
+    def _has_one_action_and_one_start(self) -> "Fault":
         actions = [name for name in self.ACTIONS if getattr(self, name) is not None]
         if len(actions) != 1:
             raise ValueError(f"a fault is exactly one of {', '.join(self.ACTIONS)}")
@@ -302,7 +302,7 @@ class Scenario(Part):
     speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights
 
     @model_validator(mode="after")
-    def _has_what_its_radio_can(self) -> "Scenario":
+    def _suits_its_radio(self) -> "Scenario":
         if self.radio.kind == "shared":
             for fault in self.faults:
                 if fault.action in ("cut_link", "jam", "loss"):

@@ -91,7 +91,7 @@ def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[OutageRow, ...
 def simulation_of(spec: RunSpec) -> Simulation:
     """The run, before its start. Raises ConfigurationError for a layout that cannot be drawn."""
     if spec.search_path:
-        extensions.search_in_text(spec.search_path)
+        extensions.add_search_path(spec.search_path)
     return Simulation(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition))
 
 

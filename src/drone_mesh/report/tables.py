@@ -68,8 +68,8 @@ def repair_rows(story: RunStory) -> list[dict[str, str]]:
             "decided": _seconds(outage.lost_s, outage.decided_s),
             "flown": _seconds(outage.decided_s, outage.landed_s),
             "fallback": "–" if outage.fallback is None else f"node {outage.fallback}'s",
-            "connected": _seconds(_stood_s(outage), outage.connected_s),
-            "total": _seconds(_began_s(outage), outage.connected_s),
+            "connected": _seconds(_ready_s(outage), outage.connected_s),
+            "total": _seconds(_start_s(outage), outage.connected_s),
             "on_ground": _on_ground(outage),
         }
         for outage in story.outages
@@ -107,7 +107,7 @@ def _cell(value: object) -> object:
     return " ".join(map(str, value)) if isinstance(value, tuple) else value
 
 
-def _stood_s(outage: Outage) -> float:
+def _ready_s(outage: Outage) -> float:
     """The earliest time at which it could reconnect: its landing, or its loss if it did not fly."""
     if outage.landed_s is None:
         return outage.lost_s
@@ -116,7 +116,7 @@ def _stood_s(outage: Outage) -> float:
     )
 
 
-def _began_s(outage: Outage) -> float:
+def _start_s(outage: Outage) -> float:
     return outage.lost_s if outage.cause_s is None else outage.cause_s
 
 
@@ -130,5 +130,5 @@ def _on_ground(outage: Outage) -> str:
         return "–"
     flown_s = 0.0
     if outage.decided_s is not None and outage.landed_s is not None:
-        flown_s = _stood_s(outage) - outage.decided_s
-    return f"{outage.connected_s - _began_s(outage) - flown_s:.1f} s"
+        flown_s = _ready_s(outage) - outage.decided_s
+    return f"{outage.connected_s - _start_s(outage) - flown_s:.1f} s"

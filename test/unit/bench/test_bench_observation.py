@@ -10,7 +10,7 @@ from drone_mesh.bench.observation import (
     Happening,
     StateSample,
     Watch,
-    first_time_all_are_connected,
+    first_time_all_connected,
     from_line,
     to_line,
 )
@@ -98,9 +98,9 @@ def test_a_router_that_lost_its_connection_again_is_waited_for():
         Happening(5.0, 1, CONNECTED),
         Happening(6.0, 2, DISCONNECTED),
     ]
-    assert first_time_all_are_connected(happenings, routers=2) == 5.0
-    assert first_time_all_are_connected(happenings[:4][::-1], routers=2) == 5.0
-    assert first_time_all_are_connected(happenings[:3], routers=2) is None
+    assert first_time_all_connected(happenings, routers=2) == 5.0
+    assert first_time_all_connected(happenings[:4][::-1], routers=2) == 5.0
+    assert first_time_all_connected(happenings[:3], routers=2) is None
 
 
 def test_figures_add_up_over_their_sources_and_the_worst_is_remembered():

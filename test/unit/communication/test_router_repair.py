@@ -7,7 +7,7 @@ import struct
 import pytest
 from rig import Rig, packet
 
-from drone_mesh.communication.election import IN_VAIN, TOOK_OFF, TOOK_OFF_HOME
+from drone_mesh.communication.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.spots import own_spot
 from drone_mesh.communication.timing import MeshTiming
@@ -816,7 +816,7 @@ def test_what_another_drone_found_in_vain_is_no_second_choice():
     rig.antenna.dead = set()
     for round_s in (0.0, 40.0, 80.0):
         rig.wait_until(BIDS_S + round_s)
-        rig.hear(bid(3, IN_VAIN), bid(2, -1.0))
+        rig.hear(bid(3, HOME_FAILED), bid(2, -1.0))
         rig.wait(TO_DECISION_S)
     assert rig.engine.goals == []
     assert "another drone flew to the gateway without success" in rig.repair_in_words()
@@ -826,7 +826,7 @@ def test_what_another_drone_found_in_vain_elsewhere_does_not_keep_this_one_from_
     """The other one believed the gateway at (0, 40); this one knows that it is at (0, 4)."""
     rig = group_rig(2, 3)
     rig.antenna.dead = set()
-    in_vain_at_0_40 = bid(3, IN_VAIN) + "01 00 00 00 00 20 42 00 00 00 00 00 00"
+    in_vain_at_0_40 = bid(3, HOME_FAILED) + "01 00 00 00 00 20 42 00 00 00 00 00 00"
     for round_s in (0.0, 40.0, 80.0):
         rig.wait_until(BIDS_S + round_s)
         rig.hear(in_vain_at_0_40, bid(2, -1.0))

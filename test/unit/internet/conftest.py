@@ -42,7 +42,7 @@ class MeshWithHttp:
         gateway = self.network.nodes[0].component
         assert isinstance(gateway, MeshnetworkGateway)
         self.gateway = gateway
-        self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_is_poked=True)
+        self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_notifies=True)
         http = HttpSettings(port=0, token=token, names=names, certificate=certificate)
         self.internet = HttpInternet(
             self.executor.submit, http, answer_within_s=answer_within_s, **settings

@@ -122,7 +122,7 @@ class Gateway:
         assert self.network.run_until(self.network.all_connected, 15.0)
         gateway = self.network.nodes[0].component
         assert isinstance(gateway, MeshnetworkGateway)
-        self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_is_poked=True)
+        self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_notifies=True)
         self.users = UsersDesk(0, self.submit)
         self.users.open(gateway.data)
         self.internet = MqttInternet(self.submit, self.users, broker, ca_file)

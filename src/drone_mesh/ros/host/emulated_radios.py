@@ -53,7 +53,7 @@ class EmulatedRadios:
         self._air = Air(self._wall_clock, links, random.Random(f"{seed} air"))
         self._settings = RadioSettings(data_rate=rate)
         self._seed = seed
-        self._executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_node")
+        self._executor = MeshExecutor(clock, clock_notifies=True, name="mesh_node")
         self._airtime_s, self._measured_s = 0.0, 0.0
         self._samples = PacketSamples()
         self._chips: dict[int, EmulatedChip] = {}

@@ -54,7 +54,7 @@ class MeshHost:
         self._reports = HostReports()
         self._settings = dataclasses.replace(settings, observer=self._reports.observe)
         self._on_failure = on_failure
-        self.executor = MeshExecutor(clock, clock_is_poked=True, name="mesh_host")
+        self.executor = MeshExecutor(clock, clock_notifies=True, name="mesh_host")
         self._radios = VirtualRadios(self.executor) if radios is None else radios
         self._figures = FiguresPublisher("host", self._take_figures)
         self._grounded = GroundedDrones()
