@@ -59,10 +59,11 @@ def _log_event(event: MeshEvent) -> None:
     """Log one line per event; orders that were lost or flown have their own lines already."""
     if event.kind in _WITHOUT_LINE:
         return
-    words = [event.kind.value]
+    words = event.kind.value
     if event.peer <= MAX_NODE_ID:
-        words.append(f"gateway {event.peer}" if event.kind in _ABOUT_GATEWAYS else str(event.peer))
+        peer = "gateway" if event.kind in _ABOUT_GATEWAYS else "node"
+        words += f": {peer} {event.peer}"
     if event.detail:
-        words.append(f"({event.detail})")
+        words += f" ({event.detail})"
     level = logging.WARNING if event.kind is MeshEventKind.EMERGENCY else logging.INFO
-    _log.log(level, "node %d: %s", event.node, " ".join(words))
+    _log.log(level, "node %d: %s", event.node, words)

@@ -30,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="address of the node (default: %(default)s)",
     )
     url = parser.parse_args(arguments).url.rstrip("/")
+    if not url.startswith(("http://", "https://")):
+        parser.error(f"{url}: must begin with http:// or https://")
     token = os.environ.get(TOKEN_VARIABLE, "")
     try:
         print(table(ask_json(f"{url}/status", ANSWER_WITHIN_S, token)))

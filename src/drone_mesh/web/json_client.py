@@ -36,9 +36,13 @@ def ask_json(
             return json.load(answer)
     except urllib.error.HTTPError as error:
         raise NoAnswer(_reason(error, url)) from error
+    except json.JSONDecodeError as error:
+        raise NoAnswer(f"the answer from {url} is not JSON: {error}") from error
     except _FAILURES as error:
-        # The text of a URLError wraps its reason in "<urlopen error ...>".
-        reason = " ".join(str(getattr(error, "reason", error)).split())
+        cause = getattr(
+            error, "reason", error
+        )  # of a URLError, whose text is "<urlopen error ...>"
+        reason = " ".join(str(getattr(cause, "strerror", None) or cause).split())
         raise NoAnswer(f"no answer from {url}: {reason}") from error
 
 

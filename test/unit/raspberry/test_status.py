@@ -141,7 +141,13 @@ def test_the_status_over_http_names_neighbours_radio_flight_and_version(capsys):
 
 def test_an_unavailable_status_gives_one_line_and_a_failure(capsys):
     assert main([f"http://127.0.0.1:{free_port()}"]) == 1
-    assert capsys.readouterr().err.endswith(": [Errno 111] Connection refused\n")
+    assert capsys.readouterr().err.endswith(": Connection refused\n")
+
+
+def test_an_address_without_its_scheme_is_refused(capsys):
+    with pytest.raises(SystemExit):
+        main(["pi:9080"])
+    assert "pi:9080: must begin with http:// or https://" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -39,10 +39,13 @@ def answering():
 @pytest.mark.parametrize(
     ("answer", "why"),
     [
-        (b"SSH-2.0-OpenSSH_9.2\r\n", "SSH-2.0-OpenSSH_9.2"),
-        (b"", "Remote end closed connection without response"),
-        (b'HTTP/1.1 200 OK\r\nContent-Length: 99\r\n\r\n{"nodes": ', "IncompleteRead"),
-        (b"HTTP/1.1 200 OK\r\n\r\n<html>", "Expecting value"),
+        (b"SSH-2.0-OpenSSH_9.2\r\n", "no answer from {url}: SSH-2.0-OpenSSH_9.2"),
+        (b"", "no answer from {url}: Remote end closed connection without response"),
+        (
+            b'HTTP/1.1 200 OK\r\nContent-Length: 99\r\n\r\n{"nodes": ',
+            "no answer from {url}: IncompleteRead",
+        ),
+        (b"HTTP/1.1 200 OK\r\n\r\n<html>", "the answer from {url} is not JSON: Expecting value"),
     ],
     ids=["not HTTP", "nothing", "half of it", "not JSON"],
 )
@@ -51,7 +54,7 @@ def test_an_invalid_answer_gives_one_line_with_the_address(answering, answer, wh
     with pytest.raises(NoAnswer) as error:
         ask_json(url, 5.0)
     line = str(error.value)
-    assert line.startswith(f"no answer from {url}: {why}")
+    assert line.startswith(why.format(url=url))
     assert "\n" not in line
 
 

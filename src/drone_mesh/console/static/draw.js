@@ -20,7 +20,7 @@ const CLEAR_LOST = 150; // lost links in full colour; with more, all of them fad
 const FAINTEST = 0.25;
 const MOST_GOAL_TEXTS = 8; // for drones that are about to leave; with more, the texts would overlap
 
-/** The palette's colours in the present theme, by name. */
+/** The palette's colours in the current theme, by name. */
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
   const names = [

@@ -230,7 +230,7 @@ export class MapView {
     this.canvas.focus({ preventScroll: true });
     this.canvas.setPointerCapture(event.pointerId);
     const node = this.#nodeAt(event.offsetX, event.offsetY);
-    // A finger that moves the map must not send away a drone that happens to be under it.
+    // A swipe that moves the map must not send away a drone that happens to be under the finger.
     const mayDrag =
       node &&
       this.mesh.canOrder &&

@@ -158,7 +158,7 @@ export class Mesh extends EventTarget {
   }
 }
 
-/** A number for people: 255 means unknown. */
+/** A number as text; 255 means unknown. */
 export function orDash(value) {
   return value === UNKNOWN || value === undefined ? "–" : String(value);
 }

@@ -2,7 +2,7 @@
 
 /**
  * What was typed in a field: {input, value, error}; `error` is empty if it is a number from `low`
- * to `high`. Nothing is rounded or clipped; a field that is wrong is marked.
+ * to `high`. Nothing is rounded or clipped; an invalid field is marked.
  */
 export function typedNumber(input, name, low, high, whole = false) {
   const text = input.value.trim().replace(",", ".");
