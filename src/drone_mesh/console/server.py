@@ -26,7 +26,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from drone_mesh.console.dots import Dot
-from drone_mesh.console.frames import FrameStore
+from drone_mesh.console.frames import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import (
     LIMITS,
@@ -221,7 +221,7 @@ class ConsoleServer:
             hello = {
                 "type": "hello",
                 "layouts": list(self._layouts),
-                "limits": LIMITS,
+                "limits": {**LIMITS, "events": EVENTS_KEPT, "samples": SAMPLES_KEPT},
                 "actions": list(self._actions),
                 "packet_kinds": [kind.value for kind in PacketKind],
                 "recording": self._recording,

@@ -17,6 +17,7 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
+from drone_mesh.communication.data.packets import MAX_DATA_PORT
 from drone_mesh.communication.data.ticket import TO_ALL, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.errors import MessageRefused, QueueFull
@@ -31,7 +32,7 @@ _POLL_S = 0.02
 Destination = Annotated[
     int, Path(ge=0, le=TO_ALL, description=f"Node id; {TO_ALL}: all nodes, best effort.")
 ]
-Port = Annotated[int, Query(ge=0, le=255)]
+Port = Annotated[int, Query(ge=0, le=MAX_DATA_PORT)]
 
 
 class DataSent(BaseModel):
@@ -90,7 +91,8 @@ def add_data_requests(
     )
     async def data(
         port: Annotated[
-            Optional[int], Query(ge=0, le=255, description="Only messages for this port.")
+            Optional[int],
+            Query(ge=0, le=MAX_DATA_PORT, description="Only messages for this port."),
         ] = None,
     ) -> Response:
         """The messages that the gateway receives from now on, as server-sent events.

@@ -30,7 +30,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     about = "make the keys of one router, which do not allow it to give orders to others"
     node = commands.add_parser("node", help=about, description=about)
     node.add_argument("mesh_key", type=Path, help="file with the mesh key")
-    node.add_argument("id", type=whole(0, MAX_NODE_ID), help="node id of the router, 0..253")
+    node.add_argument(
+        "id", type=whole(0, MAX_NODE_ID), help=f"node id of the router, 0..{MAX_NODE_ID}"
+    )
     node.add_argument("file", type=Path, help="file to make; it must not exist")
     parsed = parser.parse_args(arguments)
     try:

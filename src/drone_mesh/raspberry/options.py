@@ -84,7 +84,7 @@ def parse_router(
     )
     node = parser.add_mutually_exclusive_group(required=True)
     node.add_argument(
-        "--id", type=whole(0, MAX_NODE_ID), help="node id, 0..253, unique in the mesh"
+        "--id", type=whole(0, MAX_NODE_ID), help=f"node id, 0..{MAX_NODE_ID}, unique in the mesh"
     )
     _add_emulated(node)
     add_air_options(parser, gateway=False)
@@ -110,7 +110,7 @@ def parse_gateway(
         "--id",
         type=whole(0, MAX_NODE_ID),
         default=0,
-        help="node id, 0..253, unique in the mesh (default: %(default)s)",
+        help=f"node id, 0..{MAX_NODE_ID}, unique in the mesh (default: %(default)s)",
     )
     _add_emulated(node)
     add_air_options(parser, gateway=True)

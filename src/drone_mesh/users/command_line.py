@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Callable
 
+from drone_mesh.communication.data.packets import MAX_DATA_PORT
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
@@ -70,8 +71,8 @@ def destination(text: str) -> int:
 
 def port(text: str) -> int:
     """A port, for argparse."""
-    if not text.isdigit() or int(text) > 255:
-        raise argparse.ArgumentTypeError(f"invalid port {text!r}: must be 0..255")
+    if not text.isdigit() or int(text) > MAX_DATA_PORT:
+        raise argparse.ArgumentTypeError(f"invalid port {text!r}: must be 0..{MAX_DATA_PORT}")
     return int(text)
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 from typing import Sequence
 
-from drone_mesh.communication.data.packets import check_size
+from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYTES, check_size
 from drone_mesh.users import command_line
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Send one message; the exit status is 1 if it was not delivered."""
     parser = command_line.parser_for(
-        "mesh_send", "Sends a message of up to 1024 bytes through the mesh."
+        "mesh_send", f"Sends a message of up to {MAX_MESSAGE_BYTES} bytes through the mesh."
     )
     parser.add_argument(
         "to", type=command_line.destination, metavar="TO", help='node id, "gateway" or "all"'
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--port",
         type=command_line.port,
         default=0,
-        help="port of the receiver, 0..255 (default: %(default)s)",
+        help=f"port of the receiver, 0..{MAX_DATA_PORT} (default: %(default)s)",
     )
     parser.add_argument(
         "--no-ack", action="store_true", help="send the message once, without acknowledgement"

@@ -120,7 +120,13 @@ def test_a_page_is_greeted_and_then_gets_everything():
         assert page.received[0] == {
             "type": "hello",
             "layouts": [[0, "0: field case", [[1, 2.0, 3.0, 0.0]]]],
-            "limits": {"coordinate": 5000.0, "height": 500.0, "id": 253},
+            "limits": {
+                "coordinate": 5000.0,
+                "height": 500.0,
+                "id": 253,
+                "events": 1000,
+                "samples": 600,
+            },
             "actions": ACTIONS,
             "packet_kinds": KINDS,
             "recording": "",

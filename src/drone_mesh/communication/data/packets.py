@@ -16,6 +16,7 @@ from drone_mesh.communication.messages import BODY_BYTES, ROUTE_RECORD, ROUTE_RE
 from drone_mesh.errors import MessageRefused, PacketError
 
 MAX_MESSAGE_BYTES = 1024
+MAX_DATA_PORT = 255  # one byte
 MESSAGE_TAG_BYTES = 6  # after the payload of a message in a mesh with a key
 FRAGMENTS = range(128, 192)  # type of the fragment with index 0, 1, ...
 ACK = 192  # the fragments of a message that its creator has
@@ -51,7 +52,7 @@ class Head(NamedTuple):
 
     number: int  # 0..255: number of this message among those for the same destination
     session: int  # 0..65535: changes with each restart of the sender
-    port: int  # 0..255
+    port: int  # 0..MAX_DATA_PORT
     length: int  # bytes of the whole payload
     reliable: bool
     behind: int  # distance in the order back to the oldest message that may still arrive

@@ -201,8 +201,8 @@ class Transport:
                 f"invalid destination {to}: must be a node 0..{MAX_NODE_ID}, "
                 f"{TO_ALL} for all nodes or {TO_GATEWAY} for the gateway"
             )
-        if not 0 <= port <= 255:
-            raise MessageRefused(f"invalid port {port}: must be 0..255")
+        if not 0 <= port <= packets.MAX_DATA_PORT:
+            raise MessageRefused(f"invalid port {port}: must be 0..{packets.MAX_DATA_PORT}")
         packets.check_size(payload)
         queued = len(self._outboxes)
         if queued >= MOST_QUEUED:

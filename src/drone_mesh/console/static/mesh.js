@@ -1,9 +1,7 @@
 // What the page knows about the mesh. Frames of the server are applied here; views listen.
 // Conditions, colours and uses of links are decided by the server.
 
-const UNKNOWN = 255;
-const EVENTS_KEPT = 1000;
-const SAMPLES_KEPT = 600;
+export const UNKNOWN = 255; // NO_ROUTE of the mesh
 const LINK_USES = ["known", "lost", "route"]; // in the order in which they are drawn
 
 /** Numbers of the set bits of a hex string, ascending. */
@@ -24,7 +22,8 @@ export class Mesh extends EventTarget {
     this.layouts = [];
     this.actions = []; // what the server offers: "fly", "power", ...
     this.packetKinds = []; // the names of the kinds of packets, each with a colour of the palette
-    this.limits = { coordinate: Infinity, height: Infinity }; // of goals, m
+    // Of goals, m; of the lists that are kept.
+    this.limits = { coordinate: Infinity, height: Infinity, events: Infinity, samples: Infinity };
     this.nodes = new Map(); // id -> node
     this.obstacles = []; // {corners: [[x, y]], top}, m
     this.links = { known: [], lost: [], route: [] }; // use -> [[id, higher id]]
@@ -65,8 +64,8 @@ export class Mesh extends EventTarget {
       changed.add(id);
     }
     if (linksChanged) this.#relink();
-    if (frame.events) this.events = this.events.concat(frame.events).slice(-EVENTS_KEPT);
-    if (frame.samples) this.samples = this.samples.concat(frame.samples).slice(-SAMPLES_KEPT);
+    if (frame.events) this.events = this.events.concat(frame.events).slice(-this.limits.events);
+    if (frame.samples) this.samples = this.samples.concat(frame.samples).slice(-this.limits.samples);
     if (frame.story) this.story = frame.story;
     if (frame.full || frame.story) this.#notify("story");
     for (const id of this.group) if (!this.nodes.has(id)) this.group.delete(id);

@@ -1,7 +1,7 @@
 // The selected node: its facts, its power switch, and where to send its drone.
 
 import { arrowKeys } from "./arrows.js";
-import { orDash } from "./mesh.js";
+import { orDash, UNKNOWN } from "./mesh.js";
 import { typedNumber } from "./numbers.js";
 
 export class NodePanel {
@@ -49,7 +49,7 @@ export class NodePanel {
       ["Hops", orDash(node.hops)],
       [
         "Fallback position",
-        node.fallback === 255 ? "–" : [node.fallback],
+        node.fallback === UNKNOWN ? "–" : [node.fallback],
         { before: "node ", after: `’s${this.#fallbackAge(node)}` },
       ],
       ...((node.battery ?? null) === null ? [] : [["Battery", `${node.battery} %`]]),
