@@ -20,7 +20,7 @@ class InTrain(enum.Enum):
 
 
 class Yielding:
-    """Until when one node waits for the trains of others."""
+    """How long one node waits for the trains of others."""
 
     def __init__(self, rules: AccessRules) -> None:
         self._rules = rules
