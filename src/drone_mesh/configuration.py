@@ -15,6 +15,8 @@ from pydantic.fields import FieldInfo
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
+from drone_mesh.communication.routing import DEFAULT_ROUTING
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
@@ -65,13 +67,15 @@ class FactoryConfiguration:
     broker: str = Field("mqtt://127.0.0.1/simulation", min_length=1, description="mqtt://HOST/MESH")
     key: str = Field("", description="the name of a key file")  # empty: nothing is sealed
     routing: str = Field(
-        "child_table_tree", min_length=1, description="the name of a routing technique"
+        DEFAULT_ROUTING, min_length=1, description="the name of a routing technique"
     )
     repair: str = Field(DEFAULT_REPAIR, min_length=1, description="the name of a repair strategy")
     clearance: float = Field(CLEARANCE_M, gt=0, le=100, description="metres")  # between drones
     avoid_wrecks: bool = Field(False)  # whether drones that are off count for the clearance
-    check_period: float = Field(10.0, ge=0.1, le=3600, description="seconds")
-    connection_lost_after: float = Field(30.0, ge=0.1, le=3600, description="seconds")
+    check_period: float = Field(MeshTiming.check_period_s, ge=0.1, le=3600, description="seconds")
+    connection_lost_after: float = Field(
+        MeshTiming.connection_lost_after_s, ge=0.1, le=3600, description="seconds"
+    )
     debug: bool = Field(True)
 
     @field_validator("*", mode="before")

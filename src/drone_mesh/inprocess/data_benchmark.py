@@ -186,7 +186,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--messages",
         type=int,
         default=40,
-        help=f"number of messages of {MAX_MESSAGE_BYTES} bytes in each case (default 40)",
+        help=f"number of messages of {MAX_MESSAGE_BYTES} bytes in each case (default %(default)s)",
     )
     parser.add_argument(
         "--seed", type=int, default=1, help="seed of all random choices (default %(default)s)"

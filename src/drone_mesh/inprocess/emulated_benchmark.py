@@ -28,29 +28,35 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         "grid, and prints how fast the emulation is.",
     )
     parser.add_argument(
-        "--nodes", type=int, default=17, help=f"number of nodes, 2..{MAX_DRONES} (default 17)"
+        "--nodes",
+        type=int,
+        default=17,
+        help=f"number of nodes, 2..{MAX_DRONES} (default %(default)s)",
     )
     parser.add_argument(
-        "--spacing", type=float, default=6.0, help="spacing of the grid in metres (default 6)"
+        "--spacing",
+        type=float,
+        default=6.0,
+        help="spacing of the grid in metres (default %(default)g)",
     )
     parser.add_argument(
         "--rate",
         choices=DATA_RATES,
         default="250k",
-        help="data rate in bits per second (default 250k)",
+        help="data rate in bits per second (default %(default)s)",
     )
     parser.add_argument(
-        "--seconds", type=float, default=60.0, help="simulated seconds (default 60)"
+        "--seconds", type=float, default=60.0, help="simulated seconds (default %(default)g)"
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="seed of all random choices (default 1)"
+        "--seed", type=int, default=1, help="seed of all random choices (default %(default)s)"
     )
     parser.add_argument(
         "--links",
         choices=("disc", "distance", "measured"),
         default="disc",
         help="loss: disc: none within 9 m; distance: growing with distance, edge at 9 m; measured: "
-        "as measured in 2019, scaled to 9 m (default disc)",
+        "as measured in 2019, scaled to 9 m (default %(default)s)",
     )
     parser.add_argument(
         "--wall", action="store_true", help="run in real time and print how late the emulator is"

@@ -114,7 +114,9 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     how.add_argument("--page", type=Path, metavar="FILE", help="write a report page about the run")
     how.add_argument("--console", action="store_true", help="show it in the web console")
     how.add_argument("--rviz", action="store_true", help="play it in rviz (needs ROS, a screen)")
-    show.add_argument("--port", type=int, default=9081, help="port for --console (default 9081)")
+    show.add_argument(
+        "--port", type=int, default=9081, help="port for --console (default %(default)s)"
+    )
     show.set_defaults(run=_show)
 
     compare = commands.add_parser("compare", help="compare two cells: differences paired by seed")
@@ -136,7 +138,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         "attacks", nargs="*", metavar="ATTACK", help=f"any of: {', '.join(ATTACKS)} (default: all)"
     )
     attack.add_argument(
-        "--runs", type=_count, default=12, metavar="N", help="number of seeds (default: 12)"
+        "--runs", type=_count, default=12, metavar="N", help="number of seeds (default %(default)s)"
     )
     attack.set_defaults(run=_attack)
 

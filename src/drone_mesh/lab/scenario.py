@@ -17,6 +17,7 @@ from drone_mesh.air.obstacle_file import BoxRow
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.communication.routing import DEFAULT_ROUTING
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.lab.conditions import parse_condition
@@ -111,9 +112,9 @@ class Radio(Part):
 class Timing(Part):
     """The adjustable times of the protocol, as in MeshTiming."""
 
-    check_period_s: Above0 = 10.0
-    connection_lost_after_s: Above0 = 30.0
-    send_attempts: Annotated[int, Field(ge=1, le=20)] = 3
+    check_period_s: Above0 = MeshTiming.check_period_s
+    connection_lost_after_s: Above0 = MeshTiming.connection_lost_after_s
+    send_attempts: Annotated[int, Field(ge=1, le=20)] = MeshTiming.send_attempts
 
 
 class Repair(Part):
