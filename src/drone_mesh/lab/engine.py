@@ -104,7 +104,7 @@ def _slurm(workers: int) -> contextlib.AbstractContextManager[object]:
     except ImportError as error:
         raise EngineError("--cluster slurm needs: pip install dask-jobqueue") from error
     if shutil.which("sbatch") is None:
-        raise EngineError("--cluster slurm: sbatch not found; use a machine that submits jobs")
+        raise EngineError("--cluster slurm: sbatch not found; use a machine that can submit jobs")
     try:
         cluster = SLURMCluster()
     except ValueError as error:

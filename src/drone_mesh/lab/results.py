@@ -76,7 +76,9 @@ class Results(NamedTuple):
         if len(fit) != 1:
             labels = [self.loaded.cells[i].label for i in fit or range(len(self.loaded.cells))]
             shown = "; ".join(labels[:CELLS_SHOWN]) + ("; ..." if labels[CELLS_SHOWN:] else "")
-            what = f"{len(fit)} cells fit, expected one" if fit else "no cell fits; there are"
+            what = (
+                f"{len(fit)} cells match, expected one" if fit else "no cell matches; the cells are"
+            )
             raise ConfigurationError(f"cell {text}: {what}: {shown}")
         return fit[0]
 

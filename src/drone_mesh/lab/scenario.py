@@ -75,7 +75,7 @@ class Layout(Part):
         if self.mean_degree is not None and self.width_m is not None:
             raise ValueError("mean_degree and width_m exclude each other: give one")
         if self.kind == "file" and self.path is None:
-            raise ValueError("layout file needs path")
+            raise ValueError("a layout of kind file needs path")
         if self.kind != "file" and self.gateways >= self.drones and self.kind != "casus":
             raise ValueError(f"{self.gateways} gateways leave no router of {self.drones} drones")
         return self
@@ -257,7 +257,7 @@ class Fault(Part):
         if len(actions) != 1:
             raise ValueError(f"a fault is exactly one of {', '.join(self.ACTIONS)}")
         if (self.at_s is None) == (self.when is None):
-            raise ValueError("a fault needs at_s or when, and not both")
+            raise ValueError("a fault needs either at_s or when")
         return self
 
     @property

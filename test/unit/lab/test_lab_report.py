@@ -109,8 +109,8 @@ def test_compare_prints_the_paired_difference(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["layout.drones=5", "layout.drones=6"], "2 cells fit, expected one"),
-        (["layout.drones=7", "layout.drones=6"], "no cell fits; there are: "),
+        (["layout.drones=5", "layout.drones=6"], "2 cells match, expected one"),
+        (["layout.drones=7", "layout.drones=6"], "no cell matches; the cells are: "),
         (["layout.dron=5", "layout.drones=6"], "expected axis=value with one of"),
         (
             ["timing.connection_lost_after_s=5,layout.drones=5"] * 2 + ["--metric", "x"],

@@ -520,7 +520,7 @@ def test_a_missing_part_of_slurm_gives_one_line(
     assert "lab: --cluster slurm: describe a job (cores, memory, queue, walltime) in" in output
     (slurm / "sbatch").unlink()
     output = finish(start(slow, tmp_path / "out", "--cluster", "slurm"))
-    assert "lab: --cluster slurm: sbatch not found; use a machine that submits jobs" in output
+    assert "lab: --cluster slurm: sbatch not found; use a machine that can submit jobs" in output
 
 
 @pytest.mark.slow
