@@ -65,7 +65,8 @@ export class Mesh extends EventTarget {
     }
     if (linksChanged) this.#relink();
     if (frame.events) this.events = this.events.concat(frame.events).slice(-this.limits.events);
-    if (frame.samples) this.samples = this.samples.concat(frame.samples).slice(-this.limits.samples);
+    if (frame.samples)
+      this.samples = this.samples.concat(frame.samples).slice(-this.limits.samples);
     if (frame.story) this.story = frame.story;
     if (frame.full || frame.story) this.#notify("story");
     for (const id of this.group) if (!this.nodes.has(id)) this.group.delete(id);
