@@ -5,24 +5,20 @@ docs/protocol.md, "Connection" and "Places to step back to".
 
 from __future__ import annotations
 
-import logging
 import math
 from typing import Callable, NamedTuple
 
 from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.detours import AVOIDED_S, Detours
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.messages import MessageType, packet
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.place_requests import ask_for_place
+from drone_mesh.communication.relay_check import RelayCheck
 from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
-from drone_mesh.communication.swallowing import Detours, Swallowing
-
-_log = logging.getLogger(__name__)
 
 _HOPS_UNTIL_KNOWN = 10  # our choice: the number of hops for which to wait for the first answer
 MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
-AVOIDED_S = 60.0  # our choice: for a neighbour through which no answer came
-SWALLOWER_AVOIDED_S = 600.0  # our choice: for a neighbour that seems to swallow packets
 
 
 class Shortcut(NamedTuple):
@@ -53,8 +49,7 @@ class GatewayConnection:
         self._shortcut: Shortcut | None = None
         self._tried = NO_ROUTE  # the neighbour of the latest heartbeat's shortcut or detour
         self._detours = Detours(parts.neighbours)
-        self._swallowing = Swallowing(parts.timing.check_period_s)
-        self._detour = NO_ROUTE  # the neighbour over which the next heartbeat goes
+        self._relay_check = RelayCheck(parts, self._detours)
         self._unanswered = 0  # heartbeats in a row
         self._asked_neighbour_s = -math.inf  # for its gateway
 
@@ -115,7 +110,7 @@ class GatewayConnection:
 
     def _sent_over_detour(self, connected: bool) -> bool:
         """Send the heartbeat around a next hop that swallows. The answer changes the route."""
-        to, self._detour = self._detour, NO_ROUTE
+        to = self._relay_check.take_detour()
         if to == NO_ROUTE:
             return False
         heartbeat = self._parts.heartbeat(to, self.gateway, connected, self.gateway)
@@ -194,7 +189,7 @@ class GatewayConnection:
         self._show()
         if is_new:
             self._introduce()
-            self.ask_for_places()
+            self._ask_for_places()
         return is_new
 
     def take_gateway_of(self, neighbour: int, gateway: int) -> None:
@@ -212,52 +207,19 @@ class GatewayConnection:
         since_s = self._parts.now_s - patience * self._parts.timing.check_period_s
         return self._answered_s > since_s
 
-    def look_after(self, patience: float) -> None:
+    def check(self, patience: float) -> None:
         """The part of the periodic check for a connected router."""
-        asked = self._look_for_swallowing()
+        asked = self._relay_check.run(self.gateway, self.next_hop(), self.hops)
         if self.proven(patience):
             return
-        self.ask_for_places(gateway_asked=asked)
+        self._ask_for_places(gateway_asked=asked)
         self.send_heartbeat()
 
     def gateway_sent_place(self) -> None:
         """The preferred gateway itself reported its place."""
-        self._swallowing.answered()
+        self._relay_check.gateway_sent_place()
 
-    def _look_for_swallowing(self) -> bool:
-        """In a mesh with a key: check whether the route carries more than heartbeats.
-
-        True: the gateway was asked for its place. If no answers come, later heartbeats go through
-        another neighbour.
-        """
-        parts, now_s, next_hop = self._parts, self._parts.now_s, self.next_hop()
-        sealed = parts.antenna.reserved_bytes(MessageType.LOCATION) > 0
-        relayed = next_hop not in (self.gateway, NO_ROUTE)
-        if not (sealed and relayed and parts.routing.TAKES_SHORTCUTS):
-            return False
-        if self._swallowing.noticed(self.hops):
-            self._detours.avoid(next_hop, now_s + SWALLOWER_AVOIDED_S)
-            _log.warning(
-                "node %d: node %d carries heartbeats to gateway %d, but no other packets",
-                parts.node_id,
-                next_hop,
-                self.gateway,
-            )
-        if self._detours.avoids(next_hop, now_s):  # just now, or the route has returned to it
-            self._detour = self._detours.nearest(next_hop, self.hops, now_s)
-            if self._detour == NO_ROUTE:
-                self._swallowing.give_up()
-                self._detours.avoid_none()
-            else:
-                self._swallowing.another_next_hop(self.hops)
-            return False
-        if not self._swallowing.must_ask(now_s):
-            return False
-        self._swallowing.asked(now_s)
-        self.ask_for_place(self.gateway)
-        return True
-
-    def ask_for_places(self, gateway_asked: bool = False) -> None:
+    def _ask_for_places(self, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
 
         `gateway_asked`: the gateway was asked a moment ago.
@@ -268,9 +230,9 @@ class GatewayConnection:
         too_old = age_s >= (MAX_AGE_PERIODS - 1) * self._parts.timing.check_period_s
         unsure = places.gateway is None or next_hop == self.gateway or too_old
         if unsure and not gateway_asked:
-            self.ask_for_place(self.gateway)
+            ask_for_place(self._parts, self.gateway)
         if next_hop not in (self.gateway, NO_ROUTE):
-            self.ask_for_place(next_hop)
+            ask_for_place(self._parts, next_hop)
 
     # The end of a connection -----------------------------------------------------------------
 
@@ -300,18 +262,13 @@ class GatewayConnection:
         self._asked_neighbour_s = now_s
         return False
 
-    def ask_for_place(self, node: int) -> None:
-        """Request the place of `node`, along the route to it."""
-        me = self._parts.node_id
-        self._parts.delivery.send_own(packet(MessageType.REQUESTLOCATION, me, me, node, node))
-
     def _prefer(self, gateway: int) -> None:
         if gateway != self.gateway:
             if self.gateway != NO_ROUTE:
                 self._parts.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self.gateway = gateway
             self._parts.places.forget_gateway()
-            self._swallowing.give_up()  # the new gateway may not know its place
+            self._relay_check.gateway_changed()
 
     def _show(self) -> None:
         """Report a change of the connection; cancel the wait for an answer that is not expected."""

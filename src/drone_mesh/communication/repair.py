@@ -21,7 +21,8 @@ from drone_mesh.communication.messages import (
 )
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
-from drone_mesh.communication.repair_flight import ASK_AGAIN_S, RepairFlight, ask_all_for_places
+from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.repair_flight import ASK_AGAIN_S, RepairFlight
 from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
@@ -187,10 +188,10 @@ class ConnectionRepair(RepairViews):
             self._parts.delivery.send_own(addressed(packet, neighbour))
 
     def ask_places(self) -> None:  # noqa: D102
-        ask_all_for_places(self._parts.antenna, self.node_id)
+        ask_all_for_places(self._parts)
 
     def ask_place(self, node: int) -> None:  # noqa: D102
-        self._connection.ask_for_place(node)
+        ask_for_place(self._parts, node)
 
     def announce_place(self, place: Location) -> None:  # noqa: D102
         me = self.node_id

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Callable
 
-from drone_mesh.communication.interfaces import BROADCAST, IWirelessCommunication
-from drone_mesh.communication.messages import Message, MessageType
 from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.place_requests import ask_all_for_places
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.spots import free_spot, towards
 from drone_mesh.communication.timing import LANDED_WITHIN_M
@@ -61,7 +60,7 @@ class RepairFlight:
 
     def each_second(self) -> None:
         """It is still in flight."""
-        self._ask_all_for_places()
+        ask_all_for_places(self._parts)
         if self.stops_when_connected:
             self._introduce()
 
@@ -94,14 +93,14 @@ class RepairFlight:
             self._fly_on()
             return False
         self.asks_left = ASKS_ON_GROUND
-        self._ask_all_for_places()
+        ask_all_for_places(self._parts)
         return True
 
     def ask_again(self) -> bool:
         """The time for answers is over. Returns False if it is clear and the flight is over."""
         self.asks_left -= 1
         if self.on_ground:
-            self._ask_all_for_places()
+            ask_all_for_places(self._parts)
         return self.on_ground
 
     def _go_to(self, goal: Location) -> None:
@@ -153,12 +152,3 @@ class RepairFlight:
             for node, heard in self._parts.neighbours.places().items()
             if node != me and now_s - heard.heard_s <= FRESH_S
         ]
-
-    def _ask_all_for_places(self) -> None:
-        ask_all_for_places(self._parts.antenna, self._parts.node_id)
-
-
-def ask_all_for_places(antenna: IWirelessCommunication, me: int) -> None:
-    """Request the places of all nodes in range."""
-    question = Message(me, me, MessageType.REQUESTLOCATION, BROADCAST, BROADCAST)
-    antenna.broadcast_message(question.to_payload())

@@ -129,7 +129,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         was_connected = self._states.connected
         self._routing.maintain_routing()
         if was_connected:
-            self._connection.look_after(self._antenna.patience())
+            self._connection.check(self._antenna.patience())
         elif before is ConnectionState.SEARCHING and self._states.repair is not RepairState.FLYING:
             self._repair.on_unconnected_check(due_s)
 
