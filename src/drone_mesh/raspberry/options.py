@@ -146,7 +146,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         choices=[power.value for power in TxPower],
         default=TxPower.DBM_0.value,
         help="transmit power in dBm, before the amplifier if the module has one; the limit in "
-        "Europe is 100 mW (20 dBm) in all (default: %(default)s)",
+        "Europe is 100 mW (20 dBm) after the amplifier (default: %(default)s)",
     )
     radio.add_argument(
         "--crc",
@@ -211,8 +211,8 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         type=float,
         default=OUTDOOR_RANGE_M,
         metavar="M",
-        help="range of the radio in metres, which the repair uses; raspberry_radio range measures "
-        "it (default: %(default)g, for 250k)",
+        help="range of the radio in metres, which the repair uses; 'raspberry_radio range' shows "
+        "the loss at a distance (default: %(default)g, for 250k)",
     )
     mesh.add_argument(
         "--key-file",
