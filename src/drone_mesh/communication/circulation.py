@@ -7,7 +7,7 @@ from typing import Hashable, Tuple
 
 from drone_mesh.communication.timing import CIRCULATION_S
 
-_Passage = Tuple[int, int, float, int]
+Passage = Tuple[int, int, float, int]
 """A packet's first passage: the neighbour that it came from, the next hop, the time and its hop
 count. A plain tuple, as there is one for each packet."""
 
@@ -21,32 +21,31 @@ class CirculationGuard:
 
     def __init__(self) -> None:
         # Two tables used in turn, so that old passages are forgotten without a search for them.
-        self._passages: dict[Hashable, _Passage] = {}
-        self._earlier: dict[Hashable, _Passage] = {}
+        self._passages: dict[Hashable, Passage] = {}
+        self._earlier: dict[Hashable, Passage] = {}
         self._turn_s = -math.inf  # when the earlier ones are forgotten
 
-    def came_round(
-        self, identity: Hashable, came_from: int, now_s: float, hops: int = 0
-    ) -> int | None:
-        """The next hop of the packet's first passage, if it now comes from another neighbour.
-
-        A heartbeat counts its hops, so it has come round only if it has more `hops` than before.
-        """
+    def first_passage(self, identity: Hashable, now_s: float) -> Passage | None:
+        """The packet's first passage, if that was less than half a second ago."""
         passage = self._passages.get(identity) or self._earlier.get(identity)
-        if passage is None:
-            return None
-        first_from, went_to, at_s, first_hops = passage
-        if first_from == came_from or (hops and hops <= first_hops):
-            return None
-        return None if now_s - at_s >= CIRCULATION_S else went_to
+        return None if passage is None or now_s - passage[2] >= CIRCULATION_S else passage
 
     def passed(
         self, identity: Hashable, came_from: int, went_to: int, now_s: float, hops: int = 0
     ) -> None:
-        """Record that the packet was forwarded. Only its first passage counts."""
+        """Record the first passage of a packet that was forwarded."""
         if now_s >= self._turn_s:
             self._turn_s = now_s + CIRCULATION_S
             self._passages, self._earlier = {}, self._passages
-        first = self._passages.get(identity) or self._earlier.get(identity)
-        if first is None or now_s - first[2] >= CIRCULATION_S:
-            self._passages[identity] = (came_from, went_to, now_s, hops)
+        self._passages[identity] = (came_from, went_to, now_s, hops)
+
+
+def came_round(first: Passage, came_from: int, hops: int = 0) -> int | None:
+    """The next hop of the packet's first passage, if it now comes from another neighbour.
+
+    A heartbeat counts its hops, so it has come round only if it has more `hops` than before.
+    """
+    first_from, went_to, _at_s, first_hops = first
+    if first_from == came_from or (hops and hops <= first_hops):
+        return None
+    return went_to

@@ -73,18 +73,15 @@ class Delivery:
             return False
         if self._shared:
             return self._hand_over(payload)
-        antenna, transmissions = self._antenna, failures
         while failures < self._attempts or failures < self._most_attempts(payload):
-            taken = antenna.send_message_to(payload)
-            transmissions += antenna.transmissions_of_last_send()
-            if taken:
+            if self._antenna.send_message_to(payload):
                 self.total_sent += 1
                 if not is_known:
                     self._known.add(to)
-                self._routing.sent(to, True, transmissions)
+                self._routing.sent(to, True, failures + 1)
                 return True
             failures += 1
-        self._routing.sent(to, False, transmissions)
+        self._routing.sent(to, False, failures)
         self._neighbour_lost(to, came_from)
         return False
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Hashable, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.circulation import CirculationGuard
+from drone_mesh.communication.circulation import CirculationGuard, came_round
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.delivery import Delivery, NodeReport
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -57,10 +57,12 @@ class Forwarding:
             identity = (creator, forward, know_gateway, gateway)
         else:
             identity, hops = messages.identity(payload), 0
-        went_to = self._circulation.came_round(identity, from_, now_s, hops)
-        if went_to is not None:
-            self._drop_circulating(payload, went_to, now_s)
-            return
+        first = self._circulation.first_passage(identity, now_s)
+        if first is not None:
+            went_to = came_round(first, from_, hops)
+            if went_to is not None:
+                self._drop_circulating(payload, went_to, now_s)
+                return
         lost = NO_ROUTE
         for _attempt in (1, 2):
             directions = routing.directions(forward, from_, creator)
@@ -77,7 +79,8 @@ class Forwarding:
                 self._complaints.dropped("a heartbeat with too many hops", payload, now_s)
                 return
             if self._delivery.send(forwarded, to, came_from=from_):
-                self._circulation.passed(identity, from_, to, now_s, hops)
+                if first is None:
+                    self._circulation.passed(identity, from_, to, now_s, hops)
                 return
             lost = to
         self.stranded(payload, now_s)

@@ -186,13 +186,6 @@ class IWirelessCommunication(abc.ABC):
         """
         return [self.send_message_to(payload) for payload in payloads]
 
-    def transmissions_of_last_send(self) -> int:
-        """How often the last packet, sent or given up, was transmitted; at least 1.
-
-        A radio that retransmits by itself overrides this.
-        """
-        return 1
-
     @abc.abstractmethod
     def broadcast_message(self, payload: bytes) -> None:
         """Send to every node in range; each finds its own id in byte 3."""

@@ -134,9 +134,6 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         taken = iter(self._antenna.send_messages(sealed))
         return [payload is None or next(taken) for payload in proven]
 
-    def transmissions_of_last_send(self) -> int:
-        return self._antenna.transmissions_of_last_send()
-
     def broadcast_message(self, payload: bytes) -> None:
         payload = self._end_to_end.seal(payload, self._clock()) or payload
         if payload[TYPE_AT] == _PRESENT:

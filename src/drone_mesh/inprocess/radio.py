@@ -22,6 +22,10 @@ Deliver = Callable[[bytes], None]
 """Passes a packet to the mesh component of one node and schedules its next tick."""
 
 
+def _ignore(_payload: bytes) -> None:
+    """A packet reached an antenna without power, or one that was stopped."""
+
+
 class InProcessAir:
     """Which nodes hear each other, and which packets are lost, delayed or cut off."""
 
@@ -56,7 +60,15 @@ class InProcessAir:
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
         self._standing: dict[int, Location] = {}  # their positions
         self._flying: set[int] = set()
-        self.delivered = 0
+        # Packets that leave at one time also arrive at one time: one event of the clock for all.
+        self._under_way: list[tuple[InProcessAntenna, bytes]] = []
+        self._left_s = -math.inf  # when those left
+        self._delivered = 0  # before those
+
+    @property
+    def delivered(self) -> int:
+        """The number of packets so far that a node receives or has received."""
+        return self._delivered + len(self._under_way)
 
     def expect(self, node_id: int) -> None:
         """A node with this id has an antenna, which may start later."""
@@ -161,14 +173,29 @@ class InProcessAir:
             return False
         if self.loss and self._rng.random() < self.loss:
             return False
-        self.delivered += 1
-        clock = self._clock
-        at_s = clock.now_s + self._delay_s
-        if self._jitter_s:
-            clock.call_at(at_s + self._rng.random() * self._jitter_s, other.take, payload)
-        else:
-            clock.call_in_line(at_s, other.take, payload)
+        now_s = self._clock.now_s
+        if now_s != self._left_s:
+            self._next_to_leave(now_s)
+        self._under_way.append((other, payload))
         return True
+
+    def _next_to_leave(self, now_s: float) -> None:
+        """The following packets leave at `now_s`; with jitter only one."""
+        self._delivered += len(self._under_way)
+        self._under_way = []
+        at_s = now_s + self._delay_s
+        if self._jitter_s:
+            at_s += self._rng.random() * self._jitter_s
+            self._clock.call_at(at_s, self._arrive, self._under_way)
+        else:
+            self._left_s = now_s
+            self._clock.call_in_line(at_s, self._arrive, self._under_way)
+
+    def _arrive(self, packets: list[tuple[InProcessAntenna, bytes]]) -> None:
+        self._left_s = -math.inf  # without a delay, the answers leave at this time, too
+        for antenna, payload in packets:
+            take = antenna.take  # calling a local is faster than antenna.take(...)
+            take(payload)
 
 
 class InProcessAntenna(IWirelessCommunication):
@@ -183,17 +210,19 @@ class InProcessAntenna(IWirelessCommunication):
         self._air = air
         self._deliver = deliver
         self._started = False
-        self.take: Deliver = self.receive  # made once, not once per packet
+        self.take: Deliver = _ignore  # called with each packet that arrives
         air.expect(node_id)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Become reachable."""
         self._started = True
+        self._listen()
         self._air.add(self)
 
     def stop_antenna(self) -> None:
         """Become unreachable."""
         self._started = False
+        self._listen()
         self._air.remove(self)
 
     def send_message_to(self, payload: bytes) -> bool:
@@ -215,9 +244,7 @@ class InProcessAntenna(IWirelessCommunication):
     def switch_power(self, on: bool) -> None:
         """Power on or off."""
         self.powered = on
+        self._listen()
 
-    def receive(self, payload: bytes) -> None:
-        """A packet arrived; ignored without power."""
-        if self.powered and self._started:
-            deliver = self._deliver  # calling a local is faster than self._deliver(...)
-            deliver(payload)
+    def _listen(self) -> None:
+        self.take = self._deliver if self.powered and self._started else _ignore
