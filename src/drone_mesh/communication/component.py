@@ -282,7 +282,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         location = self._pilot.goal or self._pilot.location()  # its destination counts
         if location is not None:
             me, now_s, places = self._node_id, self._deadlines.now_s, self.places
-            answer = messages.LocationMessage.of(location, now_s, me, me, asker, asker).to_payload()
+            answer = messages.location(location, now_s, me, me, asker, asker)
             if places.gateway is not None:
                 gateway, age_s = self.get_preferred_gateway(), now_s - places.gateway_seen_s
                 extension = messages.GatewayPlace(gateway, places.gateway, age_s)

@@ -78,7 +78,7 @@ class Forwarding:
             if forwarded is None:
                 self._complaints.dropped("a heartbeat with too many hops", payload, now_s)
                 return
-            if self._delivery.send(forwarded, to, came_from=from_):
+            if self._delivery.send(forwarded, to, 0, from_):  # keywords cost more
                 if first is None:
                     self._circulation.passed(identity, from_, to, now_s, hops)
                 return

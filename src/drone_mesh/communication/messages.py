@@ -100,17 +100,6 @@ class LocationMessage:
     height: int  # whole metres
     time_since_posix: int  # whole seconds of the creator's clock
 
-    @classmethod
-    def of(
-        cls, location: Location, now_s: float, creator: int, from_: int, to: int, forward: int
-    ) -> LocationMessage:
-        """`location` as a message. Heights are int16, whole metres."""
-        height = max(-(2**15), min(2**15 - 1, round(location.height)))
-        time_s = int(now_s) % 2**32
-        return cls(
-            creator, from_, to, forward, location.latitude, location.longitude, height, time_s
-        )
-
     def to_payload(self) -> bytes:
         """The 32 bytes. Raises PacketError for a value that does not fit its field."""
         return _packed(self, self.latitude, self.longitude, self.height, self.time_since_posix)
@@ -267,6 +256,10 @@ _ORDER_NUMBER = struct.Struct("<H")
 _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
+_LOCATION = int(MessageType.LOCATION)
+_NEW_LOCATION = struct.Struct(
+    f"<{HEADER_BYTES}B{LocationMessage.BODY.format[1:]}{BODY_BYTES - LocationMessage.BODY.size}x"
+)
 _PRESENT = int(MessageType.PRESENT)
 _NEW_PRESENT = struct.Struct(
     f"<{HEADER_BYTES}B{IntroduceMessage.BODY.format[1:]}{BODY_BYTES - IntroduceMessage.BODY.size}x"
@@ -390,6 +383,18 @@ def packet(kind: int, creator: int, from_: int, to: int, forward: int, body: byt
 def place_in(location: bytes) -> Location:
     """The place in a LOCATION, without creating the object: every tenth packet is one."""
     return Location(*LocationMessage.BODY.unpack_from(location, HEADER_BYTES)[:3])
+
+
+def location(
+    place: Location, now_s: float, creator: int, from_: int, to: int, forward: int
+) -> bytes:
+    """The bytes of a new LocationMessage, without the object. Heights are int16, whole metres."""
+    latitude, longitude, height = place
+    height = max(-(2**15), min(2**15 - 1, round(height)))
+    time_s = int(now_s) % 2**32
+    return _NEW_LOCATION.pack(
+        creator, from_, _LOCATION, to, forward, latitude, longitude, height, time_s
+    )
 
 
 def present(sender: int, hops: int, know_gateway: bool) -> bytes:

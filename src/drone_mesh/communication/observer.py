@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
-from typing import Callable
+from typing import Callable, NamedTuple
 
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -46,8 +45,7 @@ class MeshEventKind(enum.Enum):
     CAN_FLY = "can fly again"
 
 
-@dataclass(frozen=True)
-class MeshEvent:
+class MeshEvent(NamedTuple):
     """One event at one node."""
 
     kind: MeshEventKind

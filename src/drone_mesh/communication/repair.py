@@ -15,9 +15,9 @@ from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.messages import (
     GatewayPlace,
-    LocationMessage,
     MovementNegotiationMessage,
     addressed,
+    location,
 )
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.parts import NodeParts
@@ -195,8 +195,8 @@ class ConnectionRepair(RepairViews):
 
     def announce_place(self, place: Location) -> None:  # noqa: D102
         me = self.node_id
-        message = LocationMessage.of(place, self.now_s, me, me, BROADCAST, BROADCAST)
-        self._parts.antenna.broadcast_message(message.to_payload())
+        packet = location(place, self.now_s, me, me, BROADCAST, BROADCAST)
+        self._parts.antenna.broadcast_message(packet)
 
     def present(self) -> None:  # noqa: D102
         self._introduce()
