@@ -23,7 +23,7 @@ class Detours:
         self._until_s[neighbour] = until_s
 
     def avoid_none(self) -> None:
-        """Forget all: none is better than the others."""
+        """Avoid no neighbour any longer, because there is no better one."""
         self._until_s.clear()
 
     def avoids(self, neighbour: int, now_s: float) -> bool:

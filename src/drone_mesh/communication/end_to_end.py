@@ -1,4 +1,4 @@
-"""EndToEnd: proves which node made a packet, over all relays (docs/security.md, "End-to-end seal").
+"""EndToEnd: proves to the addressee which node made a packet (docs/security.md, "End-to-end seal").
 
 The hop seal shows that some node of the mesh sent a packet. This one shows the addressee which node
 created it: an order comes from a node that holds the mesh key, a place from the node itself. Its

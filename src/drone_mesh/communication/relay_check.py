@@ -59,7 +59,7 @@ class RelayCheck:
         return True
 
     def take_detour(self) -> int:
-        """The neighbour over which the next heartbeat goes, once; NO_ROUTE: the next hop."""
+        """The neighbour to send the next heartbeat through, for one heartbeat; NO_ROUTE: none."""
         detour, self._detour = self._detour, NO_ROUTE
         return detour
 
@@ -68,5 +68,5 @@ class RelayCheck:
         self._swallowing.answered()
 
     def gateway_changed(self) -> None:
-        """The router prefers another gateway, which may not know its place."""
+        """The router prefers another gateway; this one may not know its own place."""
         self._swallowing.give_up()

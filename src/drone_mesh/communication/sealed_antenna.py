@@ -163,7 +163,7 @@ class SealedAntenna(IWirelessCommunication, IMeshNetwork):
         return self._node_id
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
-        """Open a packet and hand it on; one that is not authentic ends here."""
+        """Open a packet and pass it on; one that is not authentic ends here."""
         mesh = self._mesh
         if mesh is None:
             return

@@ -50,6 +50,6 @@ class Swallowing:
         self._unanswered = max(0, hops - LEAST_UNANSWERED)
 
     def give_up(self) -> None:
-        """Stop suspecting: there is another gateway, or it is silent over every next hop."""
+        """Stop suspecting: there is another gateway, or it is silent through every next hop."""
         self._answers = False
         self._unanswered = 0

@@ -94,7 +94,7 @@ class InProcessAir:
             self._link(node)
 
     def cut(self, one: int, other: int, off: bool = True) -> None:
-        """Cut the link between two nodes, or mend it. Raises ValueError for an unknown pair."""
+        """Cut the link between two nodes, or restore it. Raises ValueError for an unknown pair."""
         if one == other or not {one, other} <= self._ids:
             raise ValueError(f"no link between {one} and {other}: name two different nodes")
         (self._cut.add if off else self._cut.discard)(frozenset((one, other)))

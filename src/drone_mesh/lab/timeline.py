@@ -157,11 +157,11 @@ class Timeline:
         for a, b in links:
             air.cut(a, b)
 
-        def mend(_: object) -> None:
+        def restore(_: object) -> None:
             for a, b in links:
                 air.cut(a, b, off=False)
 
-        self._after(what.for_s, mend)
+        self._after(what.for_s, restore)
         return sorted({node for link in links for node in link})
 
     def _jam(self, fault: Fault, _rng: random.Random) -> list[int]:

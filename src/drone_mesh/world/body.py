@@ -23,9 +23,10 @@ class BodyLimits:
     hover_s: float = 1200.0  # hovering time with a full battery
     standby_s: float = 36_000.0  # time for which a full battery powers the node on the ground
     crash_m_s: float = 1.0  # a change of speed within one step that no motor could cause
-    # Something that holds the drone in the air destroys its rotors too: a smaller change of speed,
-    held_m_s: float = 0.01  # above this
-    held_s: float = 0.5  # in each step of this time
+    # Something that holds the drone in the air destroys its rotors too. It is recognised by
+    # smaller changes of speed:
+    held_m_s: float = 0.01  # each above this,
+    held_s: float = 0.5  # in every step of this time
 
 
 POSITION_GAIN_PER_S = 1.2  # m/s of wanted speed per metre of distance
