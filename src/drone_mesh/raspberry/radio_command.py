@@ -20,8 +20,8 @@ from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice, open_spi
 from drone_mesh.raspberry import radio_tests, range_test
-from drone_mesh.raspberry.bench_radio import BenchRadio
-from drone_mesh.raspberry.emulated_bench import PARTNER_ID, EmulatedPartner
+from drone_mesh.raspberry.emulated_partner import PARTNER_ID, EmulatedPartner
+from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.node_status import version
 from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
 
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _tool(options: argparse.Namespace, radio: BenchRadio, irq: IrqPin | None) -> Iterator[str]:
+def _tool(options: argparse.Namespace, radio: FieldRadio, irq: IrqPin | None) -> Iterator[str]:
     if options.tool == "check":
         return radio_tests.check(radio, irq)
     if options.tool == "scan":
@@ -61,7 +61,7 @@ def _tool(options: argparse.Namespace, radio: BenchRadio, irq: IrqPin | None) ->
     return _report(radio, irq, options)
 
 
-def _listen(radio: BenchRadio, ended: Callable[[], bool], file: Path | None) -> Iterator[str]:
+def _listen(radio: FieldRadio, ended: Callable[[], bool], file: Path | None) -> Iterator[str]:
     if file is None:
         yield from radio_tests.listen(radio, ended)
         return
@@ -76,7 +76,7 @@ def _listen(radio: BenchRadio, ended: Callable[[], bool], file: Path | None) -> 
         )
 
 
-def _report(radio: BenchRadio, irq: IrqPin | None, options: argparse.Namespace) -> Iterator[str]:
+def _report(radio: FieldRadio, irq: IrqPin | None, options: argparse.Namespace) -> Iterator[str]:
     """Write the output of check and scan, and a description of this machine, to one file."""
     file: Path = options.file
     lines = [
@@ -134,7 +134,7 @@ def _model() -> str:
 
 
 @contextlib.contextmanager
-def _opened(options: argparse.Namespace) -> Iterator[tuple[BenchRadio, IrqPin | None]]:
+def _opened(options: argparse.Namespace) -> Iterator[tuple[FieldRadio, IrqPin | None]]:
     settings = RadioSettings(channel=options.channel, data_rate=DATA_RATES[options.rate])
     spi: SpiDevice
     ce: CePin
@@ -152,7 +152,7 @@ def _opened(options: argparse.Namespace) -> Iterator[tuple[BenchRadio, IrqPin | 
         else:
             spi, ce, runtime = _hardware(options)
             irq = None if options.irq is None else GpiodIrq(options.irq)
-        radio = BenchRadio(spi, ce, options.id, settings, runtime)
+        radio = FieldRadio(spi, ce, options.id, settings, runtime)
         stack.callback(radio.close)
         yield radio, irq
 

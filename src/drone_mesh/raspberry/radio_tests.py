@@ -11,7 +11,7 @@ from drone_mesh.communication.messages import MessageType
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import IrqPin
 from drone_mesh.nrf24.registers import Register
-from drone_mesh.raspberry.bench_radio import TEST_TYPE, BenchRadio
+from drone_mesh.raspberry.field_radio import TEST_TYPE, FieldRadio
 
 Lines = Iterator[str]
 
@@ -26,7 +26,7 @@ _RATES_IN_WORDS = ", ".join(f"{rate} for up to {most}" for most, rate in MOST_NO
 PATTERNS = (bytes(5), b"\xff" * 5, b"\x55" * 5, b"\xaa\x55\xaa\x55\xaa")
 
 
-def check(radio: BenchRadio, irq: IrqPin | None) -> Lines:
+def check(radio: FieldRadio, irq: IrqPin | None) -> Lines:
     """Test wiring, SPI, registers, CE, supply, IRQ. Raises RadioError if the radio is unusable."""
     radio.set_up()
     yield "ok   registers: written and read back"
@@ -56,12 +56,12 @@ def check(radio: BenchRadio, irq: IrqPin | None) -> Lines:
         yield _check_irq(radio, irq)
 
 
-def _holds(radio: BenchRadio, pattern: bytes) -> bool:
+def _holds(radio: FieldRadio, pattern: bytes) -> bool:
     radio.link.write(Register.TX_ADDR, pattern)
     return radio.link.read(Register.TX_ADDR, len(pattern)) == pattern
 
 
-def _check_irq(radio: BenchRadio, irq: IrqPin) -> str:
+def _check_irq(radio: FieldRadio, irq: IrqPin) -> str:
     if irq.wait_low(0.0):
         return "FAIL IRQ: low although no flag is set: check its wiring"
     radio.broadcast(_probe(), keep_flags=True)
@@ -74,7 +74,7 @@ def _check_irq(radio: BenchRadio, irq: IrqPin) -> str:
     )
 
 
-def scan(radio: BenchRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
+def scan(radio: FieldRadio, rounds: int, nodes: int, suggest: int = 3) -> Lines:
     """How often each channel carried a signal of more than -64 dBm, and the quietest channels.
 
     The last line gives the options for a mesh of this many nodes.
@@ -117,7 +117,7 @@ def quietest(heard: list[int], count: int) -> list[int]:
 
 
 def listen(
-    radio: BenchRadio,
+    radio: FieldRadio,
     ended: Callable[[], bool],
     keep: Callable[[bytes], None] = lambda _payload: None,
 ) -> Lines:

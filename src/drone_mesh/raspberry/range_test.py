@@ -16,7 +16,7 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.emulator.measured import measured_losses
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.settings import DataRate, RadioSettings, TxPower
-from drone_mesh.raspberry.bench_radio import SWITCH_S, TEST_TYPE, BenchRadio
+from drone_mesh.raspberry.field_radio import SWITCH_S, TEST_TYPE, FieldRadio
 
 Lines = Iterator[str]
 
@@ -40,7 +40,7 @@ class _RateRequest(NamedTuple):
 
 
 def measure_range(
-    radio: BenchRadio,
+    radio: FieldRadio,
     to: int,
     packets: int,
     distance_m: float | None = None,
@@ -75,7 +75,7 @@ def measure_range(
         )
 
 
-def _wait_for_partner(radio: BenchRadio, to: int) -> None:
+def _wait_for_partner(radio: FieldRadio, to: int) -> None:
     """Send until a packet is acknowledged, for a limited time: `to` may be changing its rate."""
     until_s = radio.runtime.now_s() + CHANGE_WITHIN_S
     address, payload = radio.settings.node_address(to), _payload(radio.node_id, to)
@@ -88,7 +88,7 @@ def _hold_s(packets: int) -> int:
     return 2 + round(packets * FAILED_PACKET_S)
 
 
-def _measured(radio: BenchRadio, to: int, packets: int) -> str:
+def _measured(radio: FieldRadio, to: int, packets: int) -> str:
     settings = radio.settings
     address = settings.node_address(to)
     payload = _payload(radio.node_id, to)
@@ -102,7 +102,7 @@ def _measured(radio: BenchRadio, to: int, packets: int) -> str:
 class _Partner:
     """The far end, as seen by the end that measures."""
 
-    def __init__(self, radio: BenchRadio, node_id: int, hold_s: int) -> None:
+    def __init__(self, radio: FieldRadio, node_id: int, hold_s: int) -> None:
         self._radio = radio
         self._id = node_id
         self._hold_s = hold_s
@@ -162,7 +162,7 @@ class _Partner:
         )
 
 
-def answer(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
+def answer(radio: FieldRadio, ended: Callable[[], bool]) -> Lines:
     """The far end of `measure_range`: acknowledge what arrives, and follow announced rates."""
     radio.set_up()
     base, runtime = radio.settings, radio.runtime
@@ -193,7 +193,7 @@ def answer(radio: BenchRadio, ended: Callable[[], bool]) -> Lines:
             yield said
 
 
-def _follow(radio: BenchRadio, request: _RateRequest) -> str:
+def _follow(radio: FieldRadio, request: _RateRequest) -> str:
     """Confirm, and change to the rate; keep the present one if the chip does not support it."""
     base = radio.settings
     there = dataclasses.replace(base, data_rate=request.rate)

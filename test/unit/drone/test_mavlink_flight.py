@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mavlink_bench import ALL, ARDUPILOT, Bench, is_inside
+from mavlink_rig import ALL, ARDUPILOT, Rig, is_inside
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.interfaces import Location
@@ -20,24 +20,24 @@ BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.na
 def test_with_every_permission_it_takes_off_flies_up_across_and_down_and_hovers(
     autopilot: Autopilot,
 ) -> None:
-    bench = Bench(autopilot).ready()
-    assert bench.status().why_not_fly == ""
-    bench.goal(30.0, 20.0, 5.0)
-    bench.reach(Phase.HOLDING)
-    bench.run(5.0)
-    assert bench.place.distance_m(Location(30.0, 20.0, 5.0)) < 0.2
-    assert bench.vehicle.mode is Mode.FOLLOW
-    assert max(bench.heights) == pytest.approx(12.0, abs=0.2)  # layer 1: 10 m + 2 m
+    rig = Rig(autopilot).ready()
+    assert rig.status().why_not_fly == ""
+    rig.goal(30.0, 20.0, 5.0)
+    rig.reach(Phase.HOLDING)
+    rig.run(5.0)
+    assert rig.place.distance_m(Location(30.0, 20.0, 5.0)) < 0.2
+    assert rig.vehicle.mode is Mode.FOLLOW
+    assert max(rig.heights) == pytest.approx(12.0, abs=0.2)  # layer 1: 10 m + 2 m
 
 
 @BOTH
 def test_across_it_flies_only_at_its_own_height(autopilot: Autopilot) -> None:
-    bench = Bench(autopilot).ready()
-    bench.goal(40.0, 0.0, 5.0)
-    while bench.status().phase is not Phase.HOLDING:
-        bench.step()
-        if 2.0 < bench.place.latitude < 38.0:
-            assert bench.place.height == pytest.approx(12.0, abs=0.5)
+    rig = Rig(autopilot).ready()
+    rig.goal(40.0, 0.0, 5.0)
+    while rig.status().phase is not Phase.HOLDING:
+        rig.step()
+        if 2.0 < rig.place.latitude < 38.0:
+            assert rig.place.height == pytest.approx(12.0, abs=0.5)
 
 
 def test_drones_with_different_ids_cross_in_different_layers() -> None:
@@ -48,56 +48,56 @@ def test_drones_with_different_ids_cross_in_different_layers() -> None:
 
 @BOTH
 def test_an_ordered_landing_ends_on_the_ground_disarmed(autopilot: Autopilot) -> None:
-    bench = Bench(autopilot).ready()
-    bench.goal(10.0, 0.0, 0.0, lands=True)
-    bench.run_until("it has landed", lambda: bench.status().phase is Phase.IDLE)
-    assert bench.place.distance_m(Location(10.0, 0.0, 0.0)) < 1.0
-    assert not bench.vehicle.body.armed
-    assert bench.commands()[-1] == mavlink.MAV_CMD_NAV_LAND
+    rig = Rig(autopilot).ready()
+    rig.goal(10.0, 0.0, 0.0, lands=True)
+    rig.run_until("it has landed", lambda: rig.status().phase is Phase.IDLE)
+    assert rig.place.distance_m(Location(10.0, 0.0, 0.0)) < 1.0
+    assert not rig.vehicle.body.armed
+    assert rig.commands()[-1] == mavlink.MAV_CMD_NAV_LAND
 
 
 @BOTH
 def test_from_where_it_was_ordered_to_land_it_can_take_off_again(autopilot: Autopilot) -> None:
-    bench = Bench(autopilot).ready()
-    bench.goal(10.0, 0.0, 0.0, lands=True)
-    bench.run_until("it has landed", lambda: bench.status().phase is Phase.IDLE)
-    bench.run(2.0)
-    assert bench.status().why_not_fly == ""
-    bench.goal(0.0, 0.0, 6.0)
-    bench.reach(Phase.HOLDING)
-    assert bench.place.height == pytest.approx(6.0, abs=1.0)
+    rig = Rig(autopilot).ready()
+    rig.goal(10.0, 0.0, 0.0, lands=True)
+    rig.run_until("it has landed", lambda: rig.status().phase is Phase.IDLE)
+    rig.run(2.0)
+    assert rig.status().why_not_fly == ""
+    rig.goal(0.0, 0.0, 6.0)
+    rig.reach(Phase.HOLDING)
+    assert rig.place.height == pytest.approx(6.0, abs=1.0)
 
 
 @BOTH
 def test_a_new_goal_replaces_the_old_one_in_flight(autopilot: Autopilot) -> None:
-    bench = Bench(autopilot).ready()
-    bench.goal(60.0, 0.0, 5.0)
-    bench.run_until("it is on its way", lambda: bench.place.latitude > 10.0)
-    bench.goal(0.0, 20.0, 5.0)
-    bench.reach(Phase.HOLDING)
-    bench.run(3.0)
-    assert bench.place.distance_m(Location(0.0, 20.0, 5.0)) < 0.2
-    assert bench.commands().count(mavlink.MAV_CMD_COMPONENT_ARM_DISARM) == 1
+    rig = Rig(autopilot).ready()
+    rig.goal(60.0, 0.0, 5.0)
+    rig.run_until("it is on its way", lambda: rig.place.latitude > 10.0)
+    rig.goal(0.0, 20.0, 5.0)
+    rig.reach(Phase.HOLDING)
+    rig.run(3.0)
+    assert rig.place.distance_m(Location(0.0, 20.0, 5.0)) < 0.2
+    assert rig.commands().count(mavlink.MAV_CMD_COMPONENT_ARM_DISARM) == 1
 
 
 def test_the_same_goal_again_changes_nothing() -> None:
-    bench = Bench().ready()
-    bench.goal(30.0, 0.0, 5.0)
-    bench.run_until("it is on its way", lambda: bench.place.latitude > 10.0)
-    before = len(bench.commands())
-    bench.goal(30.0, 0.0, 5.0)
-    bench.run(2.0)
-    assert len(bench.commands()) == before
-    assert bench.place.latitude > 12.0
+    rig = Rig().ready()
+    rig.goal(30.0, 0.0, 5.0)
+    rig.run_until("it is on its way", lambda: rig.place.latitude > 10.0)
+    before = len(rig.commands())
+    rig.goal(30.0, 0.0, 5.0)
+    rig.run(2.0)
+    assert len(rig.commands()) == before
+    assert rig.place.latitude > 12.0
 
 
 def test_it_flies_at_the_speed_that_was_set() -> None:
-    bench = Bench(limits=FlightLimits(speed_m_s=3.0)).ready()
-    bench.goal(100.0, 0.0, 12.0)
-    bench.run_until("it is on its way", lambda: bench.place.latitude > 20.0)
-    start_m, start_s = bench.place.latitude, bench.now_s
-    bench.run_until("it is further", lambda: bench.place.latitude > 80.0)
-    speed = (bench.place.latitude - start_m) / (bench.now_s - start_s)
+    rig = Rig(limits=FlightLimits(speed_m_s=3.0)).ready()
+    rig.goal(100.0, 0.0, 12.0)
+    rig.run_until("it is on its way", lambda: rig.place.latitude > 20.0)
+    start_m, start_s = rig.place.latitude, rig.now_s
+    rig.run_until("it is further", lambda: rig.place.latitude > 80.0)
+    speed = (rig.place.latitude - start_m) / (rig.now_s - start_s)
     assert speed == pytest.approx(3.0, rel=0.05)
 
 
@@ -111,29 +111,29 @@ def test_it_flies_at_the_speed_that_was_set() -> None:
     ],
 )
 def test_a_goal_outside_the_limits_is_refused(goal, why: str) -> None:
-    bench = Bench().ready()
+    rig = Rig().ready()
     with pytest.raises(GoalRefused, match=why):
-        bench.goal(*goal)
-    bench.run(5.0)
-    assert bench.commands() == []
+        rig.goal(*goal)
+    rig.run(5.0)
+    assert rig.commands() == []
 
 
 @pytest.mark.slow
 @BOTH
 def test_no_target_of_a_flight_lies_outside_the_limits(autopilot: Autopilot) -> None:
     limits = FlightLimits(max_height_m=12.0, max_distance_m=50.0)
-    bench = Bench(autopilot, ALL, limits, node_id=5).ready()
+    rig = Rig(autopilot, ALL, limits, node_id=5).ready()
     for goal in ((49.0, 0.0, 12.0), (-30.0, 30.0, 2.0), (0.0, 0.0, 0.0)):
-        bench.goal(*goal, lands=goal[2] == 0.0)
-        bench.run_until("it is there", lambda: not bench.status().is_flying)
+        rig.goal(*goal, lands=goal[2] == 0.0)
+        rig.run_until("it is there", lambda: not rig.status().is_flying)
     home = Location(0.0, 0.0, 0.0)
-    assert all(is_inside(target, limits, home) for target in bench.targets())
+    assert all(is_inside(target, limits, home) for target in rig.targets())
 
 
 def test_a_drone_that_its_pilot_flew_out_of_the_limits_is_not_led_further() -> None:
-    bench = Bench(PX4, limits=FlightLimits(max_distance_m=50.0))
-    bench.vehicle.lift(10.0)
-    bench.vehicle.body.place = Location(80.0, 0.0, 10.0)
-    bench.ready()
-    assert bench.targets()
-    assert all(target.latitude == pytest.approx(50.0, abs=0.1) for target in bench.targets())
+    rig = Rig(PX4, limits=FlightLimits(max_distance_m=50.0))
+    rig.vehicle.lift(10.0)
+    rig.vehicle.body.place = Location(80.0, 0.0, 10.0)
+    rig.ready()
+    assert rig.targets()
+    assert all(target.latitude == pytest.approx(50.0, abs=0.1) for target in rig.targets())

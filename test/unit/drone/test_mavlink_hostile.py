@@ -11,7 +11,7 @@ import random
 import struct
 
 import pytest
-from mavlink_bench import ALL, ARDUPILOT, NONE, Bench, is_inside
+from mavlink_rig import ALL, ARDUPILOT, NONE, Rig, is_inside
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.interfaces import Location
@@ -76,84 +76,84 @@ def _decode(codec, kind, body: bytes) -> Message:
     return message
 
 
-def _hostile(bench: Bench, messages: int, seed: int, goals: bool) -> None:
+def _hostile(rig: Rig, messages: int, seed: int, goals: bool) -> None:
     rng = random.Random(seed)
     for number in range(messages):
-        bench.now_s += rng.choice([0.0, 0.001, 0.01, 0.1])
-        bench.pilot.on_message(_random_message(rng), bench.now_s)
+        rig.now_s += rng.choice([0.0, 0.001, 0.01, 0.1])
+        rig.pilot.on_message(_random_message(rng), rig.now_s)
         if number % 5 == 0:
             if goals:
                 goal = Location(*(rng.uniform(-700, 700) for _ in range(2)), rng.uniform(0, 80))
                 with contextlib.suppress(GoalRefused):
-                    bench.pilot.set_goal(goal, rng.random() < 0.3, bench.now_s)
-            bench.pilot.tick(bench.now_s)
-            bench.status()
-        bench.down.take()
+                    rig.pilot.set_goal(goal, rng.random() < 0.3, rig.now_s)
+            rig.pilot.tick(rig.now_s)
+            rig.status()
+        rig.down.take()
 
 
-def _flight_orders(bench: Bench) -> set[int]:
-    return set(bench.commands()) & FLIGHT_ORDERS
+def _flight_orders(rig: Rig) -> set[int]:
+    return set(rig.commands()) & FLIGHT_ORDERS
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_messages_crash_nothing_and_start_no_flight(seed: int) -> None:
-    bench = Bench(permissions=ALL)
-    _hostile(bench, messages=MESSAGES // 8, seed=seed, goals=False)
-    assert _flight_orders(bench) == set()
+    rig = Rig(permissions=ALL)
+    _hostile(rig, messages=MESSAGES // 8, seed=seed, goals=False)
+    assert _flight_orders(rig) == set()
 
 
 @pytest.mark.parametrize("seed", range(4, 8))
 def test_without_permission_random_messages_and_goals_never_arm_or_take_off(seed: int) -> None:
-    bench = Bench(permissions=NONE)
-    _hostile(bench, messages=MESSAGES // 8, seed=seed, goals=True)
-    assert _flight_orders(bench) <= {mavlink.MAV_CMD_NAV_LAND}
+    rig = Rig(permissions=NONE)
+    _hostile(rig, messages=MESSAGES // 8, seed=seed, goals=True)
+    assert _flight_orders(rig) <= {mavlink.MAV_CMD_NAV_LAND}
 
 
 def test_a_vehicle_survives_random_messages_on_the_ground() -> None:
-    bench = Bench(PX4).ready()
+    rig = Rig(PX4).ready()
     rng = random.Random(9)
     for _ in range(MESSAGES // 8):
-        bench.vehicle.on_message(_random_message(rng), bench.now_s)
-    bench.run(1.0)
-    assert bench.vehicle.body.place.distance_m(HOME) < 2e5
+        rig.vehicle.on_message(_random_message(rng), rig.now_s)
+    rig.run(1.0)
+    assert rig.vehicle.body.place.distance_m(HOME) < 2e5
 
 
-def lose_the_link(autopilot: Autopilot, seed: int) -> Bench:
+def lose_the_link(autopilot: Autopilot, seed: int) -> Rig:
     """Fly, lose the link at a random moment in one or both directions, wait for the end."""
     rng = random.Random(seed)
     limits = FlightLimits(max_height_m=20.0, max_distance_m=60.0, speed_m_s=4.0)
-    bench = Bench(autopilot, ALL, limits, node_id=rng.randrange(254)).ready()
+    rig = Rig(autopilot, ALL, limits, node_id=rng.randrange(254)).ready()
     for _ in range(3):
         goal = Location(rng.uniform(-40, 40), rng.uniform(-40, 40), rng.uniform(2, 20))
-        bench.goal(*goal, lands=rng.random() < 0.2)
-        bench.run(rng.uniform(0.0, 15.0))
-        if bench.status().why_not_fly:
+        rig.goal(*goal, lands=rng.random() < 0.2)
+        rig.run(rng.uniform(0.0, 15.0))
+        if rig.status().why_not_fly:
             break
-    bench.down.broken = rng.random() < 0.8
-    bench.up.broken = not bench.down.broken or rng.random() < 0.5
-    was_armed = bench.vehicle.body.armed
-    bench.down.sent.clear()
-    bench.run(12.0)  # the autopilot has noticed
-    assert bench.up.broken is False or not bench.status().is_flying
-    assert was_armed or not bench.vehicle.body.armed or not bench.down.broken
-    bench.down.broken = bench.up.broken = False
-    armed = bench.vehicle.body.armed
-    bench.run(8.0)
-    assert armed or not bench.vehicle.body.armed, "it armed after the link was lost"
-    return bench
+    rig.down.broken = rng.random() < 0.8
+    rig.up.broken = not rig.down.broken or rng.random() < 0.5
+    was_armed = rig.vehicle.body.armed
+    rig.down.sent.clear()
+    rig.run(12.0)  # the autopilot has noticed
+    assert rig.up.broken is False or not rig.status().is_flying
+    assert was_armed or not rig.vehicle.body.armed or not rig.down.broken
+    rig.down.broken = rig.up.broken = False
+    armed = rig.vehicle.body.armed
+    rig.run(8.0)
+    assert armed or not rig.vehicle.body.armed, "it armed after the link was lost"
+    return rig
 
 
-def check_after_loss(bench: Bench) -> None:
+def check_after_loss(rig: Rig) -> None:
     """The drone holds or lands, nothing is resumed, no target was outside the limits."""
-    assert all(is_inside(target, bench.limits, HOME) for target in bench.targets())
-    assert bench.vehicle.mode in (Mode.HOLD, Mode.FOLLOW, Mode.LAND)
-    before = bench.place
-    bench.run(3.0)
+    assert all(is_inside(target, rig.limits, HOME) for target in rig.targets())
+    assert rig.vehicle.mode in (Mode.HOLD, Mode.FOLLOW, Mode.LAND)
+    before = rig.place
+    rig.run(3.0)
     moved_m = Location(before.latitude, before.longitude, 0.0).distance_m(
-        bench.place._replace(height=0.0)
+        rig.place._replace(height=0.0)
     )
     assert moved_m < 0.1
-    assert bench.place.height <= before.height + 0.1
+    assert rig.place.height <= before.height + 0.1
 
 
 @pytest.mark.parametrize("seed", range(LOSSES // 2))
@@ -166,12 +166,12 @@ def test_a_link_lost_at_any_moment_ends_in_holding_or_landing(
 
 @pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)
 def test_messages_of_strangers_on_the_line_do_not_disturb_a_flight(autopilot: Autopilot) -> None:
-    bench = Bench(autopilot).ready()
-    bench.goal(20.0, 0.0, 5.0)
+    rig = Rig(autopilot).ready()
+    rig.goal(20.0, 0.0, 5.0)
     rng = random.Random(11)
     for _ in range(1000):
-        bench.step()
+        rig.step()
         message = _random_message(rng)
         if message.get_srcSystem() != 1:
-            bench.pilot.on_message(message, bench.now_s)
-    assert bench.place.distance_m(Location(20.0, 0.0, 5.0)) < 0.5
+            rig.pilot.on_message(message, rig.now_s)
+    assert rig.place.distance_m(Location(20.0, 0.0, 5.0)) < 0.5

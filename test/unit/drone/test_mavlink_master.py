@@ -6,7 +6,7 @@ import re
 from typing import Callable
 
 import pytest
-from mavlink_bench import ALL, ARDUPILOT, NONE, TARGET, Bench
+from mavlink_rig import ALL, ARDUPILOT, NONE, TARGET, Rig
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.interfaces import Location
@@ -19,17 +19,17 @@ from drone_mesh.errors import GoalRefused
 BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)
 
 
-def _in_the_air(autopilot: Autopilot, permissions: Permissions = ALL) -> Bench:
-    bench = Bench(autopilot, permissions)
-    bench.vehicle.lift(8.0)
-    return bench.ready()
+def _in_the_air(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
+    rig = Rig(autopilot, permissions)
+    rig.vehicle.lift(8.0)
+    return rig.ready()
 
 
-def _on_its_way(autopilot: Autopilot) -> Bench:
-    bench = _in_the_air(autopilot)
-    bench.goal(100.0, 0.0, 8.0)
-    bench.run_until("it is on its way", lambda: bench.place.latitude > 20.0)
-    return bench
+def _on_its_way(autopilot: Autopilot) -> Rig:
+    rig = _in_the_air(autopilot)
+    rig.goal(100.0, 0.0, 8.0)
+    rig.run_until("it is on its way", lambda: rig.place.latitude > 20.0)
+    return rig
 
 
 # What it may not do --------------------------------------------------------------------------
@@ -48,98 +48,98 @@ def test_without_a_permission_it_refuses_and_says_what_is_missing(
     autopilot: Autopilot, missing: str, why: str
 ) -> None:
     granted = {"may_arm": True, "may_take_off": True, "may_change_mode": True, missing: False}
-    bench = Bench(autopilot, Permissions(**granted))
-    bench.vehicle.choose_mode(Mode.HOLD)
-    bench.ready()
-    assert why in bench.status().why_not_fly
+    rig = Rig(autopilot, Permissions(**granted))
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.ready()
+    assert why in rig.status().why_not_fly
     with pytest.raises(GoalRefused, match=why):
-        bench.goal(10.0, 0.0, 5.0)
-    bench.run(10.0)
-    assert bench.commands() == []
-    assert not bench.vehicle.body.armed
-    assert bench.place.height == 0.0
+        rig.goal(10.0, 0.0, 5.0)
+    rig.run(10.0)
+    assert rig.commands() == []
+    assert not rig.vehicle.body.armed
+    assert rig.place.height == 0.0
 
 
 @BOTH
 def test_it_never_takes_control_from_a_pilot_who_flies_by_hand(autopilot: Autopilot) -> None:
-    bench = Bench(autopilot)
-    bench.vehicle.lift(8.0)
-    bench.vehicle.choose_mode(Mode.PILOT)
-    bench.ready()
-    assert "flown by its pilot" in bench.status().why_not_fly
+    rig = Rig(autopilot)
+    rig.vehicle.lift(8.0)
+    rig.vehicle.choose_mode(Mode.PILOT)
+    rig.ready()
+    assert "flown by its pilot" in rig.status().why_not_fly
     with pytest.raises(GoalRefused, match="flown by its pilot"):
-        bench.goal(10.0, 0.0, 8.0)
-    assert bench.commands() == []
+        rig.goal(10.0, 0.0, 8.0)
+    assert rig.commands() == []
 
 
 @BOTH
 def test_without_permissions_it_flies_when_the_pilot_hands_it_a_hovering_drone(
     autopilot: Autopilot,
 ) -> None:
-    bench = _in_the_air(autopilot, NONE)
-    assert "--may-change-mode" in bench.status().why_not_fly
-    bench.vehicle.choose_mode(Mode.FOLLOW)
-    bench.run(3.0)
-    assert bench.vehicle.mode is Mode.FOLLOW  # PX4 stays in it because targets arrive
-    assert bench.status().why_not_fly == ""
-    bench.goal(10.0, 0.0, 8.0)
-    bench.run_until("it is there", lambda: bench.place.distance_m(Location(10.0, 0.0, 8.0)) < 0.5)
-    assert bench.commands() == []
+    rig = _in_the_air(autopilot, NONE)
+    assert "--may-change-mode" in rig.status().why_not_fly
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run(3.0)
+    assert rig.vehicle.mode is Mode.FOLLOW  # PX4 stays in it because targets arrive
+    assert rig.status().why_not_fly == ""
+    rig.goal(10.0, 0.0, 8.0)
+    rig.run_until("it is there", lambda: rig.place.distance_m(Location(10.0, 0.0, 8.0)) < 0.5)
+    assert rig.commands() == []
 
 
 @BOTH
 def test_it_changes_the_mode_only_from_holding(autopilot: Autopilot) -> None:
-    bench = _in_the_air(autopilot, Permissions(may_change_mode=True))
-    bench.goal(10.0, 0.0, 8.0)
-    bench.reach(Phase.HOLDING)
-    assert set(bench.commands()) == {mavlink.MAV_CMD_DO_SET_MODE}
+    rig = _in_the_air(autopilot, Permissions(may_change_mode=True))
+    rig.goal(10.0, 0.0, 8.0)
+    rig.reach(Phase.HOLDING)
+    assert set(rig.commands()) == {mavlink.MAV_CMD_DO_SET_MODE}
 
 
 # What ends a flight --------------------------------------------------------------------------
 
 
-def _pilot_takes_over(bench: Bench) -> None:
-    bench.vehicle.choose_mode(Mode.PILOT)
+def _pilot_takes_over(rig: Rig) -> None:
+    rig.vehicle.choose_mode(Mode.PILOT)
 
 
-def _autopilot_goes_home(bench: Bench) -> None:
-    bench.vehicle.choose_mode(Mode.RETURN)
+def _autopilot_goes_home(rig: Rig) -> None:
+    rig.vehicle.choose_mode(Mode.RETURN)
 
 
-def _stick(bench: Bench) -> None:
-    bench.vehicle.faults.stick_us = 1700
+def _stick(rig: Rig) -> None:
+    rig.vehicle.faults.stick_us = 1700
 
 
-def _no_fix(bench: Bench) -> None:
-    bench.vehicle.faults.fix_type = 2
+def _no_fix(rig: Rig) -> None:
+    rig.vehicle.faults.fix_type = 2
 
 
-def _estimate(bench: Bench) -> None:
-    bench.vehicle.faults.estimate_good = False
+def _estimate(rig: Rig) -> None:
+    rig.vehicle.faults.estimate_good = False
 
 
-def _stale(bench: Bench) -> None:
-    bench.vehicle.faults.positions_stop = True
+def _stale(rig: Rig) -> None:
+    rig.vehicle.faults.positions_stop = True
 
 
-def _fence(bench: Bench) -> None:
-    bench.vehicle.faults.fence_breached = True
+def _fence(rig: Rig) -> None:
+    rig.vehicle.faults.fence_breached = True
 
 
-def _battery(bench: Bench) -> None:
-    bench.vehicle.body.battery_percent = 29.0
+def _battery(rig: Rig) -> None:
+    rig.vehicle.body.battery_percent = 29.0
 
 
-def _battery_unknown(bench: Bench) -> None:
-    bench.vehicle.faults.battery_known = False
+def _battery_unknown(rig: Rig) -> None:
+    rig.vehicle.faults.battery_known = False
 
 
-def _silence(bench: Bench) -> None:
-    bench.vehicle.faults.silent = True
+def _silence(rig: Rig) -> None:
+    rig.vehicle.faults.silent = True
 
 
-def _failsafe(bench: Bench) -> None:
-    bench.vehicle.in_failsafe = True
+def _failsafe(rig: Rig) -> None:
+    rig.vehicle.in_failsafe = True
 
 
 @BOTH
@@ -161,114 +161,114 @@ def _failsafe(bench: Bench) -> None:
 )
 def test_a_flight_ends_at_once_and_its_reason_is_logged(
     autopilot: Autopilot,
-    happens: Callable[[Bench], None],
+    happens: Callable[[Rig], None],
     why: str,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    bench = _on_its_way(autopilot)
-    where_m = bench.place.latitude
-    happens(bench)
-    bench.run_until("it let go", lambda: not bench.status().is_flying, within_s=4.0)
+    rig = _on_its_way(autopilot)
+    where_m = rig.place.latitude
+    happens(rig)
+    rig.run_until("it let go", lambda: not rig.status().is_flying, within_s=4.0)
     assert re.search(f"the flight ends: .*({why})", caplog.text)
-    bench.run(1.0)
-    assert bench.status().goal is None
+    rig.run(1.0)
+    assert rig.status().goal is None
     with pytest.raises(GoalRefused, match="the drone cannot fly: "):
-        bench.goal(50.0, 0.0, 8.0)
-    bench.run(10.0)
-    assert bench.place.latitude < where_m + 20.0
-    assert set(bench.commands()) <= {mavlink.MAV_CMD_DO_SET_MODE}  # that of the beginning
+        rig.goal(50.0, 0.0, 8.0)
+    rig.run(10.0)
+    assert rig.place.latitude < where_m + 20.0
+    assert set(rig.commands()) <= {mavlink.MAV_CMD_DO_SET_MODE}  # that of the beginning
 
 
 @BOTH
 def test_after_a_pilot_took_over_not_one_target_is_sent(autopilot: Autopilot) -> None:
-    bench = _on_its_way(autopilot)
-    bench.vehicle.choose_mode(Mode.PILOT)
-    bench.run_until("it noticed", lambda: not bench.status().is_flying, within_s=2.0)
-    bench.down.sent.clear()
-    bench.run(10.0)
-    targets = bench.targets()
+    rig = _on_its_way(autopilot)
+    rig.vehicle.choose_mode(Mode.PILOT)
+    rig.run_until("it noticed", lambda: not rig.status().is_flying, within_s=2.0)
+    rig.down.sent.clear()
+    rig.run(10.0)
+    targets = rig.targets()
     if autopilot is ARDUPILOT:
         assert targets == []
     else:  # PX4's pilot may hand it back only while targets arrive: to stay where it is
-        assert all(t.distance_m(bench.place) < 1.0 for t in targets)
+        assert all(t.distance_m(rig.place) < 1.0 for t in targets)
 
 
 @BOTH
 def test_handing_the_drone_back_does_not_resume_the_flight(autopilot: Autopilot) -> None:
-    bench = _on_its_way(autopilot)
-    bench.vehicle.choose_mode(Mode.HOLD)
-    bench.run(3.0)
-    place = bench.place
-    bench.vehicle.choose_mode(Mode.FOLLOW)
-    bench.run(20.0)
-    assert bench.status().phase in (Phase.IDLE, Phase.HOLDING)
-    assert bench.place.distance_m(place) < 1.0
-    assert bench.status().why_not_fly == ""
+    rig = _on_its_way(autopilot)
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.run(3.0)
+    place = rig.place
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run(20.0)
+    assert rig.status().phase in (Phase.IDLE, Phase.HOLDING)
+    assert rig.place.distance_m(place) < 1.0
+    assert rig.status().why_not_fly == ""
 
 
 def test_an_autopilot_that_refuses_to_arm_ends_the_flight() -> None:
-    bench = Bench()
-    bench.vehicle.faults.refuses_to_arm = True
-    bench.ready()
-    bench.goal(10.0, 0.0, 5.0)
-    bench.run_until("it gave up", lambda: not bench.status().is_flying, within_s=10.0)
-    assert not bench.vehicle.body.armed
-    assert bench.place.height == 0.0
+    rig = Rig()
+    rig.vehicle.faults.refuses_to_arm = True
+    rig.ready()
+    rig.goal(10.0, 0.0, 5.0)
+    rig.run_until("it gave up", lambda: not rig.status().is_flying, within_s=10.0)
+    assert not rig.vehicle.body.armed
+    assert rig.place.height == 0.0
 
 
 @BOTH
 def test_when_the_program_dies_in_flight_the_autopilot_lands_the_drone(
     autopilot: Autopilot,
 ) -> None:
-    bench = _on_its_way(autopilot)
-    bench.down.broken = True
-    bench.run(60.0)
-    assert bench.vehicle.mode is Mode.LAND
-    assert bench.place.height == 0.0
+    rig = _on_its_way(autopilot)
+    rig.down.broken = True
+    rig.run(60.0)
+    assert rig.vehicle.mode is Mode.LAND
+    assert rig.place.height == 0.0
 
 
 # Where it is ---------------------------------------------------------------------------------
 
 
 def test_without_a_vehicle_it_says_so_and_sends_only_heartbeats() -> None:
-    bench = Bench()
-    bench.vehicle.faults.silent = True
-    bench.run(20.0)
-    assert bench.status().why_not_fly.startswith("no heartbeat")
-    assert bench.status().location is None
-    assert {m.get_type() for m in bench.down.sent} == {"HEARTBEAT"}
+    rig = Rig()
+    rig.vehicle.faults.silent = True
+    rig.run(20.0)
+    assert rig.status().why_not_fly.startswith("no heartbeat")
+    assert rig.status().location is None
+    assert {m.get_type() for m in rig.down.sent} == {"HEARTBEAT"}
 
 
 def test_a_home_far_from_the_origin_is_refused() -> None:
-    bench = Bench()
-    bench.vehicle.home = type(bench.vehicle.home)(51.9, 4.5, 0.0)  # Rotterdam, not Utrecht
-    bench.ready()
-    assert bench.status().why_not_fly == "its home is more than 5 km from --origin"
+    rig = Rig()
+    rig.vehicle.home = type(rig.vehicle.home)(51.9, 4.5, 0.0)  # Rotterdam, not Utrecht
+    rig.ready()
+    assert rig.status().why_not_fly == "its home is more than 5 km from --origin"
 
 
 def test_a_plane_or_a_ground_station_is_not_taken_for_a_drone() -> None:
-    bench = Bench()
-    bench.vehicle.faults.silent = True
+    rig = Rig()
+    rig.vehicle.faults.silent = True
     for kind, autopilot in (
         (mavlink.MAV_TYPE_FIXED_WING, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA),
         (mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID),
     ):
-        bench.up.send(mavlink.MAVLink_heartbeat_message(kind, autopilot, 0, 0, 0, 3))
-    bench.run(1.0)
-    assert bench.status().autopilot == ""
+        rig.up.send(mavlink.MAVLink_heartbeat_message(kind, autopilot, 0, 0, 0, 3))
+    rig.run(1.0)
+    assert rig.status().autopilot == ""
 
 
 def test_a_second_vehicle_on_the_line_is_ignored() -> None:
-    bench = _in_the_air(ARDUPILOT)
+    rig = _in_the_air(ARDUPILOT)
     other = mavlink.MAVLink(None, 2, 1)
     codec = mavlink.MAVLink(None)
     stranger = mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, 0, 0, 5, 3
     )
     (heard,) = codec.parse_buffer(stranger.pack(other))
-    before = bench.status()
-    bench.pilot.on_message(heard, bench.now_s)
-    assert bench.status() == before
+    before = rig.status()
+    rig.pilot.on_message(heard, rig.now_s)
+    assert rig.status() == before
 
 
 # Parameters ----------------------------------------------------------------------------------
@@ -276,9 +276,9 @@ def test_a_second_vehicle_on_the_line_is_ignored() -> None:
 
 @BOTH
 def test_a_safe_set_of_parameters_raises_no_complaint(autopilot: Autopilot) -> None:
-    bench = Bench(autopilot).ready()
-    bench.run(10.0)
-    assert bench.status().complaints == ()
+    rig = Rig(autopilot).ready()
+    rig.run(10.0)
+    assert rig.status().complaints == ()
 
 
 @pytest.mark.parametrize(
@@ -295,21 +295,21 @@ def test_a_safe_set_of_parameters_raises_no_complaint(autopilot: Autopilot) -> N
 def test_a_parameter_that_is_not_safe_is_named(
     autopilot: Autopilot, name: str, value: float, complaint: str
 ) -> None:
-    bench = Bench(autopilot)
-    bench.vehicle.parameters[name] = value
-    bench.ready()
-    bench.run(15.0)
-    (told,) = bench.status().complaints
+    rig = Rig(autopilot)
+    rig.vehicle.parameters[name] = value
+    rig.ready()
+    rig.run(15.0)
+    (told,) = rig.status().complaints
     assert told.startswith(complaint)
 
 
 def test_the_charge_may_be_unknown_when_no_least_charge_is_asked_for() -> None:
-    bench = Bench(limits=FlightLimits(min_battery_percent=0.0))
-    bench.vehicle.faults.battery_known = False
-    assert bench.ready().status().why_not_fly == ""
+    rig = Rig(limits=FlightLimits(min_battery_percent=0.0))
+    rig.vehicle.faults.battery_known = False
+    assert rig.ready().status().why_not_fly == ""
 
 
 def test_every_target_is_a_position_alone() -> None:
-    bench = _on_its_way(ARDUPILOT)
-    masks = {m.type_mask for m in bench.down.sent if m.get_type() == TARGET}
+    rig = _on_its_way(ARDUPILOT)
+    masks = {m.type_mask for m in rig.down.sent if m.get_type() == TARGET}
     assert masks == {0b110111111000}

@@ -46,7 +46,7 @@ class Mesh(IMeshNetwork):
         raise AssertionError("a radio is not registered anywhere")
 
 
-class Bench:
+class Rig:
     """Radios in a row, at given places on x."""
 
     def __init__(self, *places_m, links=None, settings=None):
@@ -77,69 +77,69 @@ def packet(sender, to, filling=0x55):
 
 
 def test_a_packet_takes_two_frames_and_the_time_of_the_radio():
-    bench = Bench(0.0, 6.0)
-    assert bench.antennas[0].send_message_to(packet(0, 1))
-    bench.run(1.0)
-    ((heard_s, payload),) = bench.meshes[1].heard
+    rig = Rig(0.0, 6.0)
+    assert rig.antennas[0].send_message_to(packet(0, 1))
+    rig.run(1.0)
+    ((heard_s, payload),) = rig.meshes[1].heard
     assert payload == packet(0, 1)
     # docs/radio.md: 505 us to let an acknowledgement out, 130 us settling, 1316 us of data
     assert heard_s == pytest.approx(505e-6 + 130e-6 + 1316e-6, abs=200e-6)
-    assert bench.air.frames == 2
-    assert bench.air.airtime_s == pytest.approx(1316e-6 + 292e-6)
+    assert rig.air.frames == 2
+    assert rig.air.airtime_s == pytest.approx(1316e-6 + 292e-6)
 
 
 def test_a_broadcast_is_one_frame_and_each_receiver_finds_its_own_id_in_byte_3():
-    bench = Bench(0.0, 6.0, 8.0, 20.0)
-    bench.antennas[0].broadcast_message(packet(0, 254))
-    bench.run(1.0)
-    assert bench.air.frames == 1
-    heard = [[payload[3] for _, payload in mesh.heard] for mesh in bench.meshes]
+    rig = Rig(0.0, 6.0, 8.0, 20.0)
+    rig.antennas[0].broadcast_message(packet(0, 254))
+    rig.run(1.0)
+    assert rig.air.frames == 1
+    heard = [[payload[3] for _, payload in mesh.heard] for mesh in rig.meshes]
     assert heard == [[], [1], [2], []]
 
 
 def test_a_lost_acknowledgement_costs_a_frame_and_no_second_delivery():
-    bench = Bench(0.0, 6.0)
+    rig = Rig(0.0, 6.0)
     lost = []
-    bench.loses = lambda hop: hop.packet is None and not lost and not lost.append(hop)
-    bench.antennas[0].send_message_to(packet(0, 1))
-    bench.run(1.0)
-    assert len(bench.meshes[1].heard) == 1
-    assert bench.air.frames == 4
-    assert bench.meshes[0].undelivered == []
+    rig.loses = lambda hop: hop.packet is None and not lost and not lost.append(hop)
+    rig.antennas[0].send_message_to(packet(0, 1))
+    rig.run(1.0)
+    assert len(rig.meshes[1].heard) == 1
+    assert rig.air.frames == 4
+    assert rig.meshes[0].undelivered == []
 
 
 def test_the_mesh_learns_after_how_many_tries_a_packet_was_delivered():
-    bench = Bench(0.0, 6.0)
+    rig = Rig(0.0, 6.0)
     lost = []
-    bench.loses = lambda hop: len(lost) < 5 and not lost.append(hop)
-    bench.antennas[0].broadcast_message(packet(0, 254))
-    bench.antennas[0].send_message_to(packet(0, 1))
-    bench.run(2.0)
-    assert bench.meshes[0].delivered == [(1, 3)]  # two frames per try
+    rig.loses = lambda hop: len(lost) < 5 and not lost.append(hop)
+    rig.antennas[0].broadcast_message(packet(0, 254))
+    rig.antennas[0].send_message_to(packet(0, 1))
+    rig.run(2.0)
+    assert rig.meshes[0].delivered == [(1, 3)]  # two frames per try
 
 
 def test_a_receiver_that_is_gone_costs_18_frames_and_is_reported():
-    bench = Bench(0.0, 20.0)
-    bench.antennas[0].send_message_to(packet(0, 1))
-    bench.run(12.0)
-    assert bench.air.frames == 18
-    assert bench.meshes[0].undelivered == [packet(0, 1)]
+    rig = Rig(0.0, 20.0)
+    rig.antennas[0].send_message_to(packet(0, 1))
+    rig.run(12.0)
+    assert rig.air.frames == 18
+    assert rig.meshes[0].undelivered == [packet(0, 1)]
 
 
 def test_two_that_cannot_hear_each_other_both_reach_a_third():
-    bench = Bench(0.0, 8.0, 16.0)
+    rig = Rig(0.0, 8.0, 16.0)
     for round_number in range(20):
         for sender in (0, 2):
-            bench.antennas[sender].send_message_to(packet(sender, 1, round_number))
-        bench.run(3.0)
-    assert bench.air.collisions > 0
+            rig.antennas[sender].send_message_to(packet(sender, 1, round_number))
+        rig.run(3.0)
+    assert rig.air.collisions > 0
     for sender in (0, 2):
-        got = [p[5] for _, p in bench.meshes[1].heard if p[0] == sender]
+        got = [p[5] for _, p in rig.meshes[1].heard if p[0] == sender]
         assert got == list(range(20))
 
 
 def test_a_frame_survives_one_that_is_weaker_by_the_capture_ratio():
-    near_and_far = Bench(1.0, 0.0, -8.9)  # 19 dB apart at node 1
+    near_and_far = Rig(1.0, 0.0, -8.9)  # 19 dB apart at node 1
     for sender in (0, 2):
         near_and_far.antennas[sender].send_message_to(packet(sender, 1))
     near_and_far.run(0.0025)  # the first frame of both, which began at the same moment
@@ -147,26 +147,26 @@ def test_a_frame_survives_one_that_is_weaker_by_the_capture_ratio():
 
 
 def test_a_radio_is_deaf_while_it_sends():
-    bench = Bench(0.0, 6.0)
+    rig = Rig(0.0, 6.0)
     for sender in (0, 1):
-        bench.antennas[sender].send_message_to(packet(sender, 1 - sender))
-    bench.run(0.004)
-    assert [mesh.heard for mesh in bench.meshes] == [[], []]
-    bench.run(3.0)
-    assert [len(mesh.heard) for mesh in bench.meshes] == [1, 1]
+        rig.antennas[sender].send_message_to(packet(sender, 1 - sender))
+    rig.run(0.004)
+    assert [mesh.heard for mesh in rig.meshes] == [[], []]
+    rig.run(3.0)
+    assert [len(mesh.heard) for mesh in rig.meshes] == [1, 1]
 
 
 def test_a_radio_without_power_neither_sends_nor_hears():
-    bench = Bench(0.0, 6.0)
-    bench.antennas[1].switch_power(False)
-    assert not bench.antennas[1].send_message_to(packet(1, 0))
-    bench.antennas[0].send_message_to(packet(0, 1))
-    bench.run(12.0)
-    assert bench.meshes[1].heard == []
-    bench.antennas[1].switch_power(True)
-    bench.antennas[0].send_message_to(packet(0, 1))
-    bench.run(1.0)
-    assert len(bench.meshes[1].heard) == 1
+    rig = Rig(0.0, 6.0)
+    rig.antennas[1].switch_power(False)
+    assert not rig.antennas[1].send_message_to(packet(1, 0))
+    rig.antennas[0].send_message_to(packet(0, 1))
+    rig.run(12.0)
+    assert rig.meshes[1].heard == []
+    rig.antennas[1].switch_power(True)
+    rig.antennas[0].send_message_to(packet(0, 1))
+    rig.run(1.0)
+    assert len(rig.meshes[1].heard) == 1
 
 
 def test_an_unknown_radio_or_rate_is_refused():

@@ -67,7 +67,7 @@ def deadly_once(record):
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Callable[..., Path]:
+def experiment(tmp_path: Path) -> Callable[..., Path]:
     (tmp_path / "own_lab_parts.py").write_text(OWN)
 
     def write(added: str = "", text: str = SMALL) -> Path:
@@ -93,10 +93,10 @@ def measured(folder: Path) -> bytes:
 
 
 def test_a_run_gives_one_tidy_row_per_run_in_the_order_of_the_plan(
-    bench: Callable[..., Path], tmp_path: Path
+    experiment: Callable[..., Path], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    assert run(bench(), out) == 0
+    assert run(experiment(), out) == 0
     rows = read_rows(out / "runs.csv")
     plan = list(csv.DictReader((out / "plan.csv").open()))
     assert [row["run"] for row in rows] == [row["run"] for row in plan]
@@ -114,10 +114,10 @@ def test_a_run_gives_one_tidy_row_per_run_in_the_order_of_the_plan(
 
 @pytest.mark.slow
 def test_a_second_run_does_only_what_is_missing(
-    bench: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    experiment: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
-    path = bench()
+    path = experiment()
     run(path, out, "seeds=2")
     done: list[str] = []
 
@@ -136,9 +136,9 @@ def test_a_second_run_does_only_what_is_missing(
 
 @pytest.mark.slow
 def test_rows_are_the_same_bytes_with_and_without_interruption(
-    bench: Callable[..., Path], tmp_path: Path
+    experiment: Callable[..., Path], tmp_path: Path
 ) -> None:
-    path = bench()
+    path = experiment()
     run(path, tmp_path / "whole")
     out = tmp_path / "parts"
     run(path, out, "seeds=1")
@@ -150,8 +150,8 @@ def test_rows_are_the_same_bytes_with_and_without_interruption(
 
 
 @pytest.mark.slow
-def test_shards_together_are_the_whole(bench: Callable[..., Path], tmp_path: Path) -> None:
-    path = bench()
+def test_shards_together_are_the_whole(experiment: Callable[..., Path], tmp_path: Path) -> None:
+    path = experiment()
     run(path, tmp_path / "whole")
     shards = [tmp_path / f"shard{index}" for index in range(3)]
     for index, shard in enumerate(shards):
@@ -164,20 +164,20 @@ def test_shards_together_are_the_whole(bench: Callable[..., Path], tmp_path: Pat
 
 @pytest.mark.slow
 def test_shards_of_different_experiments_are_not_merged(
-    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run(bench(), tmp_path / "a", "seeds=1")
-    run(bench(), tmp_path / "b", "seeds=2")
+    run(experiment(), tmp_path / "a", "seeds=1")
+    run(experiment(), tmp_path / "b", "seeds=2")
     assert lab("merge", tmp_path / "all", tmp_path / "a", tmp_path / "b") == 1
     assert "different experiments" in capsys.readouterr().err
 
 
 def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_continue(
-    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = SMALL.replace("[0, 0.2]", "[0]") + "metrics: ['own_lab_parts:boom']\n"
     out = tmp_path / "out"
-    assert run(bench(text=text), out) == 1
+    assert run(experiment(text=text), out) == 1
     failures = read_rows(out / "failures.csv")
     assert len(failures) == 4
     first = failures[0]
@@ -186,39 +186,41 @@ def test_a_failing_run_is_a_failure_with_traceback_and_command_and_the_others_co
     assert first["command"] == f"python3 -m drone_mesh.lab show {out} {first['run']}"
     assert "ValueError" in (out / "logs" / f"{first['run']}.txt").read_text()
     assert "4 failed" in capsys.readouterr().out
-    assert run(bench(text=text), out) == 0  # failures are not missing
-    assert run(bench(text=text), out, "--retry-failed") == 1
+    assert run(experiment(text=text), out) == 0  # failures are not missing
+    assert run(experiment(text=text), out, "--retry-failed") == 1
 
 
 @pytest.mark.slow
-def test_an_endless_run_is_a_timeout(bench: Callable[..., Path], tmp_path: Path) -> None:
+def test_an_endless_run_is_a_timeout(experiment: Callable[..., Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
     added = "metrics: ['own_lab_parts:endless']\ntimeout_s: 0.5\n"
-    run(bench(added), out, "seeds=1", "sweep.radio.loss=[0]")
+    run(experiment(added), out, "seeds=1", "sweep.radio.loss=[0]")
     (failure,) = read_rows(out / "failures.csv")
     assert failure["kind"] == "timeout"
     assert failure["message"] == "still running after 0.5 s of wall time"
 
 
-def test_a_metric_of_the_users_is_a_column(bench: Callable[..., Path], tmp_path: Path) -> None:
-    run(bench("metrics: ['own_lab_parts:drones']\n"), tmp_path / "out", "seeds=1")
+def test_a_metric_of_the_users_is_a_column(experiment: Callable[..., Path], tmp_path: Path) -> None:
+    run(experiment("metrics: ['own_lab_parts:drones']\n"), tmp_path / "out", "seeds=1")
     assert {row["drones"] for row in read_rows(tmp_path / "out/runs.csv")} == {"3"}
 
 
 @pytest.mark.slow
 def test_seeds_are_added_until_the_interval_is_narrow(
-    bench: Callable[..., Path], tmp_path: Path
+    experiment: Callable[..., Path], tmp_path: Path
 ) -> None:
     stop = "stop: {metric: packets, relative_half_width: 0.00001, max_seeds: 10}\n"
-    run(bench(stop), tmp_path / "never", "sweep.radio.loss=[0.2]")
+    run(experiment(stop), tmp_path / "never", "sweep.radio.loss=[0.2]")
     assert len(read_rows(tmp_path / "never/runs.csv")) == 10
     stop = "stop: {metric: packets, relative_half_width: 0.9, max_seeds: 10}\n"
-    run(bench(stop), tmp_path / "soon", "sweep.radio.loss=[0.2]")
+    run(experiment(stop), tmp_path / "soon", "sweep.radio.loss=[0.2]")
     assert len(read_rows(tmp_path / "soon/runs.csv")) == 4
 
 
-def test_two_runs_in_one_folder_are_refused(bench: Callable[..., Path], tmp_path: Path) -> None:
-    plan = Plan(load_experiment(bench()))
+def test_two_runs_in_one_folder_are_refused(
+    experiment: Callable[..., Path], tmp_path: Path
+) -> None:
+    plan = Plan(load_experiment(experiment()))
     first = Store(tmp_path / "out", plan)
     with pytest.raises(StoreError, match=f"process {os.getpid()} on .* is writing there"):
         Store(tmp_path / "out", plan)
@@ -227,24 +229,24 @@ def test_two_runs_in_one_folder_are_refused(bench: Callable[..., Path], tmp_path
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_runs(
-    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert run(bench(), tmp_path / "file" / "out") == 1
+    assert run(experiment(), tmp_path / "file" / "out") == 1
     assert "Not a directory; what was written before is kept" in capsys.readouterr().err
 
 
-def test_a_bad_experiment_writes_nothing(bench: Callable[..., Path], tmp_path: Path) -> None:
-    assert run(bench("seds: 3\n"), tmp_path / "out") == 1
+def test_a_bad_experiment_writes_nothing(experiment: Callable[..., Path], tmp_path: Path) -> None:
+    assert run(experiment("seds: 3\n"), tmp_path / "out") == 1
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
 def test_a_full_disk_ends_the_run_and_loses_nothing(
-    bench: Callable[..., Path], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    experiment: Callable[..., Path], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """A limit on the size of files stands for the disk: a write fails in the same way."""
-    path, out = bench(), tmp_path / "out"
+    path, out = experiment(), tmp_path / "out"
     run(path, tmp_path / "whole")
     size = (tmp_path / "whole/runs.csv").stat().st_size
 
@@ -306,10 +308,10 @@ def address_of(scheduler_file: Path) -> str:
 
 
 @pytest.fixture
-def slow(bench: Callable[..., Path]) -> Path:
+def slow(experiment: Callable[..., Path]) -> Path:
     """48 runs of a tenth of a second."""
     text = SMALL.replace("seeds: 4", "seeds: 24") + "metrics: ['own_lab_parts:slow']\n"
-    return bench(text=text)
+    return experiment(text=text)
 
 
 @pytest.fixture
@@ -321,9 +323,9 @@ def slow_rows(slow: Path, tmp_path: Path) -> bytes:
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", ["1", "2", "4"])
 def test_any_number_of_workers_writes_the_same_bytes(
-    bench: Callable[..., Path], tmp_path: Path, workers: str
+    experiment: Callable[..., Path], tmp_path: Path, workers: str
 ) -> None:
-    path = bench()
+    path = experiment()
     run(path, tmp_path / "reference")
     process = start(path, tmp_path / "out", "--workers", workers)
     output = finish(process)
@@ -346,11 +348,11 @@ def test_a_killed_client_loses_nothing(slow: Path, slow_rows: bytes, tmp_path: P
 
 @pytest.mark.slow
 def test_a_killed_worker_loses_nothing(
-    bench: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    experiment: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One run kills its own worker, the first time it is executed."""
     marker = tmp_path / "marker"
-    path = bench("metrics: ['own_lab_parts:deadly_once']\n")
+    path = experiment("metrics: ['own_lab_parts:deadly_once']\n")
     process = start(path, tmp_path / "out", "--workers", "2", LAB_TEST_MARKER=str(marker))
     output = finish(process)
     assert process.returncode == 0, output
@@ -362,9 +364,9 @@ def test_a_killed_worker_loses_nothing(
 
 @pytest.mark.slow
 def test_a_run_that_always_kills_its_worker_is_a_failure_and_the_others_continue(
-    bench: Callable[..., Path], tmp_path: Path
+    experiment: Callable[..., Path], tmp_path: Path
 ) -> None:
-    path = bench("metrics: ['own_lab_parts:deadly']\n")
+    path = experiment("metrics: ['own_lab_parts:deadly']\n")
     process = start(path, tmp_path / "out", "--workers", "1", "seeds=1", "sweep.radio.loss=[0]")
     output = finish(process)
     assert process.returncode == 1, output
@@ -436,7 +438,7 @@ def namespaces() -> Iterator[list[tuple[str, str]]]:
 
 @pytest.mark.slow
 def test_workers_in_two_network_namespaces_share_a_batch(
-    bench: Callable[..., Path], tmp_path: Path, namespaces: list[tuple[str, str]]
+    experiment: Callable[..., Path], tmp_path: Path, namespaces: list[tuple[str, str]]
 ) -> None:
     text = SMALL.replace("seeds: 4", "seeds: 30") + "metrics: ['own_lab_parts:namespace']\n"
     address_file = tmp_path / "scheduler.json"
@@ -458,7 +460,9 @@ def test_workers_in_two_network_namespaces_share_a_batch(
                      "--no-dashboard", "--no-nanny"], **quiet,
                 )
             )  # fmt: skip
-        process = start(bench(text=text), tmp_path / "out", "--cluster", f"tcp://127.0.0.1:{port}")
+        process = start(
+            experiment(text=text), tmp_path / "out", "--cluster", f"tcp://127.0.0.1:{port}"
+        )
         output = finish(process)
         assert process.returncode == 0, output
     finally:
@@ -539,8 +543,8 @@ def test_ctrl_c_keeps_everything_and_prints_how_to_continue(
     assert measured(out) == slow_rows
 
 
-def test_a_campaign_counts_what_it_did(bench: Callable[..., Path], tmp_path: Path) -> None:
-    campaign = Campaign(load_experiment(bench()), tmp_path / "out", ["lab"])
+def test_a_campaign_counts_what_it_did(experiment: Callable[..., Path], tmp_path: Path) -> None:
+    campaign = Campaign(load_experiment(experiment()), tmp_path / "out", ["lab"])
     campaign.run(0, None, stream=(tmp_path / "log").open("w"))
     assert (campaign.completed, campaign.failures) == (8, 0)
 
@@ -553,9 +557,9 @@ def test_a_results_folder_is_needed_to_repeat_a_run(
 
 
 def test_show_repeats_exactly_that_run(
-    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run(bench(), tmp_path / "out", "seeds=1")
+    run(experiment(), tmp_path / "out", "seeds=1")
     row = read_rows(tmp_path / "out/runs.csv")[1]
     capsys.readouterr()
     assert lab("show", tmp_path / "out", row["run"][:6]) == 0
@@ -565,9 +569,9 @@ def test_show_repeats_exactly_that_run(
 
 
 def test_show_says_why_the_run_differs(
-    bench: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    experiment: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run(bench(), tmp_path / "out", "seeds=1")
+    run(experiment(), tmp_path / "out", "seeds=1")
     runs = tmp_path / "out/runs.csv"
     row = read_rows(runs)[0]
     runs.write_text(runs.read_text().replace(f"{row['event_hash']},{row['code']}", "0,older"))
@@ -575,8 +579,8 @@ def test_show_says_why_the_run_differs(
     assert "the row was computed by code older" in capsys.readouterr().out
 
 
-def test_an_unknown_run_is_named(bench: Callable[..., Path], tmp_path: Path) -> None:
-    run(bench(), tmp_path / "out", "seeds=1")
+def test_an_unknown_run_is_named(experiment: Callable[..., Path], tmp_path: Path) -> None:
+    run(experiment(), tmp_path / "out", "seeds=1")
     from drone_mesh.lab.results import load_results
 
     with pytest.raises(ConfigurationError, match="0 runs of the plan begin with zzz"):

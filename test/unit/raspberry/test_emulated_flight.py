@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drone"))
-from mavlink_bench import ALL, ORIGIN, Wire
+from mavlink_rig import ALL, ORIGIN, Wire
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.communication.assembly import assemble_component

@@ -18,7 +18,7 @@ from drone_mesh.nrf24.registers import Register
 from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 from drone_mesh.raspberry import radio_tests
-from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.options import parse_gateway
 from drone_mesh.raspberry.radio_command import main
 
@@ -34,69 +34,69 @@ class NoWire:
         """Nothing is held."""
 
 
-class Bench:
+class Rig:
     def __init__(self) -> None:
         self.clock = WallClock()
         self.air = Air(self.clock, LogDistance(random.Random(1)), random.Random(2))
         self.chip = EmulatedChip(self.air, "radio")
         self.radio = self.make(self.chip, 253)
 
-    def make(self, chip: EmulatedChip, node_id: int, ce=None) -> BenchRadio:
-        return BenchRadio(chip.spi, ce or chip.ce, node_id, SETTINGS, self.clock.runtime)
+    def make(self, chip: EmulatedChip, node_id: int, ce=None) -> FieldRadio:
+        return FieldRadio(chip.spi, ce or chip.ce, node_id, SETTINGS, self.clock.runtime)
 
     def check(self) -> list[str]:
         return list(radio_tests.check(self.radio, self.chip.irq))
 
 
 @pytest.fixture
-def bench() -> Iterator[Bench]:
-    bench = Bench()
-    yield bench
-    bench.clock.close()
+def rig() -> Iterator[Rig]:
+    rig = Rig()
+    yield rig
+    rig.clock.close()
 
 
-def test_a_good_radio_passes_every_check(bench):
-    lines = bench.check()
+def test_a_good_radio_passes_every_check(rig):
+    lines = rig.check()
     assert len(lines) == 5
     assert all(line.startswith("ok ") for line in lines)
-    assert bench.chip.warnings == []
+    assert rig.chip.warnings == []
 
 
-def test_without_a_chip_the_wiring_is_named(bench):
-    bench.chip.faults.miso_stuck_at = 0xFF
+def test_without_a_chip_the_wiring_is_named(rig):
+    rig.chip.faults.miso_stuck_at = 0xFF
     with pytest.raises(RadioError, match="no nRF24L01.* answers on SPI .*check the wiring"):
-        bench.check()
+        rig.check()
 
 
-def test_a_ce_pin_that_is_not_wired_is_named(bench, monkeypatch):
-    monkeypatch.setattr("drone_mesh.raspberry.bench_radio.SEND_WITHIN_S", 0.02)
-    bench.radio = bench.make(bench.chip, 253, NoWire())
+def test_a_ce_pin_that_is_not_wired_is_named(rig, monkeypatch):
+    monkeypatch.setattr("drone_mesh.raspberry.field_radio.SEND_WITHIN_S", 0.02)
+    rig.radio = rig.make(rig.chip, 253, NoWire())
     with pytest.raises(RadioError, match="is CE wired"):
-        bench.check()
+        rig.check()
 
 
-def test_a_supply_that_dips_while_it_sends_is_named(bench):
-    lines = radio_tests.check(bench.radio, None)
+def test_a_supply_that_dips_while_it_sends_is_named(rig):
+    lines = radio_tests.check(rig.radio, None)
     for line in lines:
         if line.startswith("ok   CE"):
             break
-    register = bench.radio.link.read_byte(Register.SETUP_AW)
-    bench.radio.link.write_byte(Register.RX_PW_P1, 0)  # what a brown-out leaves behind
+    register = rig.radio.link.read_byte(Register.SETUP_AW)
+    rig.radio.link.write_byte(Register.RX_PW_P1, 0)  # what a brown-out leaves behind
     assert register == 3
     with pytest.raises(RadioError, match="supply: RX_PW_P1 lost its setting .*capacitor"):
         list(lines)
 
 
 @pytest.mark.parametrize(("level", "said"), [(False, "low although"), (True, "never falls")])
-def test_an_irq_pin_that_is_stuck_is_named(bench, level, said):
-    bench.chip.faults.irq_stuck_at = level
-    assert said in bench.check()[-1]
+def test_an_irq_pin_that_is_stuck_is_named(rig, level, said):
+    rig.chip.faults.irq_stuck_at = level
+    assert said in rig.check()[-1]
 
 
-def test_a_scan_shows_where_another_radio_sends(bench):
-    other = bench.make(EmulatedChip(bench.air, "other", (3.0, 0.0, 0.0)), 7)
+def test_a_scan_shows_where_another_radio_sends(rig):
+    other = rig.make(EmulatedChip(rig.air, "other", (3.0, 0.0, 0.0)), 7)
     other.set_up()
-    bench.radio.set_up()
+    rig.radio.set_up()
     ended = threading.Event()
 
     def send() -> None:
@@ -106,15 +106,15 @@ def test_a_scan_shows_where_another_radio_sends(bench):
     sender = threading.Thread(target=send)
     sender.start()
     try:
-        heard = sum(bench.radio.hears_carrier(SETTINGS.channel) for _ in range(300))
-        elsewhere = sum(bench.radio.hears_carrier(90) for _ in range(50))
+        heard = sum(rig.radio.hears_carrier(SETTINGS.channel) for _ in range(300))
+        elsewhere = sum(rig.radio.hears_carrier(90) for _ in range(50))
     finally:
         ended.set()
         sender.join()
     assert heard > 0
     assert elsewhere == 0
-    bench.radio.back_to_channel()
-    assert bench.radio.link.read_byte(Register.RF_CH) == SETTINGS.channel
+    rig.radio.back_to_channel()
+    assert rig.radio.link.read_byte(Register.RF_CH) == SETTINGS.channel
 
 
 def test_the_channels_suggested_are_quiet_apart_and_in_the_band():
@@ -156,17 +156,17 @@ class BusyMachine:
         self._waited_s += 1.0
 
 
-def test_a_machine_that_is_busy_while_a_packet_is_sent_is_no_fault_of_the_radio(bench):
-    bench.radio.set_up()
-    bench.radio.runtime = BusyMachine(bench.radio.runtime)
-    assert not bench.radio.send(SETTINGS.node_address(5), bytes(32)).acknowledged
+def test_a_machine_that_is_busy_while_a_packet_is_sent_is_no_fault_of_the_radio(rig):
+    rig.radio.set_up()
+    rig.radio.runtime = BusyMachine(rig.radio.runtime)
+    assert not rig.radio.send(SETTINGS.node_address(5), bytes(32)).acknowledged
 
 
-def test_what_is_heard_is_decoded(bench):
-    other = bench.make(EmulatedChip(bench.air, "other", (3.0, 0.0, 0.0)), 7)
+def test_what_is_heard_is_decoded(rig):
+    other = rig.make(EmulatedChip(rig.air, "other", (3.0, 0.0, 0.0)), 7)
     other.set_up()
     heard: list[str] = []
-    lines = radio_tests.listen(bench.radio, lambda: bool(heard))
+    lines = radio_tests.listen(rig.radio, lambda: bool(heard))
     sender = threading.Timer(
         0.3, other.broadcast, [IntroduceMessage(7, 7, 254, 254, 2, True).to_payload()]
     )

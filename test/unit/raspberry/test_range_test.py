@@ -19,7 +19,7 @@ from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.settings import BroadcastMode, DataRate, RadioSettings
 from drone_mesh.raspberry import range_test
-from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.field_radio import FieldRadio
 
 BASE = RadioSettings()
 AT_1M = dataclasses.replace(BASE, data_rate=DataRate.MBPS_1)
@@ -35,12 +35,12 @@ class Pair:
         self.near = self.radio(253, 0.0)
         self.said: list[str] = []
 
-    def radio(self, node_id: int, x_m: float, settings=BASE, *, plus=True) -> BenchRadio:
+    def radio(self, node_id: int, x_m: float, settings=BASE, *, plus=True) -> FieldRadio:
         chip = EmulatedChip(self.air, f"radio {node_id}", (x_m, 0.0, 0.0), ChipVariant(plus=plus))
-        return BenchRadio(chip.spi, chip.ce, node_id, settings, self.clock.runtime)
+        return FieldRadio(chip.spi, chip.ce, node_id, settings, self.clock.runtime)
 
     @contextlib.contextmanager
-    def far_end(self, radio: BenchRadio, follows: bool = True) -> Iterator[None]:
+    def far_end(self, radio: FieldRadio, follows: bool = True) -> Iterator[None]:
         """A far end that acknowledges; `follows`: it runs `answer`."""
         radio.set_up()
         ended = threading.Event()
@@ -67,7 +67,7 @@ class Pair:
             time.sleep(0.005)
 
 
-def send_until_read(radio: BenchRadio, payload: bytes) -> None:
+def send_until_read(radio: FieldRadio, payload: bytes) -> None:
     """Send it to the far end, and three more: they find room only if the first was read."""
     address = radio.settings.node_address(FAR_ID)
     for sent in (payload.ljust(32, b"\0"), bytes(32), bytes(32), bytes(32)):

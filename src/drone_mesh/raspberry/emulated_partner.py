@@ -10,7 +10,7 @@ from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.settings import RadioSettings
-from drone_mesh.raspberry.bench_radio import BenchRadio
+from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.range_test import answer
 
 PARTNER_ID = 1
@@ -22,7 +22,7 @@ class EmulatedPartner:
     def __init__(self, clock: WallClock, settings: RadioSettings, place: Location) -> None:
         self._air = Air(clock, LogDistance(random.Random()), random.Random())
         chip = EmulatedChip(self._air, "partner", place.to_vector())
-        self._radio = BenchRadio(chip.spi, chip.ce, PARTNER_ID, settings, clock.runtime)
+        self._radio = FieldRadio(chip.spi, chip.ce, PARTNER_ID, settings, clock.runtime)
         self._ended = False
         self._answering = clock.runtime.start(self._answer, "partner")
 

@@ -45,7 +45,7 @@ class Wire:
         return taken
 
 
-class Bench:
+class Rig:
     """One node's drone."""
 
     def __init__(
@@ -83,7 +83,7 @@ class Bench:
             assert self.now_s < end_s, f"not within {within_s:g} s: {what}; {self.status()}"
             self.step()
 
-    def ready(self) -> Bench:
+    def ready(self) -> Rig:
         """Wait until all that a pilot needs to know was reported."""
         self.run_until("everything is reported", lambda: self.status().home is not None)
         self.run(3.0)

@@ -1,4 +1,4 @@
-"""BenchRadio: one radio without a mesh, for the field tools. One thread uses it."""
+"""FieldRadio: one radio without a mesh, for the field tools. One thread uses it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class NeitherSentNorFailed(RadioError):
         )
 
 
-class BenchRadio:
+class FieldRadio:
     """A radio with the registers of a node, from `set_up` to `close`."""
 
     def __init__(
