@@ -12,7 +12,7 @@ from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused, MeshError
 from drone_mesh.yaml_file import YamlFile, read_mapping, read_mapping_text
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from drone_mesh.drone.engines import FlightOptions, create_engine
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import LocationUnknown
 
 pytestmark = pytest.mark.slow

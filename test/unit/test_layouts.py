@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.layouts import Layouts, UnknownCase, read_layout
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 WINNERS_WITHOUT_FLIGHT = 3  # our choice: a winner may also fail to fly for honest reasons
 

@@ -27,7 +27,7 @@ from drone_mesh.communication.messages import (
 )
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_messages import OrderQuery
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)

@@ -7,7 +7,8 @@ import math
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 STANDS_STILL_WITHIN_M = 1e-3  # our choice: far below what a drone flies in a second

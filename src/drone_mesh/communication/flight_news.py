@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 
 class FlightNews:

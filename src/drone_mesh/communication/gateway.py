@@ -28,7 +28,8 @@ from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
 SEARCH_WITHIN_S = 600.0  # our choice: search for nodes that were heard within this time

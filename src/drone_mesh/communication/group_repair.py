@@ -23,7 +23,7 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.repair_interfaces import IRepairActions, IRepairStrategy, Step
 from drone_mesh.communication.router_states import RepairState, RouterEvent
 from drone_mesh.communication.spots import PITCH
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 PLACES_WITHIN_S = 1.0  # docs/protocol.md, "Negotiation": how long to wait for places
 SETTLE_S = 0.5  # our choice: a bid takes some milliseconds per hop; enough for 50 hops

@@ -37,7 +37,8 @@ from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 
 SILENCE_PERIODS = 1.5  # our choice: each neighbour is asked once a check period
 

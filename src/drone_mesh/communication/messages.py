@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Callable, ClassVar, Iterable, Mapping, NamedTuple, Union
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import PacketError
 
 CREATOR_AT, FROM_AT, TYPE_AT, TO_AT, FORWARD_AT = range(5)  # offsets of the header bytes

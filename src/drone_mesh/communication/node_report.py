@@ -13,7 +13,7 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import HEADER_BYTES, MessageType
 from drone_mesh.communication.text_parts import split
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 STEPS_PER_M = 5  # places are encoded in steps of 0.2 m: 5000 m fit into an int16
 UNKNOWN = 255  # in a field of one byte

@@ -19,7 +19,7 @@ from drone_mesh.communication.order_messages import OrderOutcome, OrderQuery, Or
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.text_parts import TextAssembly
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 OLD_ORDERS_KEPT = 100  # our choice: besides the latest of each drone
 HIGHEST_NUMBER = 2**16 - 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from typing import NamedTuple
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 
 class OrderState(enum.Enum):

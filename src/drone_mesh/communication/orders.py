@@ -18,7 +18,7 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_messages import OrderOutcome, reply_packets
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
 ORDERS_KEPT = 8  # our choice: more than the gateways that order one drone

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 
 class KnownPlaces:

@@ -29,7 +29,7 @@ from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStat
 from drone_mesh.communication.repair_views import RepairViews
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.communication.spots import PITCH, beside, own_spot
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 ROUNDING_S = 1e-6  # sums of periods are not exact
 

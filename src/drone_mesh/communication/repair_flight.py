@@ -9,7 +9,7 @@ from drone_mesh.communication.place_requests import ask_all_for_places
 from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.spots import free_spot, towards
 from drone_mesh.communication.timing import LANDED_WITHIN_M
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 ASK_AGAIN_S = 0.3  # our choice: an answer takes some milliseconds
 ASKS_ON_GROUND = 2  # our choice: a lossy medium loses a question now and then

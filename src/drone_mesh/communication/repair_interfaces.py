@@ -15,7 +15,7 @@ from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.router_states import RepairState, RouterEvent
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 SILENCE_PATIENCE = 5.0  # our choice: the factor on a node's patience if its medium may be down
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.router_states import RepairState
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 
 class RepairStatus(NamedTuple):

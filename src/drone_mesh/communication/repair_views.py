@@ -13,7 +13,7 @@ from drone_mesh.communication.repair_options import RepairOptions
 from drone_mesh.communication.router_states import RepairState, RouterStates
 from drone_mesh.communication.spots import PITCH
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
 

@@ -32,7 +32,8 @@ from drone_mesh.communication.router_states import ConnectionState, RepairState,
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 
 GOAL_AGAIN_S = 0.15  # our choice: broadcasts are not acknowledged, and it is soon out of reach
 SHORT_FLIGHT = 0.25  # of the range, our choice: the discs before and after share 84 % of their area

@@ -11,7 +11,7 @@ from typing import ClassVar, Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 _HEARTBEAT = int(messages.MessageType.HEARTBEAT)
 

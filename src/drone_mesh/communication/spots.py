@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Iterable, Iterator
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 BLOCK = 16  # one spot for each of the 256 ids
 WITHIN_REACH = 0.9  # our choice, of the range: how far behind a node that moved a drone stays

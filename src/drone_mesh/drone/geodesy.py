@@ -14,7 +14,7 @@ import struct
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 
 MAX_LATITUDE_DEG = 85.0  # our choice: closer to a pole, east and north become meaningless

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 

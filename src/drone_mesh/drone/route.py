@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Sequence
 
 from drone_mesh.drone.flight_path import Point, between
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 LEAD_S = 1.5  # our choice: greatest distance of the target ahead, in seconds of flight
 SHORTEST_LEAD_M = 2.0  # our choice: more than the noise of a position

@@ -8,7 +8,8 @@ from typing import Any, Callable, Protocol
 from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
 

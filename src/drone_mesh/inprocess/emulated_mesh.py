@@ -16,7 +16,7 @@ from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.node import NoInternet
 from drone_mesh.nrf24.airtime import NS_PER_S

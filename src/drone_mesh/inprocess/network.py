@@ -27,7 +27,7 @@ from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import plan_fleet
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.airs import create_air
 from drone_mesh.inprocess.clock import VirtualClock

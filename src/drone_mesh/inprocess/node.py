@@ -10,7 +10,7 @@ from typing import Callable
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection, IMeshNetwork
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna

@@ -6,7 +6,7 @@ from typing import Callable, Mapping
 
 from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
 from drone_mesh.communication.spots import towards
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 JUST_IN_RANGE = 0.95  # of the range
 

@@ -13,7 +13,8 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.messages import copies_for, hop
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
 
 HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)

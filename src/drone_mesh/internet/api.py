@@ -17,7 +17,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, IGatewayC
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.internet.data import add_data_requests
 from drone_mesh.internet.guarded_app import REFUSALS, Refusal, Responses, guarded_app

@@ -10,7 +10,7 @@ from typing import Iterable, Protocol
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.shared_air import SharedAir

@@ -18,7 +18,7 @@ from drone_mesh.communication.messages import (
     header,
     readdressed,
 )
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.lab.stranger import Stranger
 
 ATTACK_S = 60.0

@@ -10,7 +10,7 @@ from typing import AbstractSet, Iterator, NamedTuple, Sequence
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.keys import Keys, MeshKey
 from drone_mesh.communication.messages import present
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network
 from drone_mesh.lab.attacks import ATTACKS, RECORDING, highest_bid, invented_ids, plausible_bid

@@ -8,7 +8,7 @@ from typing import Callable, Iterable, NamedTuple
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.keys import Keys
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.network import Network
 from drone_mesh.lab.stranger import RecordedPacket, Tap
 

@@ -9,7 +9,7 @@ from typing import AbstractSet, Dict, Sequence
 
 from drone_mesh.communication.spots import towards
 from drone_mesh.communication.strategies.inward import MOVES
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.lab.random_layouts import Point
 
 Places = Dict[int, Location]

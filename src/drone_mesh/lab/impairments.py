@@ -9,7 +9,7 @@ from typing import Callable
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import IWirelessCommunication
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
 

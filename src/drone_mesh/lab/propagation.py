@@ -8,7 +8,7 @@ from typing import Callable
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.flight_path import FlightPath, Vector
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.lab import scenario as given
 from drone_mesh.lab.impairments import Impairments

@@ -11,7 +11,7 @@ from drone_mesh.communication.interfaces import BROADCAST, IMeshNetwork, IWirele
 from drone_mesh.communication.keys import Keys
 from drone_mesh.communication.messages import MessageType, header
 from drone_mesh.communication.sealed_antenna import SealedAntenna
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna

@@ -7,7 +7,7 @@ import math
 import random
 from pathlib import Path
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.air_server import AirServer

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from drone_mesh.drone.engines import GROUND, MAVLINK, FlightOptions, create_engine
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import Permissions
 from drone_mesh.errors import ConfigurationError, LocationUnknown
 from drone_mesh.raspberry.emulated_air import EmulatedAir

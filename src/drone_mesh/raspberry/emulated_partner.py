@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LogDistance

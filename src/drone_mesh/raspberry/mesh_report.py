@@ -9,7 +9,8 @@ from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
 from drone_mesh.communication.node_reports import ReportedNode
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import LocationUnknown
 
 

@@ -20,7 +20,7 @@ from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_
 from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S, MeshTiming
 from drone_mesh.drone.engines import FlightOptions
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower

@@ -29,8 +29,8 @@ from drone_mesh.raspberry.event_history import EventHistory
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.node_status import one_line
 from drone_mesh.raspberry.options import Hardware, Options
+from drone_mesh.raspberry.served_air import MoveRadio, joining_node, serving_node
 from drone_mesh.raspberry.service_manager import ServiceManager
-from drone_mesh.raspberry.shared_air import MoveRadio, joining_node, serving_node
 from drone_mesh.stopping import StopRequest
 from drone_mesh.users.local_socket import warn_of_unreachable
 

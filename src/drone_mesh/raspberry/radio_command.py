@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
 from drone_mesh.nrf24.emulator.wall_clock import WallClock

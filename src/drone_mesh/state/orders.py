@@ -7,7 +7,7 @@ from typing import Iterable
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderState
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.state.model import EventRecord
 
 _STATE_OF = {

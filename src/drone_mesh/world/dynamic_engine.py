@@ -7,7 +7,7 @@ import math
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.route import Route
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.body import GRAVITY_M_S2, BodyLimits, controller_force, drag, learnt_trim

@@ -10,7 +10,8 @@ from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight, Vector
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.interfaces import World
 

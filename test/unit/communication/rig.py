@@ -12,7 +12,8 @@ from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.medium import UNDISTURBED
 from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import LocationUnknown
 
 FIRST_CHECK_S = 5.0  # half a period: see AlwaysHalf

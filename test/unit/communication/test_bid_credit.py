@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from drone_mesh.communication.bid_credit import BidCredit, highest_plausible
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 MOST = 2000.0
 

@@ -8,7 +8,7 @@ import pytest
 from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
 

@@ -7,7 +7,7 @@ from rig import Rig, packet
 
 from drone_mesh.communication.node_report import NodeReport
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 
 REPORTING = MeshTiming(check_period_s=1000.0, report_period_s=30.0)

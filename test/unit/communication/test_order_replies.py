@@ -6,7 +6,7 @@ import pytest
 from rig import Rig, packet
 
 from drone_mesh.communication.order_record import OrderState
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
 TO_Y_1 = "00 00 80 3f 00 00 00 00 00 00"  # latitude 1, longitude 0, height 0

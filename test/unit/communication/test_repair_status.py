@@ -7,7 +7,7 @@ from rig import Rig
 
 from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.router_states import RepairState
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 OCCUPIED = "the place of 2 is occupied by 3"
 

@@ -11,7 +11,7 @@ from drone_mesh.communication.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HO
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.spots import own_spot
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 LOCATION, REQUEST, PRESENT, HEARTBEAT, MISSING, BID = 1, 2, 3, 4, 5, 7
 GATEWAY_AT_0_4 = "00 00 01 01 01 00 00 80 40"  # latitude 4

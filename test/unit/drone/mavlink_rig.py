@@ -8,7 +8,7 @@ from typing import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot

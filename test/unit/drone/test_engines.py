@@ -7,7 +7,8 @@ import pytest
 from drone_mesh.drone.engines import FlightOptions, create_engine
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.ground import GroundEngine
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.errors import ConfigurationError
 

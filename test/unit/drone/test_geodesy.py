@@ -8,7 +8,7 @@ import random
 import pytest
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 
 pyproj = pytest.importorskip("pyproj")

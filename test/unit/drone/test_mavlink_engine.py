@@ -10,7 +10,7 @@ from typing import Callable, Iterator
 import pytest
 
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4
 from drone_mesh.drone.mavlink.engine import MavlinkEngine
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions

@@ -9,7 +9,7 @@ import pytest
 from mavlink_rig import ALL, ARDUPILOT, NONE, TARGET, Rig
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot_status import Phase

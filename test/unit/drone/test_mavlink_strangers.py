@@ -16,7 +16,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, PX4, Autopilot
 from drone_mesh.drone.mavlink.engine import MavlinkEngine
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions

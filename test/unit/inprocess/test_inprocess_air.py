@@ -4,7 +4,8 @@ import random
 
 import pytest
 
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna
 

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 ORIGIN = Origin(52.0907, 5.1214, 3.0)
 

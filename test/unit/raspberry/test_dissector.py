@@ -16,7 +16,7 @@ from drone_mesh.communication.messages import (
 )
 from drone_mesh.communication.node_report import NodeReport
 from drone_mesh.communication.order_messages import OrderOutcome, reply_packets
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat
 from drone_mesh.nrf24.emulator.pcapng import (
     LINKTYPE_PAYLOADS,

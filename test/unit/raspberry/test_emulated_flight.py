@@ -19,7 +19,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot

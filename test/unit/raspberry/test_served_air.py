@@ -7,7 +7,7 @@ import pytest
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.options import parse_gateway
 from drone_mesh.raspberry.program import without_internet
-from drone_mesh.raspberry.shared_air import serving_node
+from drone_mesh.raspberry.served_air import serving_node
 
 
 @pytest.mark.parametrize(("address", "warns"), [("0", False), ("0.0.0.0:0", True)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.communication.order_record import OrderState
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.state.model import EventRecord
 from drone_mesh.state.orders import OrderProgress, OrderWatch
 

@@ -8,7 +8,7 @@ import threading
 import pytest
 from still_world import StillWorld
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, MeshError
 from drone_mesh.world.drones import RouterDrone
 from drone_mesh.world.engine import DroneState

@@ -9,7 +9,7 @@ import pytest
 from still_world import StillWorld
 
 from drone_mesh.drone.fleet import plan_fleet
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.world.bullet_world import BulletWorld

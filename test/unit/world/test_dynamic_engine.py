@@ -8,7 +8,7 @@ from typing import Iterator
 import pytest
 
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 from drone_mesh.world.body import BodyLimits, controller_force
 from drone_mesh.world.bullet_world import BulletWorld

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from still_world import StillWorld
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.world.drones import RouterDrone
 
 

@@ -8,7 +8,7 @@ from still_world import StillWorld
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.flight_path import FlightPath
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
 from drone_mesh.world.bullet_world import BulletWorld
 from drone_mesh.world.dynamic_engine import DynamicEngine

@@ -11,7 +11,7 @@ from drone_mesh.air.box import Box
 from drone_mesh.air.node_table import NodeTable
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.flight_path import Vector
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.world.ray_links import RayLinks
 

@@ -10,7 +10,7 @@ import math
 
 from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
 from drone_mesh.communication.spots import towards
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 TO_NEIGHBOURS = 0.1  # weight of the neighbours against the gateway, as in MDSG-APF
 LEG = 0.5  # of the range: distance between two requests for places; our choice

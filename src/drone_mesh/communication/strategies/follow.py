@@ -11,7 +11,7 @@ from drone_mesh.communication.repair_interfaces import Step
 from drone_mesh.communication.router_states import RepairState
 from drone_mesh.communication.spots import WITHIN_REACH, towards
 from drone_mesh.communication.strategies.nearest import Nearest
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 
 class Follow(Nearest):

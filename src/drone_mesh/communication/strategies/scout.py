@@ -13,7 +13,7 @@ from drone_mesh.communication.election import TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair_interfaces import SILENCE_PATIENCE, IRepairActions, Step
 from drone_mesh.communication.router_states import RouterEvent
 from drone_mesh.communication.strategies.thesis import Thesis
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 LISTENS_S = 1.0  # our choice: an answer takes some milliseconds
 LATER_ROUNDS = 1.0 / 3.0  # of the patience, our choice: a step back takes about 5 s

@@ -8,7 +8,8 @@ import time
 from collections import deque
 
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.link import MavlinkLink
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot

@@ -6,7 +6,7 @@ import math
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.telemetry import Telemetry
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from drone_mesh.drone.goal import check_goal
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, GoalRefused
 
 MAX_SPEED_M_S = 20.0  # our choice: more than drones of this kind can fly

@@ -13,7 +13,7 @@ from typing import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.authority import Authority
 from drone_mesh.drone.mavlink.commander import Commander, ParameterCheck
 from drone_mesh.drone.mavlink.flight_area import FlightArea

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 
 class Phase(enum.Enum):

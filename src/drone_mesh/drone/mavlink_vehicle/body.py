@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.drone.flight_path import between
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 
 LANDING_SPEED_M_S = 1.0  # our choice
 ARRIVED_M = 0.05  # our choice

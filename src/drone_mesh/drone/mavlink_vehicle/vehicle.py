@@ -8,7 +8,7 @@ from typing import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import EarthPlace, Origin
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body

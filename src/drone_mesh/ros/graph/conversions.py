@@ -8,7 +8,7 @@ import rospy
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import Vector
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.msg import DroneInfo, MeshState, NodeState, Obstacle, RequestGatewayDroneFlight
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg

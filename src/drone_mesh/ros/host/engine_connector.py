@@ -11,7 +11,8 @@ import rospy
 
 from drone_mesh.air.obstacles import NO_PATH, Obstacles
 from drone_mesh.drone.flight_path import SPEED_M_S
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names

@@ -13,7 +13,7 @@ import actionlib
 import rospy
 
 from drone_mesh.communication.order_record import OrderState
-from drone_mesh.drone.interfaces import Location
+from drone_mesh.drone.location import Location
 from drone_mesh.msg import (
     FlyAction,
     FlyFeedback,

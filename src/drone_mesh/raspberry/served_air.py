@@ -7,7 +7,8 @@ import logging
 from typing import Callable
 
 from drone_mesh.drone.engines import create_engine
-from drone_mesh.drone.interfaces import IDroneEngine, Location
+from drone_mesh.drone.interfaces import IDroneEngine
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, LocationUnknown
 from drone_mesh.nrf24.emulator.remote_chip import RemoteChip
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface

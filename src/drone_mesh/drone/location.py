@@ -1,0 +1,38 @@
+"""Location: a position of a drone."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Sequence
+
+from drone_mesh.drone.flight_path import Vector
+
+
+class Location(NamedTuple):
+    """A position in the world frame, in metres; z is up (docs/protocol.md, "Terms")."""
+
+    latitude: float  # y
+    longitude: float  # x
+    height: float  # z of the drone's underside
+
+    def distance_m(self, other: Location) -> float:
+        """Straight 3D distance to `other`."""
+        return math.sqrt(
+            (self.latitude - other.latitude) ** 2
+            + (self.longitude - other.longitude) ** 2
+            + (self.height - other.height) ** 2
+        )
+
+    @classmethod
+    def from_vector(cls, vector: Sequence[float]) -> Location:
+        """The position at x, y, z."""
+        x, y, z = vector
+        return cls(latitude=y, longitude=x, height=z)
+
+    def to_vector(self) -> Vector:
+        """The position as x, y, z."""
+        return self.longitude, self.latitude, self.height
+
+    def in_words(self) -> str:
+        """The position as text: x, y, z."""
+        return f"x {self.longitude:.2f} m, y {self.latitude:.2f} m, z {self.height:.0f} m"
