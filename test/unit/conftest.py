@@ -9,8 +9,8 @@ settings.register_profile(
 )
 settings.load_profile("busy machine")
 
-# Seconds until a slow test counts as hung. One that computes for 25 s on an idle core takes several
-# times as long beside other work.
+# Seconds until a slow test counts as hung: the only limit of the programs that it runs. One
+# that computes for 25 s on an idle core takes many times as long beside other work.
 SLOW_HANGS_AFTER_S = 600
 
 

@@ -29,7 +29,6 @@ def run_example(tmp_path):
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=120,
         )
         assert done.returncode == 0, done.stderr
         return done.stdout

@@ -86,7 +86,6 @@ def test_no_web_server_is_in_memory_before_it_is_asked_for(module: str) -> None:
         check=True,
         capture_output=True,
         text=True,
-        timeout=60,
     )
     assert {name.split(".")[0] for name in done.stdout.split()} & (WEB | REPORT) == set()
 

@@ -81,7 +81,6 @@ def test_tshark_opens_the_file(traffic, tmp_path):
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
     ).stdout
     lines = shown.splitlines()
     assert [line.split("\t")[0] for line in lines] == ["42", "10", "42"]

@@ -44,7 +44,6 @@ def shown(path, *fields):
         capture_output=True,
         text=True,
         check=True,
-        timeout=100,
     )
     assert "Lua" not in done.stderr, done.stderr
     return [line.split("\t") for line in done.stdout.splitlines()]
