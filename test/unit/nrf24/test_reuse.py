@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from chip_lab import Lab
 
-from drone_mesh.inprocess.data_benchmark import RANGE_M, SPACING_M, reuse_distance
+from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.inprocess.data_benchmark import SPACING_M, reuse_distance
 from drone_mesh.nrf24.emulator.links import IdealDisc
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
@@ -14,7 +15,7 @@ LATER_S = [2.5e-4 * step for step in range(8)]  # the second pair starts so much
 
 def lost(settings, distance):
     """How many packets of two pairs are not acknowledged, at different distances in time."""
-    lab = Lab(IdealDisc(RANGE_M))
+    lab = Lab(IdealDisc(MAX_DISTANCE_M))
     nodes = (0, 1, distance, distance + 1)
     driver = {
         node: lab.driver(node, SPACING_M * node, begin=True, settings=settings) for node in nodes
