@@ -7,7 +7,7 @@ from typing import Callable
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_all_for_places
 from drone_mesh.communication.repair_options import RepairOptions
-from drone_mesh.communication.spots import free_spot, towards
+from drone_mesh.communication.spots import free_spot
 from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.location import Location
 
@@ -121,7 +121,7 @@ class RepairFlight:
         goal = self.goal
         longest_m = self._leg_m + LANDED_WITHIN_M
         if self.stops_when_connected and here is not None and here.distance_m(goal) > longest_m:
-            goal = towards(here, goal, self._leg_m)
+            goal = here.towards(goal, self._leg_m)
         self._parts.pilot.step_back_to(goal)
 
     def _leg_is_short(self, here: Location | None) -> bool:

@@ -17,13 +17,6 @@ def beside(place: Location, origin: Location, distance_m: float) -> Location:
     return _at(place, distance_m, _bearing(place, origin))
 
 
-def towards(start: Location, end: Location, distance_m: float) -> Location:
-    """The point `distance_m` from `start` on the straight line to `end`, at most `end` itself."""
-    whole_m = start.distance_m(end)
-    share = min(1.0, distance_m / whole_m) if whole_m else 1.0
-    return Location(*(a + (b - a) * share for a, b in zip(start, end)))
-
-
 def own_spot(
     place: Location, node: int, clearance_m: float, occupied: Iterable[Location] = ()
 ) -> Location:

@@ -23,6 +23,12 @@ class Location(NamedTuple):
             + (self.height - other.height) ** 2
         )
 
+    def towards(self, end: Location, distance_m: float) -> Location:
+        """The point `distance_m` away on the straight line to `end`, at most `end` itself."""
+        whole_m = self.distance_m(end)
+        share = min(1.0, distance_m / whole_m) if whole_m else 1.0
+        return Location(*(a + (b - a) * share for a, b in zip(self, end)))
+
     @classmethod
     def from_vector(cls, vector: Sequence[float]) -> Location:
         """The position at x, y, z."""

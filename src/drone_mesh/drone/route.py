@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Sequence
 
-from drone_mesh.drone.flight_path import Point, between
+from drone_mesh.drone.flight_path import Point
 from drone_mesh.drone.location import Location
 
 LEAD_S = 1.5  # our choice: greatest distance of the target ahead, in seconds of flight
@@ -74,9 +74,5 @@ class Route:
             if step_m == remaining_m:
                 self._target = corner
             else:
-                self._target = _towards(self._target, corner, step_m / remaining_m)
+                self._target = self._target.towards(corner, step_m)
         return False
-
-
-def _towards(start: Location, end: Location, share: float) -> Location:
-    return Location.from_vector(between(start.to_vector(), end.to_vector(), share))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Callable, Mapping
 
 from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
-from drone_mesh.communication.spots import towards
 from drone_mesh.drone.location import Location
 
 JUST_IN_RANGE = 0.95  # of the range
@@ -26,5 +25,5 @@ class Oracle(IRepairStrategy):
         if self.reason or here is None or not places:
             return
         nearest = min(places, key=lambda node: (here.distance_m(places[node]), node))
-        goal = towards(places[nearest], here, JUST_IN_RANGE * mesh.range_m)
+        goal = places[nearest].towards(here, JUST_IN_RANGE * mesh.range_m)
         mesh.fly(Step(goal, nearest), until_connected=True)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import AbstractSet, Dict, Sequence
 
-from drone_mesh.communication.spots import towards
 from drone_mesh.communication.strategies.inward import MOVES
 from drone_mesh.drone.location import Location
 from drone_mesh.lab.random_layouts import Point
@@ -65,7 +64,7 @@ def inward(places: Places, hole: Location, range_m: float, acting: AbstractSet[i
         for node in first:
             away_m = hole.distance_m(now[node])
             step_m = min(away_m, range_m / 2) if move else max(0.0, away_m - range_m / 2)
-            _fly(node, towards(now[node], hole, step_m), now, flown)
+            _fly(node, now[node].towards(hole, step_m), now, flown)
         _follow(before, now, flown, acting - set(first), range_m)
     return flown
 
@@ -87,7 +86,7 @@ def _follow(
             if lost:
                 leader = min(lost, key=lambda m, me=node: (now[me].distance_m(now[m]), m))  # type: ignore[misc]
                 way_m = now[node].distance_m(now[leader]) - range_m
-                _fly(node, towards(now[node], now[leader], way_m), now, flown)
+                _fly(node, now[node].towards(now[leader], way_m), now, flown)
                 moved.add(node)
         rest -= moved
 

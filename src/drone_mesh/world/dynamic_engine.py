@@ -96,7 +96,7 @@ class DynamicEngine(DroneEngine):
         passed_s, self._stepped_s = now_s - self._stepped_s, now_s
         position, velocity = self._physics.body_state(self._box)
         if self._pushed is not None:
-            self._look_for_hits(velocity, passed_s)
+            self._check_hits(velocity, passed_s)
         self._velocity = velocity
         while self._goals:
             self._begin(Location.from_vector(self._goals.popleft()), position, now_s)
@@ -186,7 +186,7 @@ class DynamicEngine(DroneEngine):
         if before > 0.0 == self._battery_percent:
             self._note(MeshEventKind.BATTERY_EMPTY)
 
-    def _look_for_hits(self, velocity: Vector, passed_s: float) -> None:
+    def _check_hits(self, velocity: Vector, passed_s: float) -> None:
         assert self._pushed is not None
         hit_m_s = math.dist(velocity, self._pushed)
         in_air = self._state.position[2] - self._half_height_m > ON_GROUND_M

@@ -70,7 +70,7 @@ class Outbox:
         """Add a message for this destination."""
         self._waiting.append(message)
 
-    def relayed(self, relayed: bool) -> None:
+    def set_relayed(self, relayed: bool) -> None:
         """Set whether there are relays on the same channel on the way to the destination."""
         if not relayed:
             self._train = None
@@ -78,7 +78,7 @@ class Outbox:
             self._train = Train()
 
     def next_packet(self, now_s: float) -> DataPacket | None:
-        """The next packet to send; call `left` once it was sent."""
+        """The next packet to send; call `on_sent` once it was sent."""
         train = self._train
         if train is None:
             return self._timely_poll(now_s) or self._fragment()
@@ -87,7 +87,7 @@ class Outbox:
                 return None
             if any(message.in_flight for message in self._open.values()):
                 return self._end_of_train()
-            train.over(arrived=False)
+            train.end(arrived=False)
         poll = self._timely_poll(now_s)
         if poll is not None:
             return poll
@@ -123,7 +123,7 @@ class Outbox:
     def _in_flight(self) -> int:
         return sum(message.in_flight for message in self._open.values())
 
-    def left(self, packet: DataPacket, now_s: float) -> None:
+    def on_sent(self, packet: DataPacket, now_s: float) -> None:
         """The packet was sent."""
         message = packet.message
         if packet.ends_train:
@@ -151,7 +151,7 @@ class Outbox:
         if message.ticket.reliable:
             message.asked_s, message.asks = now_s, 1
             if message.ticket.state is TicketState.QUEUED:
-                message.ticket.becomes(TicketState.SENT)
+                message.ticket.set_state(TicketState.SENT)
         else:
             self._close(message, TicketState.SENT)
 
@@ -189,12 +189,12 @@ class Outbox:
         if train.waits and ack.nonce == train.nonce:
             if train.asks == 1:
                 self._round_trip.measured(now_s - train.asked_s)
-            train.over(arrived)
+            train.end(arrived)
             for message in self._open.values():
                 if not message.ticket.reliable:
                     message.sent &= message.known  # lost fragments are not sent again
         elif arrived and not train.waits:
-            train.over(arrived)
+            train.end(arrived)
 
     def due_s(self, now_s: float) -> float:
         """When to check this outbox next; infinity while nothing waits in it."""
@@ -307,7 +307,7 @@ class Outbox:
 
     def _close(self, message: OutgoingMessage, state: TicketState, reason: str = "") -> None:
         self._remove(message)
-        message.ticket.becomes(state, reason)
+        message.ticket.set_state(state, reason)
         self._ended(state)
 
     def _remove(self, message: OutgoingMessage) -> None:

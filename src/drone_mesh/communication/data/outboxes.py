@@ -110,12 +110,12 @@ class Outboxes:
         if outbox.to != TO_ALL and not self._may_reach(outbox, now_s):
             return False
         if self._parts.antenna.medium.shared and outbox.to != TO_ALL:
-            outbox.relayed(self._direction(outbox.to) != outbox.to)
+            outbox.set_relayed(self._direction(outbox.to) != outbox.to)
         packet = outbox.next_packet(now_s)
         if packet is None:
             return False
         if self._send_packet(packet.kind, outbox.to, packet.body):
-            outbox.left(packet, now_s)
+            outbox.on_sent(packet, now_s)
             return True
         if self._direction(outbox.to) == NO_ROUTE:
             self._may_reach(outbox, now_s)
@@ -154,7 +154,7 @@ class Outboxes:
             message.ticket.reason = reason
             if now_s >= message.expires_s or not message.ticket.reliable:
                 self._for_gateway.remove(message)
-                message.ticket.becomes(TicketState.GIVEN_UP, reason)
+                message.ticket.set_state(TicketState.GIVEN_UP, reason)
                 self._ended(TicketState.GIVEN_UP)
 
     def _outbox(self, to: int) -> Outbox:

@@ -37,7 +37,7 @@ class Ticket:
         # call back into the component.
         self.changed: Callable[[Ticket], None] | None = None
 
-    def becomes(self, state: TicketState, reason: str = "") -> None:
+    def set_state(self, state: TicketState, reason: str = "") -> None:
         """Change the state."""
         if state is not self.state:
             self.state, self.reason = state, reason

@@ -41,7 +41,7 @@ class Train:
         self.nonce, self.asked_s = nonce, now_s
         self.asks += 1
 
-    def over(self, arrived: bool) -> None:
+    def end(self, arrived: bool) -> None:
         """The train is over; `arrived`: nothing of it is known to be missing."""
         if not arrived:
             self.length = max(LEAST_LENGTH, self.length // 2)

@@ -110,7 +110,7 @@ class Transport:
         me = self._parts.node_id
         if to == me or (to == TO_GATEWAY and self._my_gateway() == me):
             self._deliver(ReceivedMessage(me, port, payload, False, reliable, now_s))
-            ticket.becomes(TicketState.DELIVERED)
+            ticket.set_state(TicketState.DELIVERED)
             return ticket
         self._outboxes.add(OutgoingMessage(ticket, payload, now_s))
         self._work()

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from drone_mesh.communication.repair_interfaces import IRepairStrategy, Step
-from drone_mesh.communication.spots import towards
 from drone_mesh.drone.location import Location
 
 TO_NEIGHBOURS = 0.1  # weight of the neighbours against the gateway, as in MDSG-APF
@@ -46,11 +45,11 @@ class Field(IRepairStrategy):
         views = mesh.neighbours().values()
         places = [view.place for view in views if view.place is not None] or [here]
         middle = Location(*(sum(axis) / len(places) for axis in zip(*places)))
-        goal = towards(gateway, middle, TO_NEIGHBOURS * gateway.distance_m(middle))
+        goal = gateway.towards(middle, TO_NEIGHBOURS * gateway.distance_m(middle))
         leg_m = min(LEG * mesh.range_m, here.distance_m(goal))
         away_m = here.distance_m(gateway)
         if away_m > self._nearest_m - mesh.clearance_m:
             self.reason = "came no nearer to the gateway"
         else:
             self._nearest_m = away_m
-            mesh.fly(Step(towards(here, goal, leg_m)), until_connected=True)
+            mesh.fly(Step(here.towards(goal, leg_m)), until_connected=True)

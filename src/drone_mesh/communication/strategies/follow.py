@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from drone_mesh.communication.repair_interfaces import Step
 from drone_mesh.communication.router_states import RepairState
-from drone_mesh.communication.spots import WITHIN_REACH, towards
+from drone_mesh.communication.spots import WITHIN_REACH
 from drone_mesh.communication.strategies.nearest import Nearest
 from drone_mesh.drone.location import Location
 
@@ -24,7 +24,7 @@ class Follow(Nearest):
         if node != mesh.lost_next_hop or here is None or not may_follow:
             super().on_place(node, place)
         elif here.distance_m(place) > WITHIN_REACH * mesh.range_m:
-            self._fly(Step(towards(place, here, WITHIN_REACH * mesh.range_m), node))
+            self._fly(Step(place.towards(here, WITHIN_REACH * mesh.range_m), node))
         else:
             super().on_place(node, place)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from drone_mesh.communication.repair_interfaces import Step
 from drone_mesh.communication.router_states import RepairState
-from drone_mesh.communication.spots import WITHIN_REACH, towards
+from drone_mesh.communication.spots import WITHIN_REACH
 from drone_mesh.communication.strategies.home import Home
 from drone_mesh.drone.location import Location
 
@@ -45,7 +45,7 @@ class Inward(Home):
         half_m = mesh.range_m / 2
         if away_m > half_m or self._moves == MOVES:
             stop_m = half_m if self._moves < MOVES else max(0.0, away_m - half_m)
-            self._move_to(Step(towards(self._lost.place, here, stop_m), self._lost.owner))
+            self._move_to(Step(self._lost.place.towards(here, stop_m), self._lost.owner))
 
     def on_place(self, node: int, place: Location) -> None:
         """If a neighbour moves out of reach, follow it as far as needed."""
@@ -54,7 +54,7 @@ class Inward(Home):
         if here is None or not may_move or node not in mesh.neighbours() or self._moves_itself():
             return
         if here.distance_m(place) > mesh.range_m:
-            self._move_to(Step(towards(place, here, WITHIN_REACH * mesh.range_m), node))
+            self._move_to(Step(place.towards(here, WITHIN_REACH * mesh.range_m), node))
 
     def _moves_itself(self) -> bool:
         """Whether it is beside the dead node and may still move."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from drone_mesh.drone.flight_path import between
 from drone_mesh.drone.location import Location
 
 LANDING_SPEED_M_S = 1.0  # our choice
@@ -32,7 +31,7 @@ class Body:
         if self.armed and target is not None:
             distance_m = before.distance_m(target)
             step_m = speed_m_s * passed_s
-            self.place = target if step_m >= distance_m else _on_the_way(before, target, step_m)
+            self.place = target if step_m >= distance_m else before.towards(target, step_m)
         if passed_s > 0.0:
             self.velocity = (
                 (self.place.latitude - before.latitude) / passed_s,
@@ -43,8 +42,3 @@ class Body:
             drained = self._drain_percent_s * passed_s
             self.battery_percent = max(0.0, self.battery_percent - drained)
         return target is not None and self.place.distance_m(target) <= ARRIVED_M
-
-
-def _on_the_way(start: Location, end: Location, step_m: float) -> Location:
-    share = step_m / start.distance_m(end)
-    return Location.from_vector(between(start.to_vector(), end.to_vector(), share))

@@ -78,10 +78,10 @@ class RosDroneEngineConnector(IDroneEngine):
         if why_not:
             raise GoalRefused(f"the drone cannot fly: {why_not}")
         if self._obstacles is not None:
-            self._check_way(self._obstacles, Location(latitude, longitude, height))
+            self._check_path(self._obstacles, Location(latitude, longitude, height))
         self._goal.publish(location_msg(latitude, longitude, height))
 
-    def _check_way(self, obstacles: Obstacles, goal: Location) -> None:
+    def _check_path(self, obstacles: Obstacles, goal: Location) -> None:
         try:
             start = self.get_location().to_vector()
         except LocationUnknown:

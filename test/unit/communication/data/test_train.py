@@ -94,7 +94,7 @@ def test_a_silent_receiver_does_not_stop_best_effort(chain):
 
 def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
     outbox = Outbox(to=0, session=7, room=27, ended=lambda _state: None)
-    outbox.relayed(True)
+    outbox.set_relayed(True)
     for number in (1, 2, 3):
         ticket = Ticket(number, to=0, port=5, size=1024, reliable=False)
         outbox.add(OutgoingMessage(ticket, bytes(1024), now_s=0.0))
@@ -105,7 +105,7 @@ def test_a_loss_of_best_effort_shortens_the_next_train_and_not_those_after_it():
         sent = []
         while True:
             packet = outbox.next_packet(0.0)
-            outbox.left(packet, 0.0)
+            outbox.on_sent(packet, 0.0)
             if packet.kind == packets.POLL:
                 break
             sent.append((packet.message.head.number, packet.kind - packets.FRAGMENTS.start))
@@ -124,12 +124,12 @@ def test_a_train_grows_with_answers_and_is_halved_without():
     assert train.length == FIRST_LENGTH
     for longer in (2 * FIRST_LENGTH, MOST_LENGTH, MOST_LENGTH):
         train.left = train.length
-        train.over(arrived=True)
+        train.end(arrived=True)
         assert train.length == longer
-    train.over(arrived=True)  # it was not full: nothing is known of longer ones
+    train.end(arrived=True)  # it was not full: nothing is known of longer ones
     assert train.length == MOST_LENGTH
-    train.over(arrived=False)
+    train.end(arrived=False)
     assert train.length == MOST_LENGTH // 2
     for _ in range(5):
-        train.over(arrived=False)
+        train.end(arrived=False)
     assert train.length == LEAST_LENGTH
