@@ -7,8 +7,7 @@ more packages for these two.
 from __future__ import annotations
 
 import math
-import warnings
-from typing import Callable, NamedTuple, Sequence
+from typing import NamedTuple, Sequence
 
 import numpy as np
 from scipy import stats
@@ -43,39 +42,24 @@ class Interval(NamedTuple):
 
 def mean_interval(values: Sequence[float]) -> Interval:
     """Mean, BCa bootstrap."""
-    return _bootstrap(values, np.mean)
-
-
-def median_interval(values: Sequence[float]) -> Interval:
-    """Median, BCa bootstrap."""
-    return _bootstrap(values, np.median)
-
-
-def _bootstrap(values: Sequence[float], statistic: Callable[..., float]) -> Interval:
     n = len(values)
     if n == 0:
         return Interval(math.nan, math.nan, math.nan, 0)
-    value = float(statistic(values))
+    value = float(np.mean(values))
     if n < FEWEST:
         return Interval(value, math.nan, math.nan, n, "too few runs for an interval")
     if min(values) == max(values):
         return Interval(value, value, value, n, "all runs are equal")
-    for method in ("BCa", "percentile"):
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # scipy warns about cases that the loop handles
-            found = stats.bootstrap(
-                (np.asarray(values, float),),
-                statistic,
-                n_resamples=RESAMPLES,
-                confidence_level=CONFIDENCE,
-                method=method,
-                random_state=np.random.default_rng(SEED),
-            )
-        low, high = map(float, found.confidence_interval)
-        if math.isfinite(low) and math.isfinite(high):
-            note = "" if method == "BCa" else "percentile bootstrap: BCa is undefined here"
-            return Interval(value, low, high, n, note)
-    return Interval(value, math.nan, math.nan, n, "no interval")
+    found = stats.bootstrap(
+        (np.asarray(values, float),),
+        np.mean,
+        n_resamples=RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="BCa",
+        random_state=np.random.default_rng(SEED),
+    )
+    low, high = map(float, found.confidence_interval)
+    return Interval(value, low, high, n)
 
 
 def share_interval(successes: int, n: int) -> Interval:

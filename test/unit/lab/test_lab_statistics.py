@@ -11,7 +11,6 @@ from drone_mesh.lab.statistics import (
     holm,
     kaplan_meier,
     mean_interval,
-    median_interval,
     paired_difference,
     share_interval,
     survival,
@@ -33,9 +32,10 @@ def test_equal_values_have_an_interval_of_no_width_that_says_so() -> None:
     assert found.note == "all runs are equal"
 
 
-def test_where_bca_is_undefined_the_percentile_interval_stands_in() -> None:
-    found = median_interval([0.0] * 30 + [1.0])
-    assert found.low <= found.value <= found.high
+@pytest.mark.parametrize("values", [[0.0] * 30 + [1.0], [0.0] * 4 + [1e-9], [5.0] * 5 + [1e9]])
+def test_a_single_value_that_differs_leaves_a_finite_interval(values: list[float]) -> None:
+    found = mean_interval(values)
+    assert -math.inf < found.low <= found.value <= found.high < math.inf
 
 
 @pytest.mark.parametrize("values", [[4.0], [3.0, 5.0], [4.0, 4.0]])
