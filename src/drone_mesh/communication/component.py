@@ -32,6 +32,7 @@ from drone_mesh.drone.location import Location
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
 _LOCATION = int(MessageType.LOCATION)
+_REQUESTLOCATION = int(MessageType.REQUESTLOCATION)
 
 
 class MeshnetworkComponent(MeshNode, IMeshNetwork):
@@ -229,17 +230,17 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     # Receiving -------------------------------------------------------------------------------
 
     def _process(self, payload: bytes, creator: int, from_: int, kind: int) -> None:
-        if kind == MessageType.LOCATION:
+        if kind == _LOCATION:
             location = messages.place_in(payload)
             self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
             if creator == from_ and messages.addressee(payload) == BROADCAST:
                 self._on_goal(creator, location)
+        elif kind == _REQUESTLOCATION:
+            self._send_location(creator)
         elif kind == MessageType.GATEWAY_PLACE:
             gateway = messages.GatewayPlace.from_payload(payload)
             if gateway is not None:
                 self._on_gateway_place(gateway)
-        elif kind == MessageType.REQUESTLOCATION:
-            self._send_location(creator)
         elif kind == MessageType.MISSING:
             missing = messages.MissingMessage.from_payload(payload).missing
             if missing != self._node_id:

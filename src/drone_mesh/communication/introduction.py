@@ -16,6 +16,8 @@ from drone_mesh.communication.parts import NodeParts
 AFTER_POWER_S = 0.2  # our choice: the medium must register the antenna first
 SPREAD_S = 1.0  # our choice: spreads the nodes' packets after an outage
 
+_PRESENT = int(MessageType.PRESENT)
+
 
 class Introduction:
     """Broadcasts the PRESENT of one node, at once or later.
@@ -49,9 +51,8 @@ class Introduction:
         parts, node = self._parts, self._node
         hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
         payload = messages.present(parts.node_id, hops, connected)
-        room = messages.EXTENSION_ROOM[MessageType.PRESENT]
-        room -= parts.antenna.reserved_bytes(MessageType.PRESENT)
-        extension = parts.routing.extension(MessageType.PRESENT, room)
+        room = messages.EXTENSION_ROOM[_PRESENT] - parts.antenna.reserved_bytes(_PRESENT)
+        extension = parts.routing.extension(_PRESENT, room)
         if extension:
             payload = messages.extended(payload, extension)
         if self._frame.digest:

@@ -16,6 +16,8 @@ from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 
+_HEARTBEAT = int(MessageType.HEARTBEAT)
+
 
 @dataclass(frozen=True)
 class NodeParts:
@@ -36,9 +38,8 @@ class NodeParts:
         """A heartbeat of this node for `forward`, including the routing technique's extension."""
         me = self.node_id
         payload = messages.heartbeat(me, me, to, forward, connected, gateway)
-        room = messages.EXTENSION_ROOM[MessageType.HEARTBEAT]
-        room -= self.antenna.reserved_bytes(MessageType.HEARTBEAT)
-        extension = self.routing.extension(MessageType.HEARTBEAT, room)
+        room = messages.EXTENSION_ROOM[_HEARTBEAT] - self.antenna.reserved_bytes(_HEARTBEAT)
+        extension = self.routing.extension(_HEARTBEAT, room)
         return messages.extended(payload, extension) if extension else payload
 
     @property
