@@ -269,6 +269,10 @@ _HEARTBEAT_HOPS = HEADER_BYTES + 2  # offset of the hop count
 _NEW_HEARTBEAT = struct.Struct(
     f"<{HEADER_BYTES}B{HeartbeatMessage.BODY.format[1:]}{BODY_BYTES - HeartbeatMessage.BODY.size}x"
 )
+# A packet without the sender and receiver of its hop. Byte 7 counts: the hops of a HEARTBEAT, the
+# ids of a ROUTE_RECORD, which follow it.
+_WITHOUT_HOP = struct.Struct(f"<BxBx3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
+_NEXT_HOP = struct.Struct(f"<4B3sB{PAYLOAD_BYTES - ROUTE_RECORD_AT - 1}s")
 _EXTENSIONS = {  # the bytes after a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
@@ -416,19 +420,15 @@ def next_hop(payload: bytes, from_: int, to: int) -> bytes | None:
 
     None for a heartbeat that has reached MAX_HOPS.
     """
-    kind = payload[TYPE_AT]
-    forwarded = bytearray(payload)
-    forwarded[FROM_AT] = from_
-    forwarded[TO_AT] = to
+    creator, kind, between, count, rest = _WITHOUT_HOP.unpack(payload)
     if kind == _HEARTBEAT:
-        hops = payload[_HEARTBEAT_HOPS]
-        if hops >= MAX_HOPS:
+        if count >= MAX_HOPS:
             return None
-        forwarded[_HEARTBEAT_HOPS] = hops + 1
-    elif kind == ROUTE_RECORD and payload[ROUTE_RECORD_AT] < MOST_RECORDED:
-        forwarded[ROUTE_RECORD_AT] += 1
-        forwarded[ROUTE_RECORD_AT + forwarded[ROUTE_RECORD_AT]] = from_
-    return bytes(forwarded)
+        count += 1
+    elif kind == ROUTE_RECORD and count < MOST_RECORDED:
+        rest = rest[:count] + _BYTE[from_] + rest[count + 1 :]
+        count += 1
+    return _NEXT_HOP.pack(creator, from_, kind, to, between, count, rest)
 
 
 def hops(payload: bytes) -> int:
