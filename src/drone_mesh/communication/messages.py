@@ -243,7 +243,6 @@ _TypedMessage = Union[
     GoToLocationMessage,
     MovementNegotiationMessage,
 ]
-AnyMessage = Union[Message, _TypedMessage]
 
 _GATEWAY_PLACE = struct.Struct("<HBffh")  # age + 1 in seconds, id, latitude, longitude, height
 _GATEWAY_PLACE_AT = {

@@ -14,6 +14,7 @@ from scipy import stats
 
 RESAMPLES = 2000
 CONFIDENCE = 0.95
+ROUNDING = 1e-12  # values that differ by less are equal
 FEWEST = 5  # our choice: resampling fewer values is meaningless
 SEED = 1  # for resampling: the same rows produce the same report
 
@@ -48,7 +49,7 @@ def mean_interval(values: Sequence[float]) -> Interval:
     value = float(np.mean(values))
     if n < FEWEST:
         return Interval(value, math.nan, math.nan, n, "too few runs for an interval")
-    if min(values) == max(values):
+    if math.isclose(min(values), max(values), rel_tol=ROUNDING):  # BCa is not defined there
         return Interval(value, value, value, n, "all runs are equal")
     found = stats.bootstrap(
         (np.asarray(values, float),),

@@ -32,6 +32,12 @@ def test_equal_values_have_an_interval_of_no_width_that_says_so() -> None:
     assert found.note == "all runs are equal"
 
 
+def test_values_that_differ_by_rounding_only_count_as_equal() -> None:
+    found = mean_interval([0.3] * 5 + [0.1 + 0.2])
+    assert found.low == found.value == found.high
+    assert found.note == "all runs are equal"
+
+
 @pytest.mark.parametrize("values", [[0.0] * 30 + [1.0], [0.0] * 4 + [1e-9], [5.0] * 5 + [1e9]])
 def test_a_single_value_that_differs_leaves_a_finite_interval(values: list[float]) -> None:
     found = mean_interval(values)
