@@ -11,7 +11,7 @@ from typing import Callable, NamedTuple
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.detours import AVOIDED_S, Detours
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
-from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.observer import MeshEventKind, in_hops
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_for_place
 from drone_mesh.communication.relay_check import RelayCheck
@@ -278,4 +278,4 @@ class GatewayConnection:
         if connected != self._shown_connected:
             self._shown_connected = connected
             kind = MeshEventKind.CONNECTED if connected else MeshEventKind.DISCONNECTED
-            self._parts.report(kind, self.gateway, f"{self.hops} hops" if connected else "")
+            self._parts.report(kind, self.gateway, in_hops(self.hops) if connected else "")

@@ -55,6 +55,11 @@ class MeshEvent(NamedTuple):
     detail: str = ""  # a short text for display
 
 
+def in_hops(hops: int) -> str:
+    """A number of hops as text: "1 hop", "2 hops"."""
+    return "1 hop" if hops == 1 else f"{hops} hops"
+
+
 MeshObserver = Callable[[MeshEvent], None]
 """Called in the thread that runs the component; must not call back into the component."""
 

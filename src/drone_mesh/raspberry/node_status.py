@@ -7,6 +7,7 @@ from typing import Any, Mapping
 
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.observer import in_hops
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.errors import LocationUnknown
 from drone_mesh.nrf24.link_quality import Quality
@@ -64,7 +65,7 @@ def node_status(
 def one_line(status: dict[str, Any]) -> str:
     """The most important parts, in one line."""
     connected = (
-        f"gateway {status['gateway']}, {status['hops']} hops"
+        f"gateway {status['gateway']}, {in_hops(status['hops'])}"
         if status["connected"]
         else "not connected"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Sequence
 
+from drone_mesh.communication.observer import in_hops
 from drone_mesh.users import command_line
 from drone_mesh.users.local_client import LocalClient, Refused
 
@@ -63,8 +64,7 @@ def _ask(
         return
     round_trips_s.append(answer["round_trip_s"])
     milliseconds, hops = 1e3 * answer["round_trip_s"], answer["hops"]
-    links = "1 hop" if hops == 1 else f"{hops} hops"
-    print(f"node {to}: number {number}, {links}, {milliseconds:.1f} ms", flush=True)
+    print(f"node {to}: number {number}, {in_hops(hops)}, {milliseconds:.1f} ms", flush=True)
 
 
 def _summary(asked: int, round_trips_s: list[float]) -> str:

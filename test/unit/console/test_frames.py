@@ -115,9 +115,9 @@ def test_an_unknown_position_is_null():
 def test_each_event_is_sent_once():
     store = FrameStore()
     store.update_mesh(mesh(), wall_s=0.0)
-    store.add_events([EventRecord(1.0, 1, "connected", (0,), "1 hops")])
+    store.add_events([EventRecord(1.0, 1, "connected", (0,), "1 hop")])
     events = frame(store, 0)["events"]
-    assert events == [{"t": 1.0, "node": 1, "kind": "connected", "peers": [0], "detail": "1 hops"}]
+    assert events == [{"t": 1.0, "node": 1, "kind": "connected", "peers": [0], "detail": "1 hop"}]
     known = store.version
     store.add_events([EventRecord(2.0, 1, "disconnected", (0,))])
     assert [event["kind"] for event in frame(store, known)["events"]] == ["disconnected"]

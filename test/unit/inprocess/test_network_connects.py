@@ -253,7 +253,7 @@ RECORDED = [
     "0.000 1 STARTED 255",
     "0.000 2 STARTED 255",
     "0.000 3 STARTED 255",
-    "0.004 1 CONNECTED 0 1 hops",
+    "0.004 1 CONNECTED 0 1 hop",
     "0.018 2 CONNECTED 0 2 hops",
     "0.036 3 CONNECTED 0 3 hops",
     "20.000 2 DISCONNECTED 0",

@@ -49,7 +49,7 @@ EVENTS = [
     EventRecord(131.0, 2, "emergency"),
     EventRecord(138.0, 2, "flight decided", (1,)),
     EventRecord(141.0, 2, "landed"),
-    EventRecord(142.5, 2, "connected", (0,), "1 hops & <more>"),
+    EventRecord(142.5, 2, "connected", (0,), "1 hop & <more>"),
 ]
 
 
@@ -113,7 +113,7 @@ def test_without_a_state_there_is_no_story():
 def test_the_page_is_one_file_that_needs_nothing_from_elsewhere():
     page = render_page(tell_story(STATES, EVENTS), "A <run> & more")
     assert "<h1>A &lt;run&gt; &amp; more</h1>" in page
-    assert "1 hops &amp; &lt;more&gt;" in page
+    assert "1 hop &amp; &lt;more&gt;" in page
     assert page.count("<svg") == 4
     assert not re.search(r"""(src|href)\s*=\s*["']?(https?:)?//""", page)
     assert "37.0 s" in page
