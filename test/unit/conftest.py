@@ -1,5 +1,7 @@
 """The order and time limits of the unit tests, and settings of hypothesis for a busy machine."""
 
+import gc
+
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -23,3 +25,14 @@ def pytest_collection_modifyitems(items: "list[pytest.Item]") -> None:
     for item in items:
         if item.get_closest_marker("slow") is not None:
             item.add_marker(pytest.mark.timeout(SLOW_HANGS_AFTER_S))
+
+
+def pytest_collection_finish() -> None:
+    """Search for garbage less often.
+
+    Whole meshes are made and dropped by the thousand, and each search would look again at all that
+    was imported and collected so far: a tenth of all processor time.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 100)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections import defaultdict
 from pathlib import Path
 
@@ -15,6 +16,7 @@ SAME_IDEA = {
 }
 
 
+@functools.lru_cache(maxsize=None)
 def files_by_class():
     files = defaultdict(set)
     for path in sorted(SOURCE.rglob("*.py")):

@@ -17,15 +17,15 @@ from drone_mesh.lab.fuzz import crowd, fuzz, tables
 SLACK = 0.05
 
 
-@functools.lru_cache(maxsize=None)
-def without_attack(name):
-    return trial(name, Threat.NONE, seed=0)
+@functools.lru_cache(maxsize=None)  # several tests look at the same one
+def outcome(name, threat):
+    return trial(name, threat, seed=0)
 
 
 @pytest.mark.parametrize("name", ATTACKS)
 def test_no_stranger_harms_a_mesh_with_a_key(name):
-    quiet = without_attack(name)
-    attacked = trial(name, Threat.WITH_KEY, seed=0)
+    quiet = outcome(name, Threat.NONE)
+    attacked = outcome(name, Threat.WITH_KEY)
     assert attacked.lured == 0
     assert attacked.cut_off <= quiet.cut_off + SLACK
     assert attacked.later <= quiet.later
@@ -35,12 +35,12 @@ def test_no_stranger_harms_a_mesh_with_a_key(name):
     "name", ["forged order to the gateway", "forged orders to all", "MISSING storm"]
 )
 def test_without_a_key_one_stranger_cuts_most_nodes_off(name):
-    assert trial(name, Threat.WITHOUT_KEY, seed=0).cut_off > 0.5
+    assert outcome(name, Threat.WITHOUT_KEY).cut_off > 0.5
 
 
 @pytest.mark.parametrize("name", ["forged order to the gateway", "forged orders to all"])
 def test_without_a_key_a_stranger_sends_drones_kilometres_away(name):
-    assert trial(name, Threat.WITHOUT_KEY, seed=0).metres > 6000
+    assert outcome(name, Threat.WITHOUT_KEY).metres > 6000
 
 
 @pytest.mark.parametrize(
@@ -55,23 +55,23 @@ def test_without_a_key_a_stranger_sends_drones_kilometres_away(name):
     ],
 )
 def test_a_captured_node_neither_orders_nor_lures_nor_cuts_off(name):
-    quiet = without_attack(name)
-    attacked = trial(name, Threat.CAPTURED, seed=0)
+    quiet = outcome(name, Threat.NONE)
+    attacked = outcome(name, Threat.CAPTURED)
     assert attacked.lured == 0
     assert attacked.cut_off <= quiet.cut_off + SLACK
 
 
 def test_a_relay_that_forwards_heartbeats_only_is_avoided_in_a_mesh_with_a_key():
     name = "relay that swallows"
-    assert trial(name, Threat.WITHOUT_KEY, seed=0).later > 0.3
-    captured = trial(name, Threat.CAPTURED, seed=0)
+    assert outcome(name, Threat.WITHOUT_KEY).later > 0.3
+    captured = outcome(name, Threat.CAPTURED)
     assert captured.cut_off < 0.15
     assert captured.later == 0.0
 
 
 @pytest.mark.parametrize("name", ["bids of 1e9", "bids of 100 m"])
 def test_the_bids_of_a_captured_node_delay_a_repair_and_do_not_prevent_it(name):
-    attacked = trial(name, Threat.CAPTURED, seed=0)
+    attacked = outcome(name, Threat.CAPTURED)
     assert attacked.cut_off < 0.5
     assert attacked.later == 0.0
 
