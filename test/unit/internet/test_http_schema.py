@@ -9,6 +9,8 @@ from drone_mesh.internet.api import make_api
 from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.web.access import Access
 
+pytestmark = pytest.mark.slow  # all: scripts/test leaves the file out of the fast part
+
 schemathesis = pytest.importorskip("schemathesis")
 ignored_auth = schemathesis.checks.ignored_auth
 not_a_server_error = schemathesis.checks.not_a_server_error
@@ -18,7 +20,6 @@ schema = schemathesis.openapi.from_dict(
 )
 
 
-@pytest.mark.slow
 @schema.parametrize()
 @settings(
     max_examples=30,
