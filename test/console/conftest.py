@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -88,6 +88,13 @@ class ConsoleProcess:
 
 
 WAIT_WITHIN_S = 30.0  # for as long as the page itself waits for the answer to an order
+HANGS_AFTER_S = 600  # a test of many waits, each of which may be long on a busy machine
+expect.set_options(timeout=1000 * WAIT_WITHIN_S)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        item.add_marker(pytest.mark.timeout(HANGS_AFTER_S))
 
 
 @pytest.fixture(scope="session")
@@ -159,6 +166,7 @@ class Visit:
     def __init__(self, page: Page) -> None:
         self.page = page
         self.complaints: list[str] = []
+        self._expected: list[str] = []
         self.requests: list[str] = []
         page.on("console", self._on_console)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
@@ -168,6 +176,15 @@ class Visit:
     def _on_console(self, message: object) -> None:
         if message.type in ("error", "warning"):  # type: ignore[attr-defined]
             self.complaints.append(message.text)  # type: ignore[attr-defined]
+
+    def expect_complaints(self, *texts: str) -> None:
+        """A complaint that contains one of these texts belongs to the test."""
+        self._expected += texts
+
+    def unexpected(self) -> list[str]:
+        """The complaints so far that do not belong to the test."""
+        self.page.wait_for_timeout(0)  # until what has happened has been reported
+        return [c for c in self.complaints if not any(text in c for text in self._expected)]
 
     def drawn(self, what: str) -> int:
         """How many drones, links, links-drawn, route-links or lost-links the map has drawn."""
@@ -217,17 +234,20 @@ class Visit:
 
 @pytest.fixture
 def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
-    """Opens pages: visit(url, **options of the browser's context)."""
-    contexts = []
+    """Opens pages: visit(url, **options of the browser's context). None may have complaints."""
+    contexts, visits = [], []
 
     def open_page(url: str, **options: object) -> Visit:
         options.setdefault("viewport", {"width": 1440, "height": 900})
         context = browser.new_context(**options)  # type: ignore[arg-type]
         contexts.append(context)
         visit = Visit(context.new_page())
+        visits.append(visit)
         visit.page.goto(url)
         return visit
 
     yield open_page
+    unexpected = [complaint for visit in visits for complaint in visit.unexpected()]
     for context in contexts:
         context.close()
+    assert unexpected == []

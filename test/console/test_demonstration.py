@@ -38,7 +38,6 @@ def test_the_button_shows_a_repair_from_the_loss_to_the_reconnection(start_conso
     assert page.row(2, 2) == "off"
     page.page.click("#story-close")
     page.wait_for("the story closes", lambda: not page.page.is_visible("#story-card"))
-    assert page.complaints == []
 
 
 def test_a_demonstration_that_was_asked_for_at_the_start_begins_with_the_first_page(

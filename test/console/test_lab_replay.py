@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Iterator
 
 import pytest
+from conftest import WAIT_WITHIN_S, Visit
 from playwright.sync_api import Browser, Page, expect
 
 from drone_mesh.lab.command import main
@@ -47,7 +48,7 @@ def replay_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     yield match[0]
     process.send_signal(signal.SIGINT)
     try:
-        assert process.wait(timeout=10) == 0
+        assert process.wait(timeout=WAIT_WITHIN_S) == 0
     finally:
         process.kill()
 
@@ -55,6 +56,7 @@ def replay_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 @pytest.fixture
 def replay(replay_url: str, browser: Browser) -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 1280, "height": 900})
+    visit = Visit(page)
     page.goto(replay_url)
     expect(page.locator("#time-now")).to_contain_text("of 60 s")
     expect(page.locator("#badge")).to_be_visible()
@@ -62,7 +64,9 @@ def replay(replay_url: str, browser: Browser) -> Iterator[Page]:
     for order in page.locator("#fly-form, .tools > .live, #demonstrate, #power").all():
         expect(order).to_be_hidden()
     yield page
+    unexpected = visit.unexpected()
     page.close()
+    assert unexpected == []
 
 
 def shown_s(page: Page) -> float:
@@ -107,4 +111,4 @@ def test_play_pause_and_step(replay: Page) -> None:
     assert 0 < shown_s(replay) - before_s <= 1.0
     bar.get_by_role("button", name="step back").click()
     bar.get_by_role("button", name="play").click()
-    expect(replay.locator("#time-now")).to_contain_text(re.compile(r"^3[2-9]\."), timeout=15_000)
+    expect(replay.locator("#time-now")).to_contain_text(re.compile(r"^3[2-9]\."))

@@ -53,7 +53,7 @@ def page(start_console, visit) -> Visit:
 def test_packets_run_along_links_in_the_colours_of_the_legend(page):
     page.wait_for("dots", lambda: drawn(page) > 0)
     page.page.evaluate(RECORD)
-    page.wait_for("more of them", lambda: page.page.evaluate("dots.length") > 200, 20.0)
+    page.wait_for("more of them", lambda: page.page.evaluate("dots.length") > 200)
     dots = page.page.evaluate("dots.slice(0, 200)")
     heartbeat = page.page.evaluate(
         "getComputedStyle(document.documentElement).getPropertyValue('--packet-heartbeat').trim()"
