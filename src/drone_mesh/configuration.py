@@ -17,7 +17,12 @@ from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.drone.fleet import (
+    DEFAULT_GRIDSIZE,
+    DEFAULT_ROUTERS,
+    DEFAULT_SPACING_M,
+    MAX_DRONES,
+)
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
@@ -40,9 +45,15 @@ class FactoryConfiguration:
     # Seeds everything random; load_configuration chooses one if none is given.
     seed: int = Field(ge=0, le=MAX_SEED, description="a whole number")
     gateways: int = Field(1, ge=0, le=MAX_DRONES, description="a whole number of drones")
-    routers: int = Field(17, ge=0, le=MAX_DRONES, description="a whole number of drones")
-    gridsize: int = Field(6, ge=1, le=MAX_DRONES, description="a whole number of routers in a row")
-    spacing: float = Field(1.0, gt=0, le=1000, description="metres")  # between routers
+    routers: int = Field(
+        DEFAULT_ROUTERS, ge=0, le=MAX_DRONES, description="a whole number of drones"
+    )
+    gridsize: int = Field(
+        DEFAULT_GRIDSIZE, ge=1, le=MAX_DRONES, description="a whole number of routers in a row"
+    )
+    spacing: float = Field(
+        DEFAULT_SPACING_M, gt=0, le=1000, description="metres"
+    )  # between routers
     gui: bool = Field(False)
     drones: Literal["builtin", "external"] = Field("builtin")  # external: other nodes fly them
     flight: Literal["kinematic", "dynamic"] = Field("kinematic")  # dynamic: physics moves drones

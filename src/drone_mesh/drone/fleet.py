@@ -9,6 +9,9 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
 
 MAX_DRONES = 254  # ids 0..253
+DEFAULT_ROUTERS = 17  # as in the field case
+DEFAULT_GRIDSIZE = 6  # routers in a row
+DEFAULT_SPACING_M = 1.0
 GATEWAY_COLUMN_M = -1.0  # x of all gateways; spaced 1 m apart along y
 
 

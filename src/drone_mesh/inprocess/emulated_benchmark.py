@@ -16,7 +16,7 @@ from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.emulator.measured import measured_curve
 from drone_mesh.nrf24.emulator.trace import FrameTrace
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
-from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
+from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 
 PROGRESS_S = 5.0  # of wall time
 
@@ -42,7 +42,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--rate",
         choices=DATA_RATES,
-        default="250k",
+        default=DEFAULT_RATE,
         help="data rate in bits per second (default %(default)s)",
     )
     parser.add_argument(

@@ -26,7 +26,12 @@ from drone_mesh.communication.routing import DEFAULT_ROUTING
 from drone_mesh.communication.routing_interfaces import IRoutingTechnique
 from drone_mesh.communication.sealed_antenna import SealedAntenna
 from drone_mesh.communication.timing import MeshTiming
-from drone_mesh.drone.fleet import plan_fleet
+from drone_mesh.drone.fleet import (
+    DEFAULT_GRIDSIZE,
+    DEFAULT_ROUTERS,
+    DEFAULT_SPACING_M,
+    plan_fleet,
+)
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.airs import create_air
@@ -38,6 +43,7 @@ from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.inprocess.shortest_path import SHORTEST_PATH, LinkMap, ShortestPath
 from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.nrf24.emulator.links import LinkModel
+from drone_mesh.nrf24.settings import DEFAULT_RATE
 from drone_mesh.state.model import EventRecord, MeshStatus
 
 ORACLE = "oracle"  # the repair strategy with global knowledge
@@ -63,7 +69,7 @@ class Network:
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,
         radio: str = "disc",
-        rate: str = "250k",
+        rate: str = DEFAULT_RATE,
         links: LinkModel | None = None,
         repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
         repair_options: RepairOptions | None = None,
@@ -118,9 +124,9 @@ class Network:
     def add_fleet(
         self,
         gateways: int = 1,
-        routers: int = 17,
-        gridsize: int = 6,
-        spacing: float = 1.0,
+        routers: int = DEFAULT_ROUTERS,
+        gridsize: int = DEFAULT_GRIDSIZE,
+        spacing: float = DEFAULT_SPACING_M,
         apart_s: float = 0.0,
     ) -> None:
         """Add the factory's fleet; each drone starts `apart_s` after the previous one."""

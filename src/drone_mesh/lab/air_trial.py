@@ -17,7 +17,7 @@ from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
-from drone_mesh.nrf24.settings import RadioSettings, data_rate
+from drone_mesh.nrf24.settings import DEFAULT_RATE, RadioSettings, data_rate
 
 CHIPS, MODEL, DISC = "chips", "model", "disc"
 SAMPLE_S = 0.1  # sampling period of the nodes' connections
@@ -30,7 +30,7 @@ class AirTrial:
     """A gateway and routers on a grid, or at given positions."""
 
     nodes: int
-    rate: str = "250k"
+    rate: str = DEFAULT_RATE
     spacing_m: float = 6.0
     links: str = "disc"  # or "distance": the power falls with it, the edge of the range at 9 m
     loss: float = 0.0  # share of frames that are dropped deliberately

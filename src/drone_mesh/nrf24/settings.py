@@ -44,6 +44,7 @@ DATA_RATES = {
     "1M": DataRate.MBPS_1,
     "2M": DataRate.MBPS_2,
 }
+DEFAULT_RATE = "250k"  # the longest range
 
 
 def data_rate(name: str) -> DataRate:
@@ -81,7 +82,7 @@ class RadioSettings:
     """
 
     channel: int = 1  # 2400 + n MHz
-    data_rate: DataRate = DataRate.KBPS_250
+    data_rate: DataRate = DATA_RATES[DEFAULT_RATE]
     power: TxPower = TxPower.DBM_0
     crc_bytes: int = 2
     retransmit_delay: int = 5  # ARD = (n + 1) * 250 us, while it listens; see AccessRules

@@ -23,7 +23,13 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError, naming_argument
 from drone_mesh.internet.http_settings import HttpSettings
-from drone_mesh.nrf24.settings import DATA_RATES, BroadcastMode, RadioSettings, TxPower
+from drone_mesh.nrf24.settings import (
+    DATA_RATES,
+    DEFAULT_RATE,
+    BroadcastMode,
+    RadioSettings,
+    TxPower,
+)
 from drone_mesh.nrf24.spi import SPI_HZ
 from drone_mesh.raspberry.air_options import AirOptions, add_air_options, air_options
 from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options, fleet_options
@@ -131,13 +137,13 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
     radio.add_argument(
         "--channel",
         type=whole(0, 125),
-        default=1,
+        default=RadioSettings.channel,
         help="radio channel, 0..125: 2400 + CHANNEL MHz (default: %(default)s)",
     )
     radio.add_argument(
         "--rate",
         choices=DATA_RATES,
-        default="250k",
+        default=DEFAULT_RATE,
         help="data rate in bits per second (default: %(default)s)",
     )
     radio.add_argument(
@@ -152,7 +158,7 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "--crc",
         type=int,
         choices=(8, 16),
-        default=16,
+        default=8 * RadioSettings.crc_bytes,
         help="length of the CRC in bits; 8 if a node runs the software of 2019 "
         "(default: %(default)s)",
     )

@@ -17,7 +17,7 @@ from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, 
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
 from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
-from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
+from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice, open_spi
 from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.emulated_partner import PARTNER_ID, EmulatedPartner
@@ -179,10 +179,13 @@ def _parser() -> argparse.ArgumentParser:
         help="id of this radio (default: %(default)s)",
     )
     parser.add_argument(
-        "--channel", type=whole(0, 125), default=1, help="channel (default: %(default)s)"
+        "--channel",
+        type=whole(0, 125),
+        default=RadioSettings.channel,
+        help="channel (default: %(default)s)",
     )
     parser.add_argument(
-        "--rate", choices=DATA_RATES, default="250k", help="data rate (default: %(default)s)"
+        "--rate", choices=DATA_RATES, default=DEFAULT_RATE, help="data rate (default: %(default)s)"
     )
     parser.add_argument(
         "--emulated",
