@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Callable, Protocol
 
@@ -66,6 +67,8 @@ class Reports:
             mavlink.MAVLINK_MSG_ID_VFR_HUD: self._hud,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
         }
+        # Two messages want it, and while the drone stands or hovers it is the same.
+        self._on_earth = functools.lru_cache(maxsize=1)(vehicle.home.to_earth)
         self._interval_s = {message_id: 1.0 for message_id in self._makers}
         self._due_s = {message_id: -math.inf for message_id in self._makers}
         self._boot_s = math.nan
@@ -124,7 +127,7 @@ class Reports:
 
     def _position(self) -> Message:
         vehicle = self._vehicle
-        place = vehicle.home.to_earth(vehicle.body.place)
+        place = self._on_earth(vehicle.body.place)
         north, east, up = vehicle.body.velocity
         return mavlink.MAVLink_global_position_int_message(
             self._ms(),
@@ -140,7 +143,7 @@ class Reports:
 
     def _gps(self) -> Message:
         vehicle = self._vehicle
-        place = vehicle.home.to_earth(vehicle.body.place)
+        place = self._on_earth(vehicle.body.place)
         return mavlink.MAVLink_gps_raw_int_message(
             int(vehicle.now_s * 1e6),
             vehicle.faults.fix_type,
