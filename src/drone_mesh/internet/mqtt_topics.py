@@ -59,7 +59,7 @@ def parse_broker(url: str, password: str = "") -> Broker:
     if parts.password is not None:
         raise ConfigurationError(
             "a password in the MQTT address shows in the list of processes: "
-            "use --mqtt-password-file"
+            f"use {PASSWORD_VARIABLE} in the environment, or --mqtt-password-file on a Pi"
         )
     mesh = parts.path.strip("/") or DEFAULT_MESH
     if not re.fullmatch(r"[\w.-]{1,64}", mesh):

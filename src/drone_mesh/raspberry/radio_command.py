@@ -86,26 +86,25 @@ def _report(radio: FieldRadio, irq: IrqPin | None, options: argparse.Namespace) 
         f"radio {_radio_in_words(options)}",
         f"settings {radio.settings}",
     ]
-    with _refusing(file):  # before the scan, which takes seconds
-        report = file.open("w", encoding="utf-8")
-    with report:
-        for part, made in (
-            ("check", radio_tests.check(radio, irq)),
-            ("scan", radio_tests.scan(radio, REPORT_ROUNDS, USUAL_NODES)),
-        ):
-            lines.append(f"== {part}")
-            try:
-                for line in made:
-                    lines.append(line)
-                    if part == "check":
-                        yield line
-            except MeshError as error:
-                lines.append(f"FAIL {error}")
-                yield lines[-1]
-                break
-        with _refusing(file):
-            report.write("\n".join(lines) + "\n")
-            report.flush()
+    # Before the scan, which takes seconds; an earlier report stays until this one is complete.
+    with _refusing(file):
+        file.open("a", encoding="utf-8").close()
+    for part, made in (
+        ("check", radio_tests.check(radio, irq)),
+        ("scan", radio_tests.scan(radio, REPORT_ROUNDS, USUAL_NODES)),
+    ):
+        lines.append(f"== {part}")
+        try:
+            for line in made:
+                lines.append(line)
+                if part == "check":
+                    yield line
+        except MeshError as error:
+            lines.append(f"FAIL {error}")
+            yield lines[-1]
+            break
+    with _refusing(file):
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     yield f"report written to {file}"
 
 

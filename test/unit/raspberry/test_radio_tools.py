@@ -191,6 +191,27 @@ def test_a_report_that_cannot_be_written_is_refused_before_the_check(tmp_path, c
 
 
 @pytest.mark.slow
+def test_a_full_disk_ends_a_report_with_one_line(capsys):
+    assert main(["--emulated", "30", "report", "/dev/full"]) == 1
+    line = "cannot write the report to /dev/full: No space left on device"
+    assert line in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_an_interrupted_report_leaves_the_earlier_one(tmp_path, monkeypatch):
+    file = tmp_path / "report.txt"
+    file.write_text("of yesterday\n", encoding="utf-8")
+
+    def interrupted(*_arguments):
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr(radio_tests, "scan", interrupted)
+    main(["--emulated", "30", "report", str(file)])
+    assert file.read_text(encoding="utf-8") == "of yesterday\n"
+
+
+@pytest.mark.slow
 def test_a_report_holds_checks_scan_and_machine(tmp_path, capsys):
     file = tmp_path / "report.txt"
     assert main(["--emulated", "30", "report", str(file)]) == 0
