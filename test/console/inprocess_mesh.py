@@ -7,8 +7,8 @@ import threading
 import time
 from dataclasses import replace
 
+from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.dots import Dot
-from drone_mesh.console.orders import OrderRefused
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.inprocess.network import Network
 from drone_mesh.layouts import Layouts, UnknownCase

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from drone_mesh.console.orders import OrderRefused
+from drone_mesh.console.controls import OrderRefused
 from drone_mesh.errors import MeshError
 from drone_mesh.web.json_client import NoAnswer, ask_json
 

@@ -1,22 +1,22 @@
-"""The requests that a page may send, and the interface that carries them out."""
+"""The requests that a page may send."""
 
 from __future__ import annotations
 
 import abc
-from typing import Iterable, Literal, NamedTuple, Optional, Protocol, Sequence, Tuple, Union
+from typing import Iterable, Literal, NamedTuple, Optional, Sequence, Tuple, Union
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
+from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
-from drone_mesh.errors import ConfigurationError, MeshError
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.layouts import MAX_CASE, Order, read_layout
 
 MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here
-RECORDED = "this is a recording: it cannot be changed"
 LIMITS = {  # for the page's forms; metres, and the largest id
     "coordinate": MAX_COORDINATE_M,
     "height": MAX_HEIGHT_M,
@@ -46,26 +46,6 @@ class LayoutOffer(NamedTuple):
 def places_of(orders: Iterable[Order]) -> list[Place]:
     """The positions to which a layout sends its drones."""
     return [(drone, goal.longitude, goal.latitude, goal.height) for drone, goal in orders]
-
-
-class OrderRefused(MeshError):
-    """An order was not carried out; the text is the reason, in words for the page."""
-
-
-class MeshControls(Protocol):
-    """Executes orders. Each call may block for seconds and raises OrderRefused with a reason."""
-
-    def power(self, node: int, on: bool) -> str: ...
-
-    def fly(self, node: int, x: float, y: float, z: float) -> str: ...
-
-    def layout(self, case: int) -> str: ...
-
-    def speed(self, paused: bool, factor: float) -> str: ...
-
-    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str: ...
-
-    def remove(self, node: int) -> str: ...
 
 
 class _Request(BaseModel):
@@ -196,29 +176,6 @@ class TimeLine(_Request):
     paused: SwitchOrNone = None
     factor: FactorOrNone = None  # simulated seconds per second
     live: bool = False  # back to the present
-
-
-class RecordingControls:
-    """The MeshControls of a recording: nothing can be ordered."""
-
-    def power(self, node: int, on: bool) -> str:
-        """Refused, like everything below."""
-        raise OrderRefused(RECORDED)
-
-    def fly(self, node: int, x: float, y: float, z: float) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
-
-    def layout(self, case: int) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
-
-    def speed(self, paused: bool, factor: float) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
-
-    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
-
-    def remove(self, node: int) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
 
 
 class _Numbered(_Request):

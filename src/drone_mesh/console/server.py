@@ -25,6 +25,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
 from drone_mesh.console.history import History
@@ -32,9 +33,7 @@ from drone_mesh.console.orders import (
     LIMITS,
     Demonstrate,
     LayoutOffer,
-    MeshControls,
     NeighbourWatch,
-    OrderRefused,
     PacketWatch,
     PageOrder,
     Place,

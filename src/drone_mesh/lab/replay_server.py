@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Sequence
 
+from drone_mesh.console.controls import RecordingControls
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
-from drone_mesh.console.orders import RecordingControls
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.state.model import EventRecord, MeshStatus

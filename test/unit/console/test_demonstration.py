@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.demonstration import RepairDemonstration
-from drone_mesh.console.orders import OrderRefused
 from drone_mesh.inprocess import Network
 
 STATE_PERIOD_S = 0.2  # wall time between two states

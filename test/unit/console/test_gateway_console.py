@@ -11,10 +11,10 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
+from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
 from drone_mesh.console.gateway_command import GatewayFeed, main
-from drone_mesh.console.orders import OrderRefused
 
 NODE = {
     "id": 0,

@@ -6,9 +6,9 @@ import json
 
 import pytest
 
+from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.orders import (
     NeighbourWatch,
-    OrderRefused,
     PageOrder,
     ReadPlaces,
     number_of,

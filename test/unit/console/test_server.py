@@ -9,9 +9,10 @@ from typing import Any, Awaitable, Callable
 import pytest
 
 from drone_mesh.console import server as server_module
+from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
-from drone_mesh.console.orders import LayoutOffer, OrderRefused
+from drone_mesh.console.orders import LayoutOffer
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.web.access import Access

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from drone_mesh.console.orders import OrderRefused
+from drone_mesh.console.controls import OrderRefused
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.persistent_service import (
     Request,

@@ -14,10 +14,11 @@ import rosgraph
 import rospy
 
 from drone_mesh.console import DEFAULT_PORT
+from drone_mesh.console.controls import MeshControls, RecordingControls
 from drone_mesh.console.dots import make_dots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
-from drone_mesh.console.orders import LayoutOffer, MeshControls, RecordingControls, places_of
+from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import ConfigurationError

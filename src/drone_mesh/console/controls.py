@@ -1,0 +1,52 @@
+"""MeshControls: the interface that carries out the orders of a page."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from drone_mesh.errors import MeshError
+
+RECORDED = "this is a recording: it cannot be changed"
+
+
+class OrderRefused(MeshError):
+    """An order was not carried out; the text is the reason, in words for the page."""
+
+
+class MeshControls(Protocol):
+    """Executes orders. Each call may block for seconds and raises OrderRefused with a reason."""
+
+    def power(self, node: int, on: bool) -> str: ...
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str: ...
+
+    def layout(self, case: int) -> str: ...
+
+    def speed(self, paused: bool, factor: float) -> str: ...
+
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str: ...
+
+    def remove(self, node: int) -> str: ...
+
+
+class RecordingControls:
+    """The MeshControls of a recording: nothing can be ordered."""
+
+    def power(self, node: int, on: bool) -> str:
+        """Refused, like everything below."""
+        raise OrderRefused(RECORDED)
+
+    def fly(self, node: int, x: float, y: float, z: float) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def layout(self, case: int) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def speed(self, paused: bool, factor: float) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def remove(self, node: int) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
