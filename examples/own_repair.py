@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from drone_mesh.communication.repair_interfaces import Step
-from drone_mesh.communication.strategies.thesis import Thesis
+from drone_mesh.communication.repair.interfaces import Step
+from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.lab.sequence import run_sequence
 
 

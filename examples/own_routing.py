@@ -12,8 +12,8 @@ import statistics
 from pathlib import Path
 from typing import Sequence
 
-from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.inprocess import Network
 from drone_mesh.state.model import MeshStatus
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from drone_mesh.communication.repair_options import RANGE_M
+from drone_mesh.communication.repair.options import RANGE_M
 
 MAX_DISTANCE_M = RANGE_M

@@ -16,7 +16,7 @@ from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import RosResult, measure
 from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, check_environment, free_port
-from drone_mesh.communication.key_file import read_key_file
+from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.errors import ConfigurationError, naming_argument
 
 WINDOW_S = 20.0  # two rounds of the default timing

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Callable
 
 from drone_mesh.bench.cases import Case
-from drone_mesh.communication.keys import Keys
+from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.inprocess import Network
 
 SIZES = (25, 100, 254)

@@ -8,12 +8,15 @@ from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import MeshObserver, ignore_events
-from drone_mesh.communication.repair_interfaces import IRepairStrategy
-from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
-from drone_mesh.communication.repair_strategies import create_repair_strategy
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.named_strategies import create_repair_strategy
+from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.communication.routing import DEFAULT_ROUTING, create_routing_technique
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.routing.named_techniques import (
+    DEFAULT_ROUTING,
+    create_routing_technique,
+)
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
 

@@ -26,7 +26,7 @@ from drone_mesh.communication.messages import (
     MessageType,
 )
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.order_messages import OrderQuery
+from drone_mesh.communication.orders.messages import OrderQuery
 from drone_mesh.drone.location import Location
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)

@@ -15,7 +15,7 @@ from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCo
 from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 
 DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
 

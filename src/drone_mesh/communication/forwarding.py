@@ -11,7 +11,7 @@ from drone_mesh.communication.delivery import Delivery, NodeReport
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 

@@ -20,12 +20,12 @@ from drone_mesh.communication.messages import (
     MessageType,
     MovementNegotiationMessage,
 )
-from drone_mesh.communication.node_reports import ReportBook, ReportedNode
 from drone_mesh.communication.observer import MeshObserver, ignore_events
-from drone_mesh.communication.order_book import OrderBook
-from drone_mesh.communication.order_messages import OrderReply
 from drone_mesh.communication.order_record import OrderRecord
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.orders.book import OrderBook
+from drone_mesh.communication.orders.messages import OrderReply
+from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine

@@ -28,14 +28,14 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.introduction import Introduction
 from drone_mesh.communication.medium import ChannelUse
 from drone_mesh.communication.neighbours import Neighbours
-from drone_mesh.communication.node_reports import NodeReporter
 from drone_mesh.communication.node_search import NodeSearch
 from drone_mesh.communication.observer import MeshObserver, Reporter, ignore_events
-from drone_mesh.communication.orders import OrderIntake
+from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.places import KnownPlaces
-from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
-from drone_mesh.communication.routing_interfaces import IRoutingEssentials, IRoutingTechnique
+from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.reports.node_reports import NodeReporter
+from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location

@@ -13,7 +13,7 @@ from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
 from drone_mesh.communication.places import KnownPlaces
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)

@@ -24,13 +24,13 @@ from drone_mesh.communication.messages import (
     place_in,
 )
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
-from drone_mesh.communication.repair import ConnectionRepair
-from drone_mesh.communication.repair_interfaces import IRepairStrategy
-from drone_mesh.communication.repair_options import RepairOptions
-from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair.connection_repair import ConnectionRepair
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.router_states import ConnectionState, RepairState, RouterStates
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
-from drone_mesh.communication.strategies.thesis import Thesis
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location

@@ -17,14 +17,14 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IWirelessCommunication,
 )
-from drone_mesh.communication.keys import Keys
 from drone_mesh.communication.observer import MeshEvent
-from drone_mesh.communication.repair_interfaces import IRepairStrategy
-from drone_mesh.communication.repair_options import DEFAULT_REPAIR, RepairOptions
-from drone_mesh.communication.repair_strategies import create_repair_strategy
-from drone_mesh.communication.routing import DEFAULT_ROUTING
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
-from drone_mesh.communication.sealed_antenna import SealedAntenna
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.named_strategies import create_repair_strategy
+from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.routing.named_techniques import DEFAULT_ROUTING
+from drone_mesh.communication.seals.keys import Keys
+from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Callable, Iterable
 
-from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.inprocess.clock import VirtualClock
 
 SHORTEST_PATH = "shortest_path"

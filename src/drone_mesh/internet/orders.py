@@ -13,8 +13,8 @@ from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import IGatewayCommands
-from drone_mesh.communication.order_book import HIGHEST_NUMBER
 from drone_mesh.communication.order_record import OrderRecord, OrderState
+from drone_mesh.communication.orders.book import HIGHEST_NUMBER
 from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.internet.guarded_app import Responses
 

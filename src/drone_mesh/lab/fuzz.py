@@ -7,7 +7,7 @@ from collections import deque
 from typing import Callable, Iterable, NamedTuple
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
-from drone_mesh.communication.keys import Keys
+from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.network import Network
 from drone_mesh.lab.stranger import RecordedPacket, Tap

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import AbstractSet, Dict, Sequence
 
-from drone_mesh.communication.strategies.inward import MOVES
+from drone_mesh.communication.repair.strategies.inward import MOVES
 from drone_mesh.drone.location import Location
 from drone_mesh.lab.random_layouts import Point
 

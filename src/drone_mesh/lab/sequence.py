@@ -10,7 +10,7 @@ from typing import Callable, Mapping
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.observer import MeshEventKind
-from drone_mesh.communication.repair_options import CLEARANCE_M, DEFAULT_REPAIR
+from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.random_layouts import cut_vertices, random_layout
 

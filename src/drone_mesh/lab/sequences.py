@@ -11,7 +11,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, Iterable, Iterator
 
-from drone_mesh.communication.repair_options import DEFAULT_REPAIR
+from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.sequence import FIELDS, SequenceOutcome, run_sequence
 

@@ -9,7 +9,7 @@ from typing import Any, Callable, Iterator
 
 import numpy as np
 
-from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.flights import Flights

@@ -8,9 +8,9 @@ from typing import Callable, Iterator, NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, IMeshNetwork, IWirelessCommunication
-from drone_mesh.communication.keys import Keys
 from drone_mesh.communication.messages import MessageType, header
-from drone_mesh.communication.sealed_antenna import SealedAntenna
+from drone_mesh.communication.seals.keys import Keys
+from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import Network

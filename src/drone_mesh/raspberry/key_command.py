@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Sequence
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
-from drone_mesh.communication.key_file import read_key_file, write_key_file
-from drone_mesh.communication.keys import KEY_BYTES, MeshKey
+from drone_mesh.communication.seals.key_file import read_key_file, write_key_file
+from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.raspberry.wiring_options import whole
 

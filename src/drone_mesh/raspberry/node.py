@@ -11,7 +11,7 @@ from typing import Any, Callable
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
-from drone_mesh.communication.sealed_antenna import SealedAntenna
+from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import MeshExecutor, Work

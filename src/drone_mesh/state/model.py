@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Sequence
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.election import NO_BID
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.roles import Role
 

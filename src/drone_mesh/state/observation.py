@@ -10,7 +10,7 @@ import numpy as np
 from drone_mesh.air.box import Box
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.repair_status import NOTHING_TO_REPAIR
+from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR
 from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.roles import Role

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from drone_mesh.bench import command
-from drone_mesh.communication.key_file import write_key_file
-from drone_mesh.communication.keys import MeshKey
+from drone_mesh.communication.seals.key_file import write_key_file
+from drone_mesh.communication.seals.keys import MeshKey
 
 
 def run(capsys, *arguments):

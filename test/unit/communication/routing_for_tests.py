@@ -1,6 +1,6 @@
 """A foreign routing technique, and invalid ones, for test_routing.py."""
 
-from drone_mesh.communication.child_table_tree import ChildTableTree
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 
 
 class ForeignTree(ChildTableTree):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing_interfaces import IRoutingEssentials
+from drone_mesh.communication.routing.interfaces import IRoutingEssentials
 
 
 class RecordingEssentials(IRoutingEssentials):

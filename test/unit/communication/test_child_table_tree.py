@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from routing_rig import RecordingEssentials
 
-from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing_interfaces import IRoutingTechnique
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 
 
 def tree_with(*pairs):

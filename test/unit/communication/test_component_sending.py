@@ -7,9 +7,9 @@ import random
 import pytest
 from rig import AlwaysHalf, RecordingAntenna, Rig, RigEngine, packet
 
-from drone_mesh.communication.child_table_tree import ChildTableTree
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.router import MeshnetworkRouter
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.errors import ConfigurationError
 

@@ -7,9 +7,9 @@ import struct
 import pytest
 from rig import Rig, packet
 
-from drone_mesh.communication.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.spots import own_spot
+from drone_mesh.communication.repair.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
+from drone_mesh.communication.repair.spots import own_spot
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 

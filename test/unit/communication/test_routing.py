@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.child_table_tree import ChildTableTree
-from drone_mesh.communication.routing import ROUTING_TECHNIQUES, create_routing_technique
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
+from drone_mesh.communication.routing.named_techniques import (
+    ROUTING_TECHNIQUES,
+    create_routing_technique,
+)
 from drone_mesh.errors import ConfigurationError
 
 
@@ -49,7 +52,7 @@ def test_an_unknown_name_is_refused_with_a_list_of_what_is_known(name):
         "routing_for_tests:A_NUMBER",
         "routing_for_tests:NotRouting",
         "routing_for_tests:WantsArguments",
-        "drone_mesh.communication.routing_interfaces:IRoutingTechnique",
+        "drone_mesh.communication.routing.interfaces:IRoutingTechnique",
     ],
 )
 def test_what_cannot_be_loaded_is_refused_by_name(name):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from rig import Rig, packet
 
-from drone_mesh.communication.child_table_tree import ChildTableTree
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.errors import PacketError
 
 

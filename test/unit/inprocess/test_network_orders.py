@@ -6,7 +6,7 @@ import pytest
 
 from drone_mesh.air.box import Box
 from drone_mesh.air.obstacles import Obstacles
-from drone_mesh.communication.keys import KEY_BYTES, MeshKey
+from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 

@@ -6,8 +6,11 @@ import pytest
 from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, run_until
 
 from drone_mesh.communication.messages import GoToLocationMessage
-from drone_mesh.communication.repair_interfaces import IRepairStrategy
-from drone_mesh.communication.repair_strategies import REPAIR_STRATEGIES, create_repair_strategy
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
+from drone_mesh.communication.repair.named_strategies import (
+    REPAIR_STRATEGIES,
+    create_repair_strategy,
+)
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.network import ORACLE
@@ -157,7 +160,7 @@ def test_with_field_the_drones_move_towards_the_gateway_leg_by_leg():
 
 
 def test_a_users_own_strategy_is_created_by_its_module_and_class():
-    network = Network(repair="drone_mesh.communication.strategies.stay:Stay")
+    network = Network(repair="drone_mesh.communication.repair.strategies.stay:Stay")
     network.add_router(1, 0.0, 0.0)
     assert isinstance(create_repair_strategy("stay"), IRepairStrategy)
 

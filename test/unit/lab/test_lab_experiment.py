@@ -219,7 +219,7 @@ MODULES = {
     "ends": "raise SystemExit(3)",
     "fails": "raise RuntimeError('two\\nlines')",
     "parts": """
-from drone_mesh.communication.repair_interfaces import IRepairStrategy
+from drone_mesh.communication.repair.interfaces import IRepairStrategy
 
 class Abstract(IRepairStrategy):
     pass

@@ -14,8 +14,8 @@ from drone_mesh.communication.messages import (
     LocationMessage,
     with_order_number,
 )
-from drone_mesh.communication.node_report import NodeReport
-from drone_mesh.communication.order_messages import OrderOutcome, reply_packets
+from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
+from drone_mesh.communication.reports.node_report import NodeReport
 from drone_mesh.drone.location import Location
 from drone_mesh.nrf24.emulator.frames import Frame, FrameFormat
 from drone_mesh.nrf24.emulator.pcapng import (

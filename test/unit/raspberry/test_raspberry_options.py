@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from drone_mesh.communication.key_file import write_key_file
-from drone_mesh.communication.keys import MeshKey
-from drone_mesh.communication.repair_options import RepairOptions
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.seals.key_file import write_key_file
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone import Location
 from drone_mesh.drone.engines import FlightOptions
@@ -115,7 +115,7 @@ def test_each_option_reaches_what_it_is_for():
         "--check-period 5 --connection-lost-after 60 --report-period 45 "
         "--latitude 10 --longitude -20.5 "
         "--height 3 --log-level debug --repair home --clearance 3 --range 40 "
-        "--routing drone_mesh.communication.child_table_tree:"
+        "--routing drone_mesh.communication.routing.child_table_tree:"
         "ChildTableTree "
         "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
         "--max-distance 200 --speed 3 --min-battery 25 --cruise-height 8 --layers 1.5 --hover 12 "
@@ -132,7 +132,7 @@ def test_each_option_reaches_what_it_is_for():
             broadcast_mode=BroadcastMode.SHOCKBURST,
         ),
         timing=MeshTiming(5.0, 60.0, report_period_s=45.0),
-        routing="drone_mesh.communication.child_table_tree:ChildTableTree",
+        routing="drone_mesh.communication.routing.child_table_tree:ChildTableTree",
         repair="home",
         repair_options=RepairOptions(clearance_m=3.0, range_m=40.0),
         location=Location(latitude=10.0, longitude=-20.5, height=3.0),

@@ -9,7 +9,7 @@ from typing import Callable
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
 from drone_mesh.communication.observer import Observers
-from drone_mesh.communication.sealed_antenna import SealedAntenna
+from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import random
 
-from drone_mesh.communication.keys import MeshKey
-from drone_mesh.communication.seal import HopSeal
+from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.seals.seal import HopSeal
 
 KEY = MeshKey(bytes(range(16)))
 OTHER_KEY = MeshKey(bytes(16))

@@ -5,7 +5,7 @@ import random
 import pytest
 from seal_rig import KEY, packet
 
-from drone_mesh.communication.end_to_end import EndToEnd, NotProven
+from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven
 
 ORDER = packet("00 00 06 01 05 00 00 80 3f 00 00 00 40 03 00 2a 00")  # numbered 42, to drone 5
 PRESENT = packet("05 05 03 fe fe ff 00")

@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from seal_rig import FRESH_S, KEY, OTHER_KEY, introduce, node, packet
 
-from drone_mesh.communication.seal import HopSeal
+from drone_mesh.communication.seals.seal import HopSeal
 
 HEARTBEAT = packet("05 05 04 01 01 01 00 00")  # of node 5 for node 1
 PRESENT = packet("05 05 03 fe fe 01 01")

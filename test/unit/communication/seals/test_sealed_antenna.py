@@ -7,7 +7,7 @@ from seal_rig import KEY, OTHER_KEY, packet
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
-from drone_mesh.communication.sealed_antenna import SealedAntenna
+from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.stranger import Tap
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from routing_rig import next_hop, started
 
-from drone_mesh.communication.techniques.batman import ORIGINATOR_TYPE, Batman
+from drone_mesh.communication.routing.techniques.batman import ORIGINATOR_TYPE, Batman
 
 
 @pytest.fixture

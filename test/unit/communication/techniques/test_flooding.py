@@ -6,7 +6,7 @@ import pytest
 from routing_rig import hear, next_hop, present, started
 
 from drone_mesh.communication.messages import MessageType
-from drone_mesh.communication.techniques.flooding import Flooding
+from drone_mesh.communication.routing.techniques.flooding import Flooding
 
 
 @pytest.fixture

@@ -1,0 +1,260 @@
+"""OrderBook: the outcome of the orders that a gateway sent.
+
+docs/protocol.md, "Orders".
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass, field
+from typing import Callable
+
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.messages import GoToLocationMessage, with_order_number
+from drone_mesh.communication.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.order_record import OrderRecord, OrderState
+from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, OrderReply
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.text_parts import TextAssembly
+from drone_mesh.drone.location import Location
+
+OLD_ORDERS_KEPT = 100  # our choice: besides the latest of each drone
+HIGHEST_NUMBER = 2**16 - 1
+REPEAT_AFTER_S = (2.0, 4.0, 8.0, 16.0)  # our choice: pauses between tries without a reply
+FOUND_WITHIN_S = 1.0  # our choice: a search passes through 100 nodes within half a second
+MOST_SEARCHES = 3  # our choice: per order; the path that a search found may break at once
+QUERY_PERIOD_S = 15.0  # our choice: period of queries to a drone under way
+MOST_QUERIES = 20  # our choice: without an answer: five minutes
+
+_log = logging.getLogger(__name__)
+
+
+_EVENTS = {
+    OrderState.ASKED: MeshEventKind.ORDER_SENT,
+    OrderState.UNDER_WAY: MeshEventKind.ORDER_ACCEPTED,
+    OrderState.NO_ROUTE: MeshEventKind.NO_ROUTE,
+    OrderState.REFUSED: MeshEventKind.ORDER_REFUSED,
+    OrderState.ARRIVED: MeshEventKind.ORDER_ARRIVED,
+    OrderState.GIVEN_UP: MeshEventKind.ORDER_GIVEN_UP,
+}
+_STATE_AFTER = {
+    OrderOutcome.ACCEPTED: OrderState.UNDER_WAY,
+    OrderOutcome.REFUSED: OrderState.REFUSED,
+    OrderOutcome.ARRIVED: OrderState.ARRIVED,
+    OrderOutcome.GIVEN_UP: OrderState.GIVEN_UP,
+    OrderOutcome.UNKNOWN: OrderState.GIVEN_UP,
+}
+
+
+@dataclass
+class _Order:
+    number: int
+    drone: int
+    goal: Location
+    ordered_s: float
+    state: OrderState = OrderState.ASKED
+    reason: str = ""
+    changed_s: float = 0.0
+    due_s: float = math.inf  # next repeat or query
+    searches: int = 0  # number of searches for the drone without a route
+    seeking: bool = False  # a search for it is running or about to start
+    unanswered: int = 0  # packets since the drone's last reply about it
+    settled: bool = False  # the drone itself has reported the outcome
+    reason_parts: TextAssembly = field(default_factory=TextAssembly)
+
+
+class OrderBook:
+    """The orders of one gateway. Only its component calls it."""
+
+    def __init__(
+        self, parts: NodeParts, may_find: Callable[[int], bool], search: Callable[[int], bool]
+    ) -> None:
+        """`may_find`: whether a search could find this drone, to which there is no route.
+
+        `search` starts one; False: too soon after another.
+        """
+        self._parts = parts
+        self._may_find = may_find
+        self._search = search
+        self._orders: dict[int, _Order] = {}  # oldest first
+        self._last_number = 0
+
+    def records(self) -> list[OrderRecord]:
+        """All remembered orders, oldest first."""
+        return [
+            OrderRecord(
+                order.number,
+                order.drone,
+                order.goal,
+                order.state,
+                order.reason,
+                order.ordered_s,
+                order.changed_s,
+            )
+            for order in self._orders.values()
+        ]
+
+    def enter(self, drone: int, goal: Location) -> int:
+        """Record a new order; returns its number. It ends an older order for that drone."""
+        now_s = self._parts.now_s
+        for other in self._open_for(drone):
+            self._move(other, OrderState.GIVEN_UP, "another order followed")
+        number = self._next_number()
+        self._orders[number] = _Order(number, drone, goal, now_s, changed_s=now_s)
+        self._forget_old()
+        return number
+
+    def send(self, number: int) -> bool:
+        """Send an order for the first time, or search for its drone.
+
+        False: there is no route and no search; it is not tried again.
+        """
+        order = self._orders[number]
+        if self._parts.delivery.send_own(self._packet(order)):
+            self._wait(order, REPEAT_AFTER_S[0])
+        elif not self._seek(order):
+            self._no_route(order)
+            return False
+        self._report(order)
+        return True
+
+    def on_missing(self, drone: int) -> None:
+        """A relay reports that it has no route to this drone."""
+        for order in self._open_for(drone):
+            waits = order.state is not OrderState.ASKED or order.seeking
+            if not waits and not self._seek(order):
+                self._no_route(order)
+
+    def on_found(self, drone: int) -> None:
+        """A drone answered the search, along a working path."""
+        for order in self._open_for(drone):
+            if order.seeking:
+                order.seeking = False
+                self._parts.delivery.send_own(self._packet(order))
+                self._wait(order, REPEAT_AFTER_S[0])
+
+    def _seek(self, order: _Order) -> bool:
+        """Search for the drone; the order is lost unless a search finds it in time."""
+        if order.searches >= MOST_SEARCHES or not self._may_find(order.drone):
+            return False
+        order.seeking = True
+        if self._search(order.drone):
+            order.searches += 1
+            self._wait(order, FOUND_WITHIN_S)
+        else:
+            self._wait(order, SEARCH_EVERY_S)
+        return True
+
+    def on_reply(self, drone: int, reply: OrderReply) -> None:
+        """A part of a drone's reply; acts when the last missing part has arrived."""
+        order = self._orders.get(reply.number)
+        if order is None or order.drone != drone:
+            return
+        reason = order.reason_parts.add(reply.part, reply.text)
+        if reason is not None:
+            self.on_outcome(reply.number, reply.outcome, reason)
+
+    def on_outcome(self, number: int, outcome: OrderOutcome, reason: str) -> None:
+        """A drone has reported the outcome of an order."""
+        order = self._orders.get(number)
+        if order is None or order.settled:
+            return
+        order.unanswered = 0
+        if outcome is OrderOutcome.UNKNOWN:
+            reason = "the drone no longer knows this order"
+        order.settled = outcome is not OrderOutcome.ACCEPTED
+        self._move(order, _STATE_AFTER[outcome], reason)
+        is_own = order.drone == self._parts.node_id
+        self._wait(order, math.inf if order.settled or is_own else QUERY_PERIOD_S)
+
+    def on_due(self) -> None:
+        """Repeat orders without a reply, and query drones that are under way."""
+        now_s = self._parts.now_s
+        for order in list(self._orders.values()):
+            if order.due_s <= now_s:
+                self._pursue(order)
+        self._schedule()
+
+    def _pursue(self, order: _Order) -> None:
+        order.due_s = math.inf
+        if order.seeking:
+            if not self._seek(order):
+                self._no_route(order)
+            return
+        order.unanswered += 1
+        if order.state is OrderState.ASKED:
+            if order.unanswered >= len(REPEAT_AFTER_S):
+                self._move(order, OrderState.GIVEN_UP, "the drone did not reply")
+                return
+            self._send_if_routed(order, self._packet(order))
+            order.due_s = self._parts.now_s + REPEAT_AFTER_S[order.unanswered]
+        elif order.state is OrderState.UNDER_WAY:
+            if order.unanswered > MOST_QUERIES:
+                self._move(order, OrderState.GIVEN_UP, "the drone fell silent")
+                return
+            query = OrderQuery.packet(order.number, self._parts.node_id, order.drone)
+            self._send_if_routed(order, query)
+            order.due_s = self._parts.now_s + QUERY_PERIOD_S
+
+    def _send_if_routed(self, order: _Order, packet: bytes) -> None:
+        """Send nothing without a route: the drone may be in flight, out of reach."""
+        if self._parts.routing.get_direction_to_node(order.drone) != NO_ROUTE:
+            self._parts.delivery.send_own(packet)
+
+    def _packet(self, order: _Order) -> bytes:
+        me, to = self._parts.node_id, order.drone
+        latitude, longitude, height = order.goal
+        packet = GoToLocationMessage(me, me, to, to, latitude, longitude, int(height)).to_payload()
+        return with_order_number(packet, order.number)
+
+    def _no_route(self, order: _Order) -> None:
+        _log.warning(
+            "gateway %d: no route to drone %d: it stays where it is",
+            self._parts.node_id,
+            order.drone,
+        )
+        self._move(order, OrderState.NO_ROUTE)
+
+    def _move(self, order: _Order, state: OrderState, reason: str = "") -> None:
+        if state is order.state:
+            return
+        order.state, order.reason, order.changed_s = state, reason, self._parts.now_s
+        order.due_s = math.inf
+        order.seeking = False
+        self._report(order)
+
+    def _report(self, order: _Order) -> None:
+        words = f"order {order.number}"
+        if order.state is OrderState.ASKED:
+            words += f": to {order.goal.in_words()}"
+        elif order.reason:
+            words += f": {order.reason}"
+        self._parts.report(_EVENTS[order.state], order.drone, words)
+
+    def _wait(self, order: _Order, seconds: float) -> None:
+        order.due_s = self._parts.now_s + seconds
+        self._schedule()
+
+    def _schedule(self) -> None:
+        due_s = min((order.due_s for order in self._orders.values()), default=math.inf)
+        self._parts.deadlines.set(Due.ORDERS, due_s)
+
+    def _open_for(self, drone: int) -> list[_Order]:
+        return [
+            order for order in self._orders.values() if order.drone == drone and order.state.is_open
+        ]
+
+    def _forget_old(self) -> None:
+        latest = {order.drone: order.number for order in self._orders.values()}
+        old = [n for n, order in self._orders.items() if latest[order.drone] != n]
+        for number in old[: max(0, len(old) - OLD_ORDERS_KEPT)]:
+            del self._orders[number]
+
+    def _next_number(self) -> int:
+        if not self._last_number:
+            self._last_number = int(self._parts.now_s * NUMBERS_PER_S) % HIGHEST_NUMBER
+        self._last_number = self._last_number % HIGHEST_NUMBER + 1
+        return self._last_number

@@ -1,0 +1,300 @@
+"""ConnectionRepair: repairs a router's connection by a strategy, once it is lost for too long.
+
+It notices the loss, waits, flies for the strategy, and keeps clear of other drones.
+docs/protocol.md, "Lost connection" and "Flight".
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Callable
+
+from drone_mesh.communication.connection import GatewayConnection
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
+from drone_mesh.communication.messages import (
+    GatewayPlace,
+    MovementNegotiationMessage,
+    addressed,
+    location,
+)
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.place_requests import ask_all_for_places, ask_for_place
+from drone_mesh.communication.repair.election import NO_BID
+from drone_mesh.communication.repair.flight import ASK_AGAIN_S, RepairFlight
+from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.spots import PITCH, beside, own_spot
+from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair.views import RepairViews
+from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.drone.location import Location
+
+ROUNDING_S = 1e-6  # sums of periods are not exact
+
+
+class ConnectionRepair(RepairViews):
+    """The repair of one router. It drives the `RepairState` of the router's states."""
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        states: RouterStates,
+        connection: GatewayConnection,
+        introduce: Callable[[], None],
+        strategy: IRepairStrategy,
+        options: RepairOptions,
+    ) -> None:
+        """`introduce` broadcasts a PRESENT."""
+        super().__init__(parts, states, connection, options)
+        self._introduce = introduce
+        self._strategy = strategy
+        self._lost_since_s = math.inf  # valid from LOSS_NOTICED until the router is AT_REST
+        self._checked_s: float | None = None  # when the first check during an election was due
+        self._was_silent = False
+        self._flight: RepairFlight | None = None
+        self._flies_to_place_of = NO_ROUTE
+        strategy.start(self)
+
+    # What the router reports -----------------------------------------------------------------
+
+    def on_unconnected_check(self, due_s: float) -> None:
+        """A check, due at `due_s`, finds the router unconnected and no answer pending.
+
+        Time is counted between due times, so that a late check does not cost a period.
+        """
+        state = self._states.repair
+        if state is RepairState.AT_REST:
+            self._notice_loss(due_s)
+        elif state is RepairState.LOST:
+            self._was_silent = self.silent
+            if due_s >= self._emergency_s() - ROUNDING_S:
+                self._parts.report(MeshEventKind.EMERGENCY)
+                self._strategy.on_emergency()
+        elif self._checked_s is None:
+            self._checked_s = due_s
+
+    def on_connected(self) -> None:
+        """A gateway answers again."""
+        self._clear()
+        self._tried_goals.clear()
+        self._strategy.reason = ""
+        self._strategy.on_gateway_found()
+        if self._flight is not None:
+            self._flight.stop_here()
+
+    def on_antenna_off(self) -> None:
+        """The antenna is off."""
+        self._connection.end(RouterEvent.ANTENNA_OFF)
+        self._clear()
+        self._strategy.reason = ""
+        self._strategy.on_stopped()
+
+    def on_ordered_flight(self) -> None:
+        """An ordered flight has started."""
+        self._flight = None
+        self._parts.neighbours.left_by_order()
+        self._took_off()
+
+    def on_neighbour_found(self, node: int) -> None:
+        """A new node is in reach. After a silence, give the mesh time to recover."""
+        if self._was_silent:
+            self._was_silent = False
+            if self._states.repair is RepairState.LOST:
+                self._lost_since_s = self.now_s
+        self._strategy.on_neighbour_found(node)
+
+    def on_neighbour_lost(self, node: int) -> None:
+        """A neighbour is out of reach."""
+        self._strategy.on_neighbour_lost(node)
+
+    def on_place(self, node: int, place: Location) -> None:
+        """`node` reports its place."""
+        if self._flight is not None:
+            self._flight.on_place(node, place)
+        else:
+            self._strategy.on_place(node, place)
+
+    def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
+        """A node of the group bids; `from_` sent or relayed that bid (see IRepairStrategy)."""
+        self._strategy.on_bid(node, score, from_, about)
+
+    def on_due(self) -> bool:
+        """The repair's timer has expired. Returns whether a flight is over."""
+        self._parts.deadlines.set(Due.REPAIR, math.inf)
+        if self._flight is not None:
+            return self._stands_clear(self._flight)
+        self._strategy.on_time()
+        return False
+
+    def status(self) -> RepairStatus:
+        """The current activity of the repair, and its reason."""
+        state, flight, strategy = self.state, self._flight, self._strategy
+        if flight is not None:
+            return RepairStatus(
+                state,
+                reason="a gateway answers" if self.connected else "",
+                place_of=self._flies_to_place_of,
+                goal=flight.goal,
+                landed=flight.on_ground,
+            )
+        at_rest = state is RepairState.AT_REST and not strategy.reason
+        if self.connected or state is RepairState.FLYING or at_rest:
+            return NOTHING_TO_REPAIR
+        bids = state in (RepairState.NEGOTIATING, RepairState.WATCHING)
+        return RepairStatus(
+            state,
+            strategy.reason,
+            bid=strategy.own_bid if bids else NO_BID,
+            bid_unit=strategy.bid_unit,
+            place_of=strategy.bids_for if bids else NO_ROUTE,
+            winner=strategy.winner if state is RepairState.WATCHING else NO_ROUTE,
+            emergency_s=self._emergency_s(),
+            silent=self.silent,
+        )
+
+    # Actions of the strategy -----------------------------------------------------------------
+
+    def fly(self, step: Step, until_connected: bool = False) -> None:
+        """See IRepairActions; also for the functions below."""
+        self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
+        flight = RepairFlight(
+            self._parts, self._introduce, step.owner, step.place, self._goal(step), self._options
+        )
+        flight.stops_when_connected = until_connected or step.home
+        self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
+        if step.owner != self.node_id:
+            self._tried_goals.append(step.place)
+        self._parts.neighbours.forget_all()
+        self._parts.routing.node_moved_location()
+        flight.start()
+        self._took_off()
+        self._flight = flight
+
+    def bid(  # noqa: D102
+        self,
+        score: float,
+        node: int | None = None,
+        but_not_to: int = NO_ROUTE,
+        about: Location | None = None,
+    ) -> None:
+        me = self.node_id
+        creator = me if node is None else node
+        packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
+        if about is not None:
+            packet = GatewayPlace(self._connection.gateway, about, 0.0).appended_to(packet)
+        for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
+            self._parts.delivery.send_own(addressed(packet, neighbour))
+
+    def ask_places(self) -> None:  # noqa: D102
+        ask_all_for_places(self._parts)
+
+    def ask_place(self, node: int) -> None:  # noqa: D102
+        ask_for_place(self._parts, node)
+
+    def announce_place(self, place: Location) -> None:  # noqa: D102
+        me = self.node_id
+        packet = location(place, self.now_s, me, me, BROADCAST, BROADCAST)
+        self._parts.antenna.broadcast_message(packet)
+
+    def present(self) -> None:  # noqa: D102
+        self._introduce()
+
+    def wait_until(self, at_s: float) -> None:  # noqa: D102
+        self._parts.deadlines.set(Due.REPAIR, at_s)
+
+    def happened(self, event: RouterEvent) -> None:  # noqa: D102
+        self._states.happened(event)
+
+    def end_round(self) -> None:  # noqa: D102
+        checked_s = self._checked_s
+        self._states.happened(RouterEvent.ROUND_OVER)
+        self._clear()
+        if checked_s is not None:
+            self._notice_loss(checked_s)
+
+    def report(  # noqa: D102
+        self, kind: MeshEventKind, peer: int = NO_ROUTE, detail: str = ""
+    ) -> None:
+        self._parts.report(kind, peer, detail)
+
+    # Flight ----------------------------------------------------------------------------------
+
+    def may_connect(self, node: int, know_gateway: bool) -> bool:
+        """Whether the router may now connect through `node`.
+
+        During a repair flight it would be a relay that is soon gone, so it stays unconnected
+        unless the flight may end at a connection. A flight may also do so as soon as a node of the
+        group that it left has a gateway.
+        """
+        flight = self._flight
+        if flight is None:
+            return True
+        if know_gateway and node in flight.group:
+            flight.stop_when_connected()
+        return flight.stops_when_connected
+
+    def on_flight_second(self) -> None:
+        """The drone is still in flight."""
+        if self._flight is not None:
+            self._flight.each_second()
+
+    def on_arrived(self) -> bool:
+        """The drone is at its goal. Returns whether the flight is over."""
+        if self._flight is None:
+            return True
+        if self._flight.arrived():
+            self.wait_until(self.now_s + ASK_AGAIN_S)
+        return False
+
+    def on_landed(self) -> None:
+        """The flight is over."""
+        was_repair, self._flight = self._flight is not None, None
+        self._connection.end(RouterEvent.LANDED)
+        if was_repair:
+            self._strategy.on_landed()
+
+    def _stands_clear(self, flight: RepairFlight) -> bool:
+        if not flight.on_ground:
+            return False
+        if flight.ask_again():
+            self.wait_until(self.now_s + ASK_AGAIN_S)
+            return False
+        return True
+
+    def _goal(self, step: Step) -> Location:
+        """The goal of a step, beside a live gateway or, in a silent medium, beside any node."""
+        if step.owner == self.node_id:
+            return step.place
+        if self.silent:
+            known = [heard.place for heard in self._parts.neighbours.places().values()]
+            known += [step.place, *filter(None, [self.gateway_place])]
+            return own_spot(step.place, self.node_id, self.clearance_m, known)
+        gateway, origin = self.gateway_place, self.own_place() or step.place
+        if gateway is not None and step.place.distance_m(gateway) < self.clearance_m:
+            return beside(gateway, origin, PITCH * self.clearance_m)
+        if self._options.avoid_wrecks and step.owner != NO_ROUTE:
+            return beside(step.place, origin, PITCH * self.clearance_m)
+        return step.place
+
+    def _emergency_s(self) -> float:
+        patience = self._strategy.patience(self.silent)
+        return self._lost_since_s + self.connection_lost_after_s * patience
+
+    def _notice_loss(self, due_s: float) -> None:
+        self._lost_since_s = due_s
+        self._connection.end(RouterEvent.LOSS_NOTICED)
+        self._connection.give_up_routes()
+        self._strategy.on_gateway_lost()
+
+    def _took_off(self) -> None:
+        self._connection.end(RouterEvent.TOOK_OFF)
+        self._clear()
+        self._strategy.reason = ""
+        self._strategy.on_stopped()
+        self._parts.places.left_own_place(self._connection.gateway)
+
+    def _clear(self) -> None:
+        self._checked_s = None
+        self.wait_until(math.inf)

@@ -1,0 +1,154 @@
+"""RepairFlight: a flight for a repair, which ends beside other drones and not on them."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.place_requests import ask_all_for_places
+from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.spots import free_spot
+from drone_mesh.communication.timing import LANDED_WITHIN_M
+from drone_mesh.drone.location import Location
+
+ASK_AGAIN_S = 0.3  # our choice: an answer takes some milliseconds
+ASKS_ON_GROUND = 2  # our choice: a lossy medium loses a question now and then
+LEG = 2.0 / 3.0  # of the range, our choice: at half that height it hears nodes below
+FRESH_S = 5.0  # our choice: a drone may have moved this long after reporting its place
+
+
+class RepairFlight:
+    """One flight of one drone, from take-off until it is clear of other drones.
+
+    Once a second it asks all nodes in range for their places. If one of them is at the goal, the
+    drone diverts to a spot beside the goal and lands earlier if it is connected on the way. On the
+    ground it asks again.
+    """
+
+    def __init__(
+        self,
+        parts: NodeParts,
+        introduce: Callable[[], None],
+        owner: int,
+        place: Location,
+        goal: Location,
+        options: RepairOptions,
+    ) -> None:
+        """To `goal`, at or near the `place` of node `owner`. `introduce` broadcasts a PRESENT."""
+        self.goal = goal
+        self._owner, self._place = owner, place
+        self.group = parts.neighbours.ids()  # the neighbours that it leaves behind
+        self.stops_when_connected = False
+        self.asks_left = 0  # on the ground
+        self._wanted = place
+        self._origin = parts.pilot.location() or goal
+        self._parts = parts
+        self._introduce = introduce
+        self._clearance_m = options.clearance_m
+        self._leg_m = LEG * options.range_m
+        self._diversions = 0
+        self._leg_from: Location | None = None
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether it has landed and checks that it is clear of others."""
+        return self.asks_left > 0
+
+    def start(self) -> None:
+        """Take off."""
+        self._fly_on()
+
+    def each_second(self) -> None:
+        """It is still in flight."""
+        ask_all_for_places(self._parts)
+        if self.stops_when_connected:
+            self._introduce()
+
+    def stop_when_connected(self) -> None:
+        """Stop at the first connection, unless this flight leads back."""
+        self.stops_when_connected = self._owner != self._parts.node_id
+
+    def stop_here(self) -> None:
+        """Land at the nearest free spot."""
+        here = self._parts.pilot.location()
+        if here is not None and not self.on_ground:
+            below = Location(here.latitude, here.longitude, self.goal.height)
+            if below.distance_m(self.goal) >= self._clearance_m:
+                self._wanted = below
+                self._go_to(below if self._is_free(below) else self._spot())
+
+    def on_place(self, node: int, place: Location) -> None:
+        """Another node reports its place; keep clear of it."""
+        if node == self._owner and place.distance_m(self._place) < self._clearance_m:
+            self.stop_when_connected()
+        if place.distance_m(self.goal) < self._clearance_m:
+            self.stop_when_connected()
+            self._diversions += 1
+            self._go_to(self._spot())
+
+    def arrived(self) -> bool:
+        """It is on the ground: ask for places. Returns False after one leg of several."""
+        here = self._parts.pilot.location()
+        if self._leg_is_short(here):
+            self._fly_on()
+            return False
+        self.asks_left = ASKS_ON_GROUND
+        ask_all_for_places(self._parts)
+        return True
+
+    def ask_again(self) -> bool:
+        """The time for answers is over. Returns False if it is clear and the flight is over."""
+        self.asks_left -= 1
+        if self.on_ground:
+            ask_all_for_places(self._parts)
+        return self.on_ground
+
+    def _go_to(self, goal: Location) -> None:
+        self.goal = goal
+        self.asks_left = 0
+        self._fly_on()
+
+    def _fly_on(self) -> None:
+        """Continue towards the goal.
+
+        A flight that may end where the drone is connected consists of legs. The drone climbs by
+        half the length of a leg; from higher up it would hear no node on the ground. No leg ends
+        within LANDED_WITHIN_M of the goal, because the drone would rest there although only the
+        goal is clear of the others.
+        """
+        here = self._parts.pilot.location()
+        self._leg_from = here
+        goal = self.goal
+        longest_m = self._leg_m + LANDED_WITHIN_M
+        if self.stops_when_connected and here is not None and here.distance_m(goal) > longest_m:
+            goal = here.towards(goal, self._leg_m)
+        self._parts.pilot.step_back_to(goal)
+
+    def _leg_is_short(self, here: Location | None) -> bool:
+        """Whether this was not the last leg, and the drone makes progress."""
+        if (
+            here is None
+            or self._leg_from is None
+            or here.distance_m(self._leg_from) < LANDED_WITHIN_M
+        ):
+            return False
+        return here.distance_m(self.goal) > LANDED_WITHIN_M
+
+    def _spot(self) -> Location:
+        """A free spot; two drones that divert at the same time skip different numbers of spots."""
+        skip = self._parts.node_id % 5 if self._diversions > 1 else 0
+        return free_spot(self._wanted, self._origin, self._clearance_m, self._others(), skip)
+
+    def _is_free(self, spot: Location) -> bool:
+        return all(spot.distance_m(other) >= self._clearance_m for other in self._others())
+
+    def _others(self) -> list[Location]:
+        """Where other drones are or may be."""
+        now_s, me = self._parts.now_s, self._parts.node_id
+        gateway = self._parts.places.gateway  # it may be there, although it is off now
+        kept_free = [] if gateway is None else [gateway]
+        return kept_free + [
+            heard.place
+            for node, heard in self._parts.neighbours.places().items()
+            if node != me and now_s - heard.heard_s <= FRESH_S
+        ]

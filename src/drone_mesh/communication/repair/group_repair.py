@@ -1,0 +1,279 @@
+"""GroupRepair: the drones of a group elect one that flies one step back.
+
+docs/protocol.md, "Negotiation". The score, defined by each derived strategy, decides which one.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.repair.bid_credit import BidCredit, highest_plausible
+from drone_mesh.communication.repair.election import (
+    HOME_FAILED,
+    NO_BID,
+    TOOK_OFF,
+    TOOK_OFF_HOME,
+    Election,
+    as_on_the_air,
+)
+from drone_mesh.communication.repair.flight_news import FlightNews
+from drone_mesh.communication.repair.interfaces import IRepairActions, IRepairStrategy, Step
+from drone_mesh.communication.repair.spots import PITCH
+from drone_mesh.communication.router_states import RepairState, RouterEvent
+from drone_mesh.drone.location import Location
+
+PLACES_WITHIN_S = 1.0  # docs/protocol.md, "Negotiation": how long to wait for places
+SETTLE_S = 0.5  # our choice: a bid takes some milliseconds per hop; enough for 50 hops
+TAKE_OFF_WITHIN_S = 5.0  # docs/protocol.md, "Negotiation": then the winner is passed over
+ROUNDS_WITHOUT_FLIER = 2  # docs/protocol.md, "Negotiation": then the second choice counts
+HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a group to a gateway
+
+IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
+
+
+class GroupRepair(IRepairStrategy):
+    """Asks for places, elects, flies one step back; the gateway's place is the second choice."""
+
+    def start(self, mesh: IRepairActions) -> None:
+        """Called once, before any other call."""
+        super().start(mesh)
+        self._election = Election(mesh.check_period_s)
+        self._news = FlightNews()
+        self._credit = BidCredit()
+        self._asked_s = -math.inf
+        self._rounds_without_flier = 0
+
+    @abc.abstractmethod
+    def _score(self, step: Step) -> float:
+        """The bid to fly `step`: 0 or more, or NO_BID. The highest of the group flies."""
+
+    def on_emergency(self) -> None:
+        """With neighbours: start an election. Alone: fly."""
+        if self.mesh.neighbours():
+            self._ask_for_places()
+            return
+        self.mesh.happened(RouterEvent.NO_NEIGHBOURS)
+        step, self.reason = self._next_step(alone=True)
+        if step is not None:
+            self._fly(step)
+
+    def on_gateway_found(self) -> None:
+        """The election is over; places tried without success may be tried again."""
+        self._election.clear()
+        self._rounds_without_flier = 0
+        self._news.clear()
+        self._credit.clear()
+
+    def on_stopped(self) -> None:
+        """The election continues without this node."""
+        self._election.clear()
+
+    def on_neighbour_lost(self, node: int) -> None:
+        """Do not wait for its place or bid."""
+        if self.mesh.state in (RepairState.ASKING, RepairState.NEGOTIATING):
+            self.mesh.wait_until(self.mesh.now_s)
+
+    def on_place(self, node: int, place: Location) -> None:
+        """Possibly the last missing answer."""
+        if self.mesh.state is RepairState.ASKING and self._all_answered():
+            self._negotiate()
+
+    def on_time(self) -> None:
+        """The time for places, bids or the winner's take-off is over."""
+        state = self.mesh.state
+        if state is RepairState.ASKING:
+            until_s = self._asked_s + PLACES_WITHIN_S
+            if self._all_answered() or self.mesh.now_s >= until_s:
+                self._negotiate()
+            else:
+                self.mesh.wait_until(until_s)
+        elif state is RepairState.NEGOTIATING:
+            self._decide()
+        elif state is RepairState.WATCHING:
+            self._pass_over_winner()
+
+    # Where to --------------------------------------------------------------------------------
+
+    def _next_step(self, alone: bool) -> tuple[Step | None, str]:
+        """The next flight, or None and the reason."""
+        mesh = self.mesh
+        why_not = mesh.why_not_fly()
+        if why_not:
+            return None, f"cannot fly: {why_not}"
+        reason = "knows no place to fly to"
+        is_first_choice = True
+        for step in mesh.steps:
+            if mesh.was_at(step):
+                if is_first_choice:
+                    reason = f"flew to the place of {step.owner} without success"
+                continue
+            occupant = NO_ROUTE if alone else self._occupant(step)
+            if occupant != NO_ROUTE:
+                reason = f"the place of {step.owner} is occupied by {occupant}"
+            elif step.home and not alone and self._is_tried(step.place):
+                reason = "another drone flew to the gateway without success"
+            elif is_first_choice or self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER:
+                return step, ""
+            is_first_choice = False
+        return None, reason
+
+    def _is_tried(self, place: Location) -> bool:
+        """Whether another drone has been so close that a gateway would have answered it."""
+        return self._news.is_tried(place, self.mesh.now_s, self.mesh.range_m / 2)
+
+    def _occupant(self, step: Step) -> int:
+        """A reachable node at the goal of `step`, or the owner of that place; else NO_ROUTE."""
+        mesh = self.mesh
+        if step.owner in mesh.neighbours():
+            return step.owner
+        radius_m = mesh.clearance_m * (2 * PITCH if step.home else 1.0)
+        for node, view in mesh.reachable().items():
+            if node == step.owner and view.age_s <= mesh.now_s - self._asked_s:
+                return node
+            if view.place is not None and view.place.distance_m(step.place) < radius_m:
+                return node
+        return NO_ROUTE
+
+    def _is_second_choice(self, step: Step) -> bool:
+        return step.home and self.mesh.lost_next_hop not in (step.owner, NO_ROUTE)
+
+    # Election --------------------------------------------------------------------------------
+
+    def _ask_for_places(self) -> None:
+        mesh = self.mesh
+        mesh.happened(RouterEvent.ASKED_FOR_PLACES)
+        self._asked_s = mesh.now_s
+        mesh.wait_until(self._asked_s + PLACES_WITHIN_S)
+        mesh.ask_places()
+        owner = mesh.lost_next_hop
+        if mesh.reaches(owner) and owner not in mesh.neighbours():
+            mesh.ask_place(owner)
+
+    def _all_answered(self) -> bool:
+        """Whether all neighbours, and the node whose place it wants, have sent their places."""
+        mesh = self.mesh
+        waited_s = mesh.now_s - self._asked_s
+        asked = dict(mesh.neighbours())
+        owner = mesh.lost_next_hop
+        if owner not in asked and mesh.reaches(owner):
+            view = mesh.reachable().get(owner)
+            if view is None or view.age_s > waited_s:
+                return False
+        return all(view.age_s <= waited_s for view in asked.values())
+
+    def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
+        """A node of the group bids for the flight or took off; `from_` sent or relayed that."""
+        if score in (TOOK_OFF, TOOK_OFF_HOME):
+            self._on_take_off_of(node, score, from_, about)
+            return
+        mesh = self.mesh
+        if score == HOME_FAILED:
+            self._on_home_failed(node, from_, about)
+            score = NO_BID
+        most = highest_plausible(mesh.own_place(), mesh.gateway_place, mesh.range_m)
+        if not self._credit.believes(node, score, from_, most):
+            score = NO_BID
+        is_best = self._election.heard(node, score, mesh.now_s)
+        if mesh.connected or mesh.state is RepairState.FLYING or self._news.is_quiet(mesh.now_s):
+            return
+        if is_best:
+            mesh.bid(score, node, but_not_to=from_)
+        if mesh.state is RepairState.LOST:
+            self._ask_for_places()
+        elif mesh.state is RepairState.NEGOTIATING:
+            self._decide()
+
+    def _negotiate(self) -> None:
+        step, self.reason = self._next_step(alone=False)
+        self.own_bid = NO_BID if step is None else self._score(step)
+        self.bids_for = NO_ROUTE if step is None else step.owner
+        detail = f"score {self.own_bid:.2f}"
+        self.mesh.report(MeshEventKind.NEGOTIATION_STARTED, detail=detail)
+        self.mesh.happened(RouterEvent.BID)
+        self._begin_election()
+
+    def _begin_election(self) -> None:
+        mesh = self.mesh
+        score = as_on_the_air(self.own_bid)
+        settled_s = max(mesh.now_s, self._asked_s + PLACES_WITHIN_S) + SETTLE_S
+        self._election.start(mesh.node_id, score, mesh.now_s, settled_s)
+        tried = self._was_home() if score < 0 else None
+        if tried is None:
+            mesh.bid(score)
+        else:
+            mesh.bid(HOME_FAILED, about=tried)
+        self._decide()
+
+    def _decide(self) -> None:
+        mesh = self.mesh
+        if mesh.state is not RepairState.NEGOTIATING:
+            return
+        due_s = self._election.due_s(mesh.neighbours().keys())
+        if mesh.now_s < due_s:
+            mesh.wait_until(due_s)
+            return
+        winner = self._election.winner()
+        mesh.report(MeshEventKind.NEGOTIATION_ENDED, NO_ROUTE if winner is None else winner)
+        if winner is None:
+            self._rounds_without_flier += 1
+            self._end_round()
+        elif winner != mesh.node_id:
+            self.winner = winner
+            mesh.happened(RouterEvent.BIDS_COUNTED)
+            mesh.wait_until(mesh.now_s + TAKE_OFF_WITHIN_S)
+        else:
+            step, self.reason = self._next_step(alone=False)
+            self._end_round()
+            if step is not None:
+                if step.home:
+                    mesh.bid(TOOK_OFF_HOME, about=step.place)
+                else:
+                    mesh.bid(TOOK_OFF)
+                self._fly(step)
+
+    def _on_take_off_of(self, node: int, code: float, from_: int, about: Location | None) -> None:
+        """A drone of the group flies: wait for the outcome."""
+        mesh = self.mesh
+        if mesh.connected or self._news.is_quiet(mesh.now_s):
+            return
+        patience_s = self.patience(silent=False) * mesh.connection_lost_after_s
+        quiet_s = max(patience_s - mesh.check_period_s, TAKE_OFF_WITHIN_S)
+        self._news.took_off(mesh.now_s + quiet_s)
+        self._rounds_without_flier = 0
+        self.reason = f"{node} flies instead"
+        if code == TOOK_OFF_HOME:
+            self._news.tries(about or mesh.gateway_place, mesh.now_s, HOME_AGAIN_S)
+        mesh.bid(code, node, but_not_to=from_, about=about)
+        if mesh.state in IN_A_ROUND:
+            self._end_round()
+
+    def _on_home_failed(self, node: int, from_: int, about: Location | None) -> None:
+        """A drone found no gateway at the gateway's place: no other of the group flies there."""
+        mesh = self.mesh
+        if mesh.connected or not self._news.is_new_failure(node, mesh.now_s, TAKE_OFF_WITHIN_S):
+            return
+        rounds_s = 2 * (mesh.connection_lost_after_s + mesh.check_period_s)
+        self._news.tries(about or mesh.gateway_place, mesh.now_s, rounds_s)
+        mesh.bid(HOME_FAILED, node, but_not_to=from_, about=about)
+
+    def _was_home(self) -> Location | None:
+        """The gateway's place, if this drone has been there since it was last connected."""
+        mesh = self.mesh
+        return next((s.place for s in mesh.steps if s.home and mesh.was_at(s)), None)
+
+    def _pass_over_winner(self) -> None:
+        """The winner did not take off: the next best bid wins."""
+        self._credit.did_not_fly(self.winner)
+        self._election.pass_over(self.winner)
+        self.mesh.happened(RouterEvent.WINNER_MISSED)
+        self._begin_election()
+
+    def _fly(self, step: Step) -> None:
+        self.mesh.fly(step)
+
+    def _end_round(self) -> None:
+        self._election.clear()
+        self.mesh.end_round()

@@ -1,0 +1,223 @@
+"""HopSeal: proves that a node of this mesh has just sent a packet (docs/security.md, "Hop seal").
+
+The last 7 bytes of each packet: the low 2 bytes of a counter of its sender, and a tag of 5 bytes
+over everything before them, the counter and the sender's epoch. The key is that of the network for
+packets to all, otherwise that of the pair, so a captured node cannot impersonate another one. An
+epoch is 8 random bytes that a node draws at each start; a receiver learns it through a challenge
+that only that node can answer. So there is no stored state to lose, and no packet of an earlier
+epoch is accepted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import random
+import struct
+from collections import OrderedDict
+from hmac import compare_digest
+from typing import NamedTuple
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
+from drone_mesh.communication.messages import FORWARD_AT, FROM_AT, TO_AT, MessageType
+from drone_mesh.communication.seals.keys import Keys
+from drone_mesh.communication.seals.replay import ReplayWindow
+
+TAG_BYTES = 5
+SEAL_BYTES = 2 + TAG_BYTES
+SEAL_AT = PAYLOAD_BYTES - SEAL_BYTES
+TAG_AT = PAYLOAD_BYTES - TAG_BYTES
+LAST_COUNT = 2**32 - 1  # the last counter of an epoch: an answer carries 4 bytes
+WAITING_CHALLENGES = 16  # our choice: most unanswered challenges
+CHALLENGE_AGAIN_S = 2.0  # our choice: least time between two challenges to one node
+CHALLENGE_OUT_S = 0.5  # our choice: after this time another challenge may replace it
+
+_EPOCH_BITS, _NONCE_BITS = 64, 64
+_CHALLENGE = struct.Struct("<Q")  # nonce
+_ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
+_LOW_BYTES = 2**16 - 1  # the part of a counter that a packet carries
+
+# Each takes the whole packet (or all of it from `forward` on) and keeps only the bytes before its
+# seal: one call is cheaper than joining slices.
+_covered = struct.Struct(f"<I{SEAL_AT}s").pack  # counter, packet
+_covered_to_all = struct.Struct(f"<I{TO_AT}sB{SEAL_AT - FORWARD_AT}s").pack
+_sealed = struct.Struct(f"<{SEAL_AT}sH{TAG_BYTES}s").pack  # packet, counter, tag
+_unsealed = struct.Struct(f"{SEAL_AT}s{SEAL_BYTES}x").pack
+
+
+class _Peer:
+    """A neighbour with a known epoch."""
+
+    __slots__ = ("epoch", "heard_s", "state", "state_to_all", "window")
+
+    def __init__(
+        self, network_key: bytes, pair_key: bytes, epoch: int, count: int, now_s: float
+    ) -> None:
+        self.epoch = epoch
+        self.state_to_all = _epoch_state(network_key, epoch)
+        self.state = _epoch_state(pair_key, epoch)
+        self.window = ReplayWindow(count)
+        self.heard_s = now_s
+
+
+class _Challenge(NamedTuple):
+    nonce: int
+    sent_s: float
+
+
+class HopSeal:
+    """Seals and opens the packets of one node. Belongs to its component's thread."""
+
+    def __init__(self, node_id: int, keys: Keys, rng: random.Random, fresh_s: float) -> None:
+        """`rng` draws epochs and nonces: a cryptographic one on real nodes.
+
+        `fresh_s`: a neighbour that was silent for longer is challenged again, so that a packet that
+        an attacker has held back is worthless after that time.
+        """
+        self._node_id = node_id
+        self._keys = keys
+        self._rng = rng
+        self._fresh_s = fresh_s
+        self._peers: dict[int, _Peer] = {}
+        self._challenges: OrderedDict[int, _Challenge] = OrderedDict()  # oldest first
+        self._epoch = self._count = 0
+        self._state_to_all = _epoch_state(keys.network, 0)
+        self._states: dict[int, hashlib.blake2s] = {}  # by receiver
+        self._begin_epoch()
+
+    # Packets of the mesh ---------------------------------------------------------------------
+
+    def seal(self, payload: bytes) -> bytes:
+        """The same packet with a seal in its last 7 bytes, which are overwritten."""
+        if self._count == LAST_COUNT:
+            self._begin_epoch()
+        self._count = count = self._count + 1
+        if payload[FORWARD_AT] == BROADCAST:  # `to` differs for each receiver
+            tag = self._state_to_all.copy()
+            tag.update(_covered_to_all(count, payload, BROADCAST, payload[FORWARD_AT:]))
+        else:
+            state = self._states.get(payload[TO_AT])
+            tag = (state or self._state_to(payload[TO_AT])).copy()
+            tag.update(_covered(count, payload))
+        return _sealed(payload, count & _LOW_BYTES, tag.digest())
+
+    def open(self, payload: bytes, now_s: float) -> bytes | None:
+        """The packet with zeros in place of its seal; None unless it is authentic and new."""
+        peer = self._peers.get(payload[FROM_AT])
+        if peer is None or now_s - peer.heard_s > self._fresh_s:
+            return None
+        window = peer.window
+        count = window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8)
+        if not 0 <= count <= LAST_COUNT:
+            return None
+        if payload[FORWARD_AT] == BROADCAST:
+            tag = peer.state_to_all.copy()
+            tag.update(_covered_to_all(count, payload, BROADCAST, payload[FORWARD_AT:]))
+        else:
+            tag = peer.state.copy()
+            tag.update(_covered(count, payload))
+        if not compare_digest(tag.digest(), payload[TAG_AT:]) or not window.use(count):
+            return None
+        peer.heard_s = now_s
+        return _unsealed(payload)
+
+    def knows(self, node: int, now_s: float) -> bool:
+        """Whether the epoch of this neighbour is known and it was heard recently."""
+        peer = self._peers.get(node)
+        return peer is not None and now_s - peer.heard_s <= self._fresh_s
+
+    # Epochs ----------------------------------------------------------------------------------
+
+    def challenge(self, node: int, now_s: float) -> bytes | None:
+        """A packet that requests a neighbour's epoch; None: too soon after the last one.
+
+        The number of pending challenges is bounded; an answered one no longer counts.
+        """
+        while self._challenges and now_s - self._oldest_s() >= CHALLENGE_AGAIN_S:
+            self._challenges.popitem(last=False)
+        waiting = self._challenges.get(node)
+        if waiting is not None:
+            return None
+        if len(self._challenges) >= WAITING_CHALLENGES:
+            if now_s - self._oldest_s() < CHALLENGE_OUT_S:
+                return None
+            self._challenges.popitem(last=False)
+        nonce = self._rng.getrandbits(_NONCE_BITS)
+        self._challenges[node] = _Challenge(nonce, now_s)
+        return self._proven(MessageType.SEAL_CHALLENGE, node, _CHALLENGE.pack(nonce))
+
+    @property
+    def crowded(self) -> bool:
+        """Whether so many challenges are unanswered that many of those nodes cannot exist."""
+        return len(self._challenges) > WAITING_CHALLENGES // 2
+
+    def answer(self, challenge: bytes) -> bytes | None:
+        """The answer to a challenge; None if it is not from a node with the key."""
+        if not self._is_proven(challenge):
+            return None
+        (nonce,) = _CHALLENGE.unpack_from(challenge, messages.HEADER_BYTES)
+        body = _ANSWER.pack(nonce, self._epoch, self._count)
+        return self._proven(MessageType.SEAL_ANSWER, messages.sender(challenge), body)
+
+    def answered(self, answer: bytes, now_s: float) -> bool | None:
+        """Store a neighbour's epoch from its answer; returns whether that epoch is new.
+
+        None: it is not an answer to a challenge of this node.
+        """
+        node = messages.sender(answer)
+        waiting = self._challenges.get(node)
+        if waiting is None or not self._is_proven(answer):
+            return None
+        nonce, epoch, count = _ANSWER.unpack_from(answer, messages.HEADER_BYTES)
+        if nonce != waiting.nonce:
+            return None
+        del self._challenges[node]
+        known = self._peers.get(node)
+        is_new = known is None or known.epoch != epoch
+        if known is not None and not is_new:
+            count = max(count, known.window.highest)
+        self._peers[node] = _Peer(self._keys.network, self._pair_key(node), epoch, count, now_s)
+        return is_new
+
+    def _oldest_s(self) -> float:
+        return next(iter(self._challenges.values())).sent_s
+
+    def _begin_epoch(self) -> None:
+        self._epoch = self._rng.getrandbits(_EPOCH_BITS)
+        self._count = 0
+        self._state_to_all = _epoch_state(self._keys.network, self._epoch)
+        self._states.clear()
+
+    def _state_to(self, receiver: int) -> hashlib.blake2s:
+        self._states[receiver] = state = _epoch_state(self._pair_key(receiver), self._epoch)
+        return state
+
+    def _pair_key(self, other: int) -> bytes:
+        key = self._keys.pair(self._node_id, other)
+        assert key is not None, "a node has its own keys"
+        return key
+
+    def _proven(self, kind: MessageType, to: int, body: bytes) -> bytes:
+        packet = messages.packet(kind, self._node_id, self._node_id, to, to, body)[:TAG_AT]
+        return packet + self._proof(packet, to)
+
+    def _is_proven(self, payload: bytes) -> bool:
+        proof = self._proof(payload[:TAG_AT], messages.sender(payload))
+        return compare_digest(proof, payload[TAG_AT:])
+
+    def _proof(self, packet: bytes, other: int) -> bytes:
+        """The tag of a challenge or an answer.
+
+        It covers all but byte 3, which differs for each receiver of a broadcast challenge.
+        """
+        key = self._pair_key(other)
+        covered = packet[:TO_AT] + packet[FORWARD_AT:]
+        tag = hashlib.blake2s(covered, key=key, digest_size=TAG_BYTES, person=b"epochs")
+        return tag.digest()
+
+
+def _epoch_state(key: bytes, epoch: int) -> hashlib.blake2s:
+    """The hash state for the tags of an epoch's packets; to be copied for each packet."""
+    state = hashlib.blake2s(key=key, digest_size=TAG_BYTES, person=b"hop")
+    state.update(struct.pack("<Q", epoch))
+    return state

@@ -1,0 +1,268 @@
+"""SealedAntenna: an antenna of a mesh with a key (docs/security.md).
+
+It stands between an antenna and a mesh component, and has the interface of each for the other.
+Neither of them handles seals; the component only puts less into a packet (`reserved_bytes`).
+"""
+
+from __future__ import annotations
+
+import random
+from typing import Callable, Sequence
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.complaints import Complaints
+from drone_mesh.communication.interfaces import (
+    BROADCAST,
+    MAX_NODE_ID,
+    PAYLOAD_BYTES,
+    IMeshDebugInfo,
+    IMeshNetwork,
+    IWirelessCommunication,
+)
+from drone_mesh.communication.medium import ChannelUse, Medium
+from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TYPE_AT, MessageType
+from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven, reserved_bytes
+from drone_mesh.communication.seals.keys import Keys
+from drone_mesh.communication.seals.message_seal import MessageSeal
+from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES, HopSeal
+from drone_mesh.communication.timing import MeshTiming
+
+FRESH_PERIODS = 3.0  # our choice: a neighbour sends something once per check period
+FOREIGN_AFTER_S = 20.0  # our choice: two check periods; a restarted neighbour answers by then
+FOREIGN_FORGOTTEN_S = 60.0  # our choice: then the count starts again, as some packets arrive twice
+FOREIGN_PACKETS = 3
+
+_CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
+_PRESENT = int(MessageType.PRESENT)
+_ORDER = int(MessageType.MOVE_TO_LOCATION)
+_NO_SEAL = bytes(SEAL_BYTES)
+
+
+class _Unopened:
+    """The packets of one node that could not be opened."""
+
+    def __init__(self, since_s: float) -> None:
+        self.since_s = since_s
+        self.count = 0
+
+
+class SealedAntenna(IWirelessCommunication, IMeshNetwork):
+    """Seals what the component sends, and hands it only what is authentic.
+
+    All calls come from the thread of the component, as for every antenna; `on` and `channel_use`
+    may be called by any other.
+    """
+
+    def __init__(
+        self,
+        antenna: IWirelessCommunication,
+        node_id: int,
+        keys: Keys,
+        rng: random.Random,
+        clock: Callable[[], float],
+        timing: MeshTiming | None = None,
+    ) -> None:
+        """`rng` draws epochs and nonces: random.SystemRandom, except in simulations.
+
+        `clock` gives the time of the component, in seconds.
+        """
+        self._antenna = antenna
+        self._node_id = node_id
+        fresh_s = FRESH_PERIODS * (timing or MeshTiming()).check_period_s
+        self._seal = HopSeal(node_id, keys, rng, fresh_s)
+        self._end_to_end = EndToEnd(node_id, keys, rng)
+        self._message_seal = MessageSeal(keys)
+        self._mesh: IMeshNetwork | None = None
+        self._present = b""  # the last one, for neighbours that could not open it
+        self._unopened: dict[int, _Unopened] = {}
+        self._clock = clock
+        self.complaints = Complaints(node_id)
+
+    # For the component -----------------------------------------------------------------------
+
+    @property
+    def medium(self) -> Medium:
+        return self._antenna.medium
+
+    def reserved_bytes(self, kind: int) -> int:
+        return reserved_bytes(kind)
+
+    def seal_message(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
+        return self._message_seal.seal(creator, to, place, payload)
+
+    def open_message(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
+        return self._message_seal.open(creator, to, place, sealed)
+
+    def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
+        return self._message_seal.acknowledgement_tag(creator, to, body)
+
+    def may_be_gateway(self, node: int) -> bool:
+        return self._end_to_end.is_gateway(node)
+
+    def foreign_neighbour(self) -> str:
+        return self.complaints.foreign_neighbour(self._clock())
+
+    def channel_use(self) -> ChannelUse:
+        return self._antenna.channel_use()
+
+    def patience(self) -> float:
+        return self._antenna.patience()
+
+    def data_room(self) -> int:
+        return self._antenna.data_room()
+
+    def start_antenna(self, mesh: IMeshNetwork) -> None:
+        self._mesh = mesh
+        self._antenna.start_antenna(self)
+
+    def stop_antenna(self) -> None:
+        self._antenna.stop_antenna()
+        self._mesh = None
+
+    def send_message_to(self, payload: bytes) -> bool:
+        """As for every antenna; True also for a packet that its addressee could not verify yet."""
+        if payload[CREATOR_AT] == self._node_id:
+            proven = self._proven(payload)
+            if proven is None:
+                return True
+            payload = proven
+        return self._antenna.send_message_to(self._seal.seal(payload))
+
+    def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:
+        proven = [self._proven(payload) for payload in payloads]
+        sealed = [self._seal.seal(payload) for payload in proven if payload is not None]
+        taken = iter(self._antenna.send_messages(sealed))
+        return [payload is None or next(taken) for payload in proven]
+
+    def broadcast_message(self, payload: bytes) -> None:
+        payload = self._end_to_end.seal(payload, self._clock()) or payload
+        if payload[TYPE_AT] == _PRESENT:
+            self._present = payload
+        self._antenna.broadcast_message(self._seal.seal(payload))
+
+    def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
+        self._antenna.debugging_mode(info, on)
+
+    def on(self) -> bool:
+        return self._antenna.on()
+
+    def _proven(self, payload: bytes) -> bytes | None:
+        """A packet with its end-to-end seal; None: its addressee could not verify it yet."""
+        if payload[CREATOR_AT] != self._node_id or payload[SEAL_AT - 2] or payload[SEAL_AT - 1]:
+            return payload
+        now_s = self._clock()
+        proven = self._end_to_end.seal(payload, now_s)
+        if proven is None:
+            detail = f"no nonce of node {payload[FORWARD_AT]} was received yet"
+            self.complaints.add("a packet could not be sealed", detail, now_s)
+        return proven
+
+    # For the antenna -------------------------------------------------------------------------
+
+    def get_node_id(self) -> int:
+        return self._node_id
+
+    def on_msg(self, payload: bytes, now_s: float) -> None:
+        """Open a packet and pass it on; one that is not authentic ends here."""
+        mesh = self._mesh
+        if mesh is None:
+            return
+        if len(payload) != PAYLOAD_BYTES:
+            mesh.on_msg(payload, now_s)  # complains
+            return
+        opened = self._seal.open(payload, now_s)
+        if opened is None:
+            self._not_opened(payload, now_s)
+            return
+        forward = opened[FORWARD_AT]
+        if forward == self._node_id or forward == BROADCAST:
+            try:
+                opened = self._end_to_end.open(opened)
+            except NotProven as error:
+                self._not_proven(str(error), payload, now_s)
+                return
+        mesh.on_msg(opened, now_s)
+
+    def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
+        """A radio that acknowledged a challenge and never answered it is no neighbour."""
+        if self._mesh is not None and self._seal.knows(neighbour, now_s):
+            self._mesh.on_delivered(neighbour, tries, now_s)
+
+    def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
+        kind = payload[TYPE_AT]
+        if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, _PRESENT):
+            self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, tries, now_s)
+
+    def on_antenna_power(self, on: bool, now_s: float) -> None:
+        if self._mesh is not None:
+            self._mesh.on_antenna_power(on, now_s)
+
+    def on_antenna_registered(self, now_s: float) -> None:
+        if self._mesh is not None:
+            self._mesh.on_antenna_registered(now_s)
+
+    # Packets that do not open ----------------------------------------------------------------
+
+    def _not_opened(self, payload: bytes, now_s: float) -> None:
+        from_, kind = messages.sender(payload), messages.type_of(payload)
+        if from_ > MAX_NODE_ID or from_ == self._node_id:
+            self.complaints.dropped("a packet with invalid ids", payload, now_s)
+        elif kind == _CHALLENGE:
+            self._on_challenge(payload, from_, now_s)
+        elif kind == _ANSWER:
+            if self._seal.answered(payload, now_s):
+                self._unopened.pop(from_, None)
+        else:
+            self._complain(payload, from_, now_s)
+            self._challenge(from_, now_s)
+
+    def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
+        if messages.addressee(challenge) != self._node_id:
+            return
+        answer = self._seal.answer(challenge)
+        if answer is None:
+            self._complain(challenge, from_, now_s)
+            return
+        self._antenna.send_message_to(answer)
+        if self._present:
+            present = messages.readdressed(self._present, from_)
+            self._antenna.send_message_to(self._seal.seal(present))
+        if not self._seal.knows(from_, now_s):
+            self._challenge(from_, now_s)
+
+    def _challenge(self, node: int, now_s: float) -> None:
+        challenge = self._seal.challenge(node, now_s)
+        if challenge is None:
+            return
+        if self._antenna.medium.shared and self._seal.crowded:  # some of these ids may not exist
+            self._antenna.broadcast_message(challenge)
+        else:
+            self._antenna.send_message_to(challenge)
+
+    def _not_proven(self, reason: str, payload: bytes, now_s: float) -> None:
+        """Copies, and packets for an old nonce, are normal; forged orders are not."""
+        if payload[TYPE_AT] == _ORDER:
+            self.complaints.dropped(reason, payload, now_s)
+        else:
+            self.complaints.counts[f"dropped {reason}"] += 1
+
+    def _complain(self, payload: bytes, from_: int, now_s: float) -> None:
+        """A restarted neighbour is normal; one that never answers a challenge is not."""
+        unopened = self._unopened.get(from_)
+        if unopened is None or now_s - unopened.since_s > FOREIGN_FORGOTTEN_S:
+            unopened = self._unopened[from_] = _Unopened(now_s)
+        unopened.count += 1
+        if unopened.count < FOREIGN_PACKETS or now_s - unopened.since_s < FOREIGN_AFTER_S:
+            return
+        if self._seal.knows(from_, now_s):
+            reason = f"replayed or forged packets in the name of node {from_}"
+            self.complaints.add(reason, payload.hex(), now_s)
+        elif payload[SEAL_AT:] == _NO_SEAL:
+            reason = f"a neighbour, node {from_}, sends packets without a seal: it has no key"
+            self.complaints.foreign(reason, payload, now_s)
+        else:
+            reason = (
+                f"a neighbour, node {from_}, sends packets that this node's key does not open: "
+                "another mesh or another key?"
+            )
+            self.complaints.foreign(reason, payload, now_s)
