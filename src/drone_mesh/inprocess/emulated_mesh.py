@@ -11,6 +11,7 @@ import random
 from collections import deque
 from typing import Any, Callable
 
+from drone_mesh.channel.runtime import Task
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
@@ -26,7 +27,6 @@ from drone_mesh.nrf24.emulator.clock import EmulatorClock
 from drone_mesh.nrf24.emulator.links import LinkModel
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.runtime import Task
 from drone_mesh.nrf24.settings import RadioSettings
 
 Work = Callable[[float], None]

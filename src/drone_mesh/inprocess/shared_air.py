@@ -13,12 +13,12 @@ from __future__ import annotations
 import abc
 import math
 
+from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
-from drone_mesh.nrf24.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.nrf24.settings import RadioSettings
 
 

@@ -7,6 +7,10 @@ import random
 from dataclasses import replace
 from typing import Callable
 
+from drone_mesh.channel.medium_access import Fate, MediumAccess
+from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, Priority
+from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
+from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import (
     MAX_NODE_ID,
     IMeshDebugInfo,
@@ -19,12 +23,8 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
-from drone_mesh.nrf24.medium_access import Fate, MediumAccess
 from drone_mesh.nrf24.pace import access_rules, medium_of
-from drone_mesh.nrf24.packet_queue import ALL_NODES, OutgoingPacket, Priority
 from drone_mesh.nrf24.registers import FIFO_DEPTH
-from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
-from drone_mesh.nrf24.trains import place_in_train
 from drone_mesh.nrf24.transceiver import CE_PULSE_S, TX_DELAY_S
 
 SETTLING_S = SETTLING_NS / NS_PER_S

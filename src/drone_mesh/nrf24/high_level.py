@@ -6,6 +6,12 @@ import logging
 from dataclasses import replace
 from typing import Callable, Mapping
 
+from drone_mesh.channel.link_quality import LinkQuality, Quality
+from drone_mesh.channel.packet_queue import ALL_NODES, Priority
+from drone_mesh.channel.runtime import Runtime, SystemRuntime, Task
+from drone_mesh.channel.sender import Sender
+from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
+from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -18,15 +24,9 @@ from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import is_data, readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import PacketInbox
-from drone_mesh.nrf24.link_quality import LinkQuality, Quality
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.pace import medium_of
-from drone_mesh.nrf24.packet_queue import ALL_NODES, Priority
-from drone_mesh.nrf24.runtime import Runtime, SystemRuntime, Task
-from drone_mesh.nrf24.sender import Sender
 from drone_mesh.nrf24.settings import BROADCAST_PIPE
-from drone_mesh.nrf24.statistics import ChannelMeter, RadioStatistics
-from drone_mesh.nrf24.trains import place_in_train
 from drone_mesh.nrf24.transceiver import Received
 
 logger = logging.getLogger(__name__)

@@ -7,18 +7,18 @@ import random
 from dataclasses import replace
 from typing import Callable
 
+from drone_mesh.channel.access_rules import AccessRules
+from drone_mesh.channel.medium_access import Fate, MediumAccess
+from drone_mesh.channel.packet_queue import OutgoingPacket, Priority
+from drone_mesh.channel.runtime import Runtime, SystemRuntime
+from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
-from drone_mesh.nrf24.access_rules import AccessRules
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch
-from drone_mesh.nrf24.medium_access import Fate, MediumAccess
 from drone_mesh.nrf24.pace import access_rules
-from drone_mesh.nrf24.packet_queue import OutgoingPacket, Priority
-from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
-from drone_mesh.nrf24.statistics import RadioStatistics
 from drone_mesh.nrf24.transceiver import Received, Transceiver
 
 logger = logging.getLogger(__name__)

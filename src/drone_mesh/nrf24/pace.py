@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.communication.medium import Medium
-from drone_mesh.nrf24.access_rules import AccessRules
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 
 CYCLE_S = {DataRate.KBPS_250: 2.6e-3, DataRate.MBPS_1: 1.1e-3, DataRate.MBPS_2: 0.9e-3}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
+from drone_mesh.channel.runtime import Runtime
+from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.airtime import ard_s
 from drone_mesh.nrf24.errors import RadioError
@@ -26,7 +28,6 @@ from drone_mesh.nrf24.registers import (
     Command,
     Register,
 )
-from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import (
     OWN_PIPE,
     BroadcastMode,
@@ -34,7 +35,6 @@ from drone_mesh.nrf24.settings import (
     RadioSettings,
 )
 from drone_mesh.nrf24.spi import SpiDevice
-from drone_mesh.nrf24.statistics import RadioStatistics
 
 POWER_UP_S = 5e-3  # Tpd2stby is up to 4.5 ms, depending on the crystal [DS Table 16]
 CE_PULSE_S = 20e-6  # Thce is 10 us; a pulse sends one packet and does not keep the chip in TX

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 from typing import NamedTuple
 
+from drone_mesh.channel.runtime import Runtime
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.airtime import ard_s
 from drone_mesh.nrf24.errors import RadioError
@@ -23,7 +24,6 @@ from drone_mesh.nrf24.registers import (
     Command,
     Register,
 )
-from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import POWER_UP_S

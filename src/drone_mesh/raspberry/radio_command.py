@@ -10,13 +10,13 @@ import time
 from pathlib import Path
 from typing import Callable, Iterator, Sequence
 
+from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.nrf24.emulator.pcapng import LINKTYPE_PAYLOADS, CapturedPacket, PcapngWriter
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.gpio import CePin, GpiodCe, GpiodIrq, IrqPin
-from drone_mesh.nrf24.runtime import Runtime, SystemRuntime
 from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice, open_spi
 from drone_mesh.raspberry import radio_tests, range_test

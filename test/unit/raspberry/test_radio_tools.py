@@ -8,6 +8,7 @@ from typing import Iterator
 
 import pytest
 
+from drone_mesh.channel.runtime import Runtime
 from drone_mesh.communication.messages import IntroduceMessage
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
@@ -15,7 +16,6 @@ from drone_mesh.nrf24.emulator.links import LogDistance
 from drone_mesh.nrf24.emulator.wall_clock import WallClock
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.registers import Register
-from drone_mesh.nrf24.runtime import Runtime
 from drone_mesh.nrf24.settings import DataRate, RadioSettings
 from drone_mesh.raspberry import radio_tests
 from drone_mesh.raspberry.field_radio import FieldRadio

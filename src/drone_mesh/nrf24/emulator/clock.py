@@ -9,7 +9,7 @@ from __future__ import annotations
 import abc
 from typing import Callable, ContextManager
 
-from drone_mesh.nrf24.runtime import Runtime, Signal
+from drone_mesh.channel.runtime import Runtime, Signal
 
 
 class EmulatorClock(abc.ABC):

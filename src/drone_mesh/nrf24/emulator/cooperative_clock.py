@@ -21,9 +21,9 @@ from typing import Any, Callable, ContextManager
 
 import greenlet
 
+from drone_mesh.channel.runtime import Runtime, Signal, Task
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
-from drone_mesh.nrf24.runtime import Runtime, Signal, Task
 
 logger = logging.getLogger(__name__)
 

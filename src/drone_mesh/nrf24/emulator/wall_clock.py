@@ -16,9 +16,9 @@ import threading
 import time
 from typing import Any, Callable, Iterator
 
+from drone_mesh.channel.runtime import Runtime, Signal, SystemRuntime, ThreadSignal
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
-from drone_mesh.nrf24.runtime import Runtime, Signal, SystemRuntime, ThreadSignal
 
 logger = logging.getLogger(__name__)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rospy
 
+from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import (
     IMeshDebugInfo,
     IMeshNetwork,
@@ -14,7 +15,6 @@ from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import NRF24
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.statistics import RadioStatistics
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.packet_samples import PacketSamples
 from drone_mesh.ros.host.antenna_panel import AntennaPanel

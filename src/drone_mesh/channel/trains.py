@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from drone_mesh.channel.yielding import InTrain
 from drone_mesh.communication import messages
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.nrf24.yielding import InTrain
 
 
 def place_in_train(payload: bytes, receiver: int) -> InTrain:

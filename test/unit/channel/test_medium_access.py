@@ -10,11 +10,11 @@ import random
 
 import pytest
 
+from drone_mesh.channel.access_rules import AccessRules
+from drone_mesh.channel.medium_access import Fate, MediumAccess
+from drone_mesh.channel.packet_queue import ALL_NODES, Priority
+from drone_mesh.channel.yielding import InTrain
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.nrf24.access_rules import AccessRules
-from drone_mesh.nrf24.medium_access import Fate, MediumAccess
-from drone_mesh.nrf24.packet_queue import ALL_NODES, Priority
-from drone_mesh.nrf24.yielding import InTrain
 
 CYCLE_S = 0.0026
 RULES = AccessRules.for_cycle(CYCLE_S)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.nrf24.trains import place_in_train
-from drone_mesh.nrf24.yielding import InTrain
+from drone_mesh.channel.trains import place_in_train
+from drone_mesh.channel.yielding import InTrain
 
 RELAY, GATEWAY = 3, 0
 

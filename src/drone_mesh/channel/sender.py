@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Callable
 
-from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
-from drone_mesh.nrf24.medium_access import Fate
-from drone_mesh.nrf24.packet_queue import ALL_NODES, OutgoingPacket, Priority
-from drone_mesh.nrf24.runtime import Runtime, Task
-from drone_mesh.nrf24.yielding import InTrain
+from drone_mesh.channel.medium_access import Fate
+from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, Priority
+from drone_mesh.channel.radio import PacketRadio
+from drone_mesh.channel.runtime import Runtime, Task
+from drone_mesh.channel.yielding import InTrain
 
 
 class Sender:
@@ -20,7 +20,7 @@ class Sender:
 
     def __init__(
         self,
-        radio: NRF24LowLevelInterface,
+        radio: PacketRadio,
         runtime: Runtime,
         on_delivered: Callable[[int, int], None],
         on_given_up: Callable[[bytes, int], None],

@@ -33,9 +33,9 @@ import math
 import random
 from typing import Any
 
-from drone_mesh.nrf24.access_rules import AccessRules
-from drone_mesh.nrf24.packet_queue import ALL_NODES, OutgoingPacket, PacketQueue, Priority
-from drone_mesh.nrf24.yielding import InTrain, Yielding
+from drone_mesh.channel.access_rules import AccessRules
+from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, PacketQueue, Priority
+from drone_mesh.channel.yielding import InTrain, Yielding
 
 
 class Fate(enum.Enum):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 
-from drone_mesh.nrf24.access_rules import AccessRules
+from drone_mesh.channel.access_rules import AccessRules
 
 _NO_SENDER = -1
 
