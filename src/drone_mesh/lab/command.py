@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Callable, Sequence
 
 from drone_mesh.errors import MeshError
-from drone_mesh.lab.attacks import ATTACKS
 from drone_mesh.lab.campaign import Campaign
-from drone_mesh.lab.damage import KEY, keys_of, table
 from drone_mesh.lab.estimate import Estimate, estimate
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.fuzz import NODES, crowd, fuzz
 from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
+from drone_mesh.lab.proofs.attacks import ATTACKS
+from drone_mesh.lab.proofs.damage import KEY, keys_of, table
+from drone_mesh.lab.proofs.fuzz import NODES, crowd, fuzz
 from drone_mesh.lab.status import describe_folder
 from drone_mesh.lab.template import write_template
 

@@ -7,10 +7,10 @@ import functools
 import pytest
 
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.attacks import ATTACKS, RECORDING
 from drone_mesh.lab.command import main
-from drone_mesh.lab.damage import KEY, Threat, keys_of, table, trial
-from drone_mesh.lab.fuzz import crowd, fuzz, tables
+from drone_mesh.lab.proofs.attacks import ATTACKS, RECORDING
+from drone_mesh.lab.proofs.damage import KEY, Threat, keys_of, table, trial
+from drone_mesh.lab.proofs.fuzz import crowd, fuzz, tables
 
 # Tolerance where an attack must have no effect: the scenario alone has slightly different results
 # when packets travel at other moments.

@@ -14,7 +14,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.seals.message_seal import MessageSeal
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.stranger import Hole, Tap
+from drone_mesh.lab.proofs.stranger import Hole, Tap
 
 TO_ALL = 254
 PLACE = b"\x34\x12\x07\x05\x00"

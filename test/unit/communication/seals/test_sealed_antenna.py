@@ -9,7 +9,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.stranger import Tap
+from drone_mesh.lab.proofs.stranger import Tap
 
 
 def line(nodes, key=KEY, radio="disc", **options):

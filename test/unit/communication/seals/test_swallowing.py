@@ -8,7 +8,7 @@ from seal_rig import KEY
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
 from drone_mesh.communication.swallowing import Swallowing
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.stranger import Hole
+from drone_mesh.lab.proofs.stranger import Hole
 
 NOTICED_WITHIN_S = 120.0
 

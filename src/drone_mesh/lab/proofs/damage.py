@@ -13,8 +13,14 @@ from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
 from drone_mesh.inprocess.network import Network
-from drone_mesh.lab.attacks import ATTACKS, RECORDING, highest_bid, invented_ids, plausible_bid
-from drone_mesh.lab.stranger import BESIDE, Stranger
+from drone_mesh.lab.proofs.attacks import (
+    ATTACKS,
+    RECORDING,
+    highest_bid,
+    invented_ids,
+    plausible_bid,
+)
+from drone_mesh.lab.proofs.stranger import BESIDE, Stranger
 
 NODES, SHARED_NODES = 25, 9
 SPACING_M = 6.0

@@ -10,7 +10,7 @@ from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.network import Network
-from drone_mesh.lab.stranger import RecordedPacket, Tap
+from drone_mesh.lab.proofs.stranger import RecordedPacket, Tap
 
 NODES = 6
 SPACING_M = 6.0

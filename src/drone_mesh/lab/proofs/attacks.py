@@ -19,7 +19,7 @@ from drone_mesh.communication.messages import (
     readdressed,
 )
 from drone_mesh.drone.location import Location
-from drone_mesh.lab.stranger import Stranger
+from drone_mesh.lab.proofs.stranger import Stranger
 
 ATTACK_S = 60.0
 OUTAGE_S = 90.0

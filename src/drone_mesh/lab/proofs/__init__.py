@@ -1,0 +1,1 @@
+"""Programs that prove what a mesh withstands: attackers and mutated packets."""
