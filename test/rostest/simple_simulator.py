@@ -1,5 +1,9 @@
 #!/usr/bin/env python3
-"""A WirelessSignalSimulator of the specification: `message` and `othersinRange` alone."""
+"""A WirelessSignalSimulator written from the original design: its figure 3.28 and two services.
+
+An unknown node is registered by a message with a topic; other messages about it are dropped. Each
+message about a known node switches its power or else updates all that the message says.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +22,15 @@ powered: dict[int, bool] = {}
 
 
 def hear(info: DroneInfo) -> None:
-    if not info.sub:
-        positions[info.nodeID] = tuple(info.position)
-        return
     if info.nodeID not in antennas:
+        if not info.sub:
+            return
         antennas[info.nodeID] = rospy.Publisher(info.sub, NRF24, queue_size=100)
+    elif powered[info.nodeID] != info.on:
+        powered[info.nodeID] = info.on
+        return
     powered[info.nodeID] = info.on
+    positions[info.nodeID] = tuple(info.position)
 
 
 def reaches(sender: int, receiver: int) -> bool:

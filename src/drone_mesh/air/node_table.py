@@ -48,7 +48,9 @@ class NodeTable:
     # DroneInfo -------------------------------------------------------------------------------
 
     def drone_info(self, node_id: int, position: Sequence[float], sub: str, on: bool) -> None:
-        """Apply one DroneInfo; with `sub` it comes from an antenna, otherwise from an engine.
+        """Apply one DroneInfo. With `sub` it comes from an antenna; without, it is a position.
+
+        Only without either it speaks of power alone: engines leave `on` false.
 
         Raises AirError, and changes nothing, for an invalid id, position or topic.
         """
@@ -58,7 +60,7 @@ class NodeTable:
             check_topic(node_id, sub)
             self._apply_from_antenna(node_id, place, sub, on)
         else:
-            self._apply_from_engine(node_id, place, on)
+            self._apply_without_topic(node_id, place, on)
 
     def _apply_from_antenna(self, node_id: int, position: Position, topic: str, on: bool) -> None:
         known = self._nodes.get(node_id)
@@ -68,13 +70,12 @@ class NodeTable:
         if known != Node(node_id, topic, on):
             self._set(Node(node_id, topic, on))
 
-    def _apply_from_engine(self, node_id: int, position: Position, on: bool) -> None:
+    def _apply_without_topic(self, node_id: int, position: Position, on: bool) -> None:
         node = self._nodes.get(node_id)
-        if not on:
-            if node is not None and node.on:
-                self._set(Node(node_id, node.topic, False))
-        elif node is not None and not node.on and position == _UNKNOWN:
-            self._set(Node(node_id, node.topic, True))
+        stays_on = node is not None and node.on and on
+        if position == _UNKNOWN and not stays_on:
+            if node is not None and node.on != on:
+                self._set(Node(node_id, node.topic, on))
         elif self._positions.get(node_id) != position:
             self._positions[node_id] = position
             self._places[node_id] = position

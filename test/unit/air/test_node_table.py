@@ -60,11 +60,26 @@ def test_a_flying_drone_does_not_switch_its_antenna_back_on():
     assert table.position(1) == (6.0, 0.0, 0.05)
 
 
-def test_power_off_without_sub_leaves_the_position_alone():
+def test_a_message_with_neither_sub_nor_position_switches_the_power_and_moves_nothing():
     table = register_of((1.0, 2.0, 0.05))
-    table.drone_info(0, (9.0, 9.0, 9.0), "", False)
+    table.drone_info(0, NOWHERE, "", False)
     assert table.node(0) == Node(0, "/Node/0", False)
     assert table.position(0) == (1.0, 2.0, 0.05)
+
+
+def test_an_engine_that_fills_only_id_and_position_moves_its_node_and_leaves_it_on():
+    """As in the original design; `on` is false then, because nobody has set it."""
+    table = register_of((1.0, 2.0, 0.05))
+    table.drone_info(0, (9.0, 9.0, 9.0), "", False)
+    assert table.node(0) == Node(0, "/Node/0", True)
+    assert table.position(0) == (9.0, 9.0, 9.0)
+
+
+def test_the_power_of_an_unknown_node_is_no_position_of_it():
+    table = NodeTable()
+    table.drone_info(7, NOWHERE, "", False)
+    table.drone_info(7, (5.0, 0.0, 0.05), "/Node/7", True)
+    assert table.position(7) == (5.0, 0.0, 0.05)
 
 
 def test_exactly_the_origin_without_sub_switches_on_a_node_that_is_off():
@@ -159,3 +174,10 @@ def test_both_queries_agree_however_nodes_are_moved_and_switched():
     links = {pair for pair in itertools.permutations(range(40), 2) if table.link(*pair)}
     assert links == {(a, b) for a in range(40) for b in table.in_range(a)}
     assert 100 < len(links) < 40 * 39
+
+
+def test_power_off_twice_moves_nothing():
+    table = register_of((1.0, 2.0, 0.05))
+    for _ in range(2):
+        table.drone_info(0, NOWHERE, "", False)
+    assert table.position(0) == (1.0, 2.0, 0.05)

@@ -17,7 +17,7 @@ from drone_mesh.srv import RequestGPSResponse
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 _CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
-_NO_POSITION = (0.0, 0.0, 0.0)
+NO_POSITION: Vector = (0.0, 0.0, 0.0)  # of a DroneInfo that only speaks of power or topic
 
 
 class PlaceMsg(Protocol):
@@ -66,14 +66,22 @@ def flight_order(node_id: int, goal: Location) -> RequestGatewayDroneFlight:
 # DroneInfo (docs/protocol.md, "Sources of DroneInfo") -------------------------------------------
 
 
-def engine_info(node_id: int, position: Vector, flat: bool = False) -> DroneInfo:
-    """The DroneInfo of an engine: always a position, never a topic; off if its battery is flat."""
-    return DroneInfo(nodeID=node_id, position=position, sub="", on=not flat)
+def engine_info(node_id: int, position: Vector) -> DroneInfo:
+    """The DroneInfo of an engine: always a position, never a topic."""
+    return DroneInfo(nodeID=node_id, position=position, sub="", on=True)
 
 
-def antenna_info(node_id: int, topic: str, on: bool) -> DroneInfo:
-    """The DroneInfo of an antenna: always a topic, never a position."""
-    return DroneInfo(nodeID=node_id, position=_NO_POSITION, sub=topic, on=on)
+def power_off_info(node_id: int) -> DroneInfo:
+    """The DroneInfo of a node that has lost its power, with neither position nor topic."""
+    return DroneInfo(nodeID=node_id, position=NO_POSITION, sub="", on=False)
+
+
+def antenna_info(node_id: int, topic: str, on: bool, position: Vector) -> DroneInfo:
+    """The DroneInfo of an antenna: its topic, and where its drone's engine was last.
+
+    A simulator that follows the original design takes the position of each message of a known node.
+    """
+    return DroneInfo(nodeID=node_id, position=position, sub=topic, on=on)
 
 
 # State and events -------------------------------------------------------------------------------

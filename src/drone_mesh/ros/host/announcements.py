@@ -7,9 +7,13 @@ from collections import deque
 from typing import Callable, Protocol
 
 from drone_mesh.communication.messages import MessageType, packet
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import antenna_info
+
+PlaceOf = Callable[[int], Vector]
+"""The position that the engine of this drone reported last, metres; NO_POSITION if none did."""
 
 
 class AnnouncedAntenna(Protocol):
@@ -36,8 +40,9 @@ class Announcements:
     the power of the antennas changed; publishing only appends to a queue.
     """
 
-    def __init__(self, publish: Callable[[DroneInfo], None]) -> None:
+    def __init__(self, publish: Callable[[DroneInfo], None], place_of: PlaceOf) -> None:
         self._publish = publish
+        self._place_of = place_of
         self._lock = threading.Lock()
         self._announcing = threading.Lock()
         self._rota: deque[int] = deque()  # ids of all antennas, least recently announced first
@@ -67,10 +72,11 @@ class Announcements:
                 self._rota.remove(antenna.node_id)
 
     def announce(self, antenna: AnnouncedAntenna) -> None:
-        """Publish where this antenna listens, and whether it has power."""
-        topic = names.node_topic(antenna.node_id)
+        """Publish where this antenna listens and is, and whether it has power."""
+        node_id = antenna.node_id
+        topic, place = names.node_topic(node_id), self._place_of(node_id)
         with self._announcing:
-            self._publish(antenna_info(antenna.node_id, topic, antenna.on()))
+            self._publish(antenna_info(node_id, topic, antenna.on(), place))
 
     def announce_all_to_new_simulator(self) -> None:
         """Announce all antennas: a new simulator has not registered any."""

@@ -13,6 +13,7 @@ from drone_mesh.drone.roles import Role
 from drone_mesh.errors import MeshError
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.ros.graph.figures import FiguresPublisher
+from drone_mesh.ros.host.announcements import PlaceOf
 from drone_mesh.ros.host.grounded_drones import GroundedDrones
 from drone_mesh.ros.host.host_reports import HostReports
 from drone_mesh.ros.host.mesh_settings import MeshSettings
@@ -44,18 +45,19 @@ class MeshHost:
         settings: MeshSettings,
         clock: Callable[[], float],
         on_failure: Callable[[str], None],
+        place_of: PlaceOf,
         radios: Radios | None = None,
     ) -> None:
         """`clock` gives simulated seconds; the code that advances it calls `time_advanced`.
 
-        `on_failure` is called with the reason when a node cannot start. `radios`: virtual ones by
-        default.
+        `on_failure` is called with the reason when a node cannot start. `place_of` is called in
+        any thread. `radios`: virtual ones by default.
         """
         self._reports = HostReports()
         self._settings = dataclasses.replace(settings, observer=self._reports.observe)
         self._on_failure = on_failure
         self.executor = MeshExecutor(clock, clock_notifies=True, name="mesh_host")
-        self._radios = VirtualRadios(self.executor) if radios is None else radios
+        self._radios = VirtualRadios(self.executor, place_of) if radios is None else radios
         self._figures = FiguresPublisher("host", self._take_figures)
         self._grounded = GroundedDrones()
         self.nodes: dict[int, VirtualRaspberryPi] = {}

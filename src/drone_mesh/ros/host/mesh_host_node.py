@@ -26,6 +26,7 @@ from drone_mesh.ros.host.followed_clock import FollowedClock
 from drone_mesh.ros.host.followed_fleet import FollowedFleet
 from drone_mesh.ros.host.mesh_host import MeshHost
 from drone_mesh.ros.host.mesh_settings import MeshSettings
+from drone_mesh.ros.host.reported_places import ReportedPlaces
 
 POLL_PERIOD_S = 0.1  # wall; our choice
 WAITING_LOG_PERIOD_S = 5.0  # wall; between two log lines about what is being waited for
@@ -108,7 +109,8 @@ def main() -> None:
         ids = or_exit(lambda: share_of_host(fleet, get_present_drones()))
         _log.info("serving %s", f"drones {ids.start}..{ids.stop - 1}" if ids else "no drones")
         settings = or_exit(lambda: MeshSettings.of(fleet, _obstacles_of(fleet)))
-        host = MeshHost(settings, lambda: clock.now_s, stop.fail)
+        places = ReportedPlaces()
+        host = MeshHost(settings, lambda: clock.now_s, stop.fail, places.place_of)
         # The world waits for declared hosts only.
         rospy.set_param(names.host_param(rospy.get_name()), [ids.start, ids.stop - 1])
         MasterWatch(names.host_param(rospy.get_name())).start()

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.execution import ExecutorSlot, MeshExecutor
+from drone_mesh.ros.host.announcements import PlaceOf
 from drone_mesh.ros.host.simulator_link import SimulatorLink
 from drone_mesh.ros.host.virtual_nrf24 import VirtualNRF24
 
@@ -58,9 +59,9 @@ class VirtualRadios:
 
     own_threads = False
 
-    def __init__(self, executor: MeshExecutor) -> None:
+    def __init__(self, executor: MeshExecutor, place_of: PlaceOf) -> None:
         self._executor = executor
-        self._link = SimulatorLink(executor)
+        self._link = SimulatorLink(executor, place_of)
 
     @property
     def ready(self) -> bool:

@@ -14,7 +14,7 @@ from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused
-from drone_mesh.ros.host.announcements import Announcements, probe_of
+from drone_mesh.ros.host.announcements import Announcements, PlaceOf, probe_of
 from drone_mesh.ros.host.simulator_connection import SimulatorConnection
 
 POLL_PERIOD_S = 0.1  # our choice: wall seconds between two attempts to reach a simulator
@@ -35,7 +35,7 @@ class SimulatorLink(rospy.SubscribeListener):
     `_connection` is replaced as a whole, under `_lock`.
     """
 
-    def __init__(self, executor: MeshExecutor) -> None:
+    def __init__(self, executor: MeshExecutor, place_of: PlaceOf) -> None:
         self._executor = executor
         self._connection: SimulatorConnection | None = None
         self._lock = threading.Lock()
@@ -53,7 +53,7 @@ class SimulatorLink(rospy.SubscribeListener):
             tcp_nodelay=True,
             queue_size=names.SIGNAL_QUEUE,
         )
-        self.antennas = Announcements(self._publisher.publish)
+        self.antennas = Announcements(self._publisher.publish, place_of)
         self._thread = threading.Thread(target=self._keep_connected, name="simulator_link")
 
     def start(self) -> None:

@@ -9,11 +9,12 @@ from typing import Callable, Sequence
 import rospy
 
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import GoalRefused
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.conversions import engine_info, gps_response
+from drone_mesh.ros.graph.conversions import engine_info, gps_response, power_off_info
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
 from drone_mesh.state.model import EventRecord
@@ -44,9 +45,11 @@ class PositionReporter(rospy.SubscribeListener):
         implementation.add_subscriber_listener(self)
         self._report_all()
 
-    def report(self, info: DroneInfo) -> None:
-        """Publish to all current subscribers."""
-        self._publisher.publish(info)
+    def report_position(self, node_id: int, position: Vector, is_flat: bool) -> None:
+        """Publish to all current subscribers; a drone with a flat battery has no power either."""
+        self._publisher.publish(engine_info(node_id, position))
+        if is_flat:
+            self._publisher.publish(power_off_info(node_id))
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """A new subscriber, perhaps a simulator that was restarted: report all positions.
@@ -61,7 +64,7 @@ class PositionReporter(rospy.SubscribeListener):
 
     def report_drone(self, drone: VirtualDrone) -> None:
         """Report the position of this drone now."""
-        self.report(engine_info(drone.node_id, drone.engine.state.position, drone.engine.is_flat))
+        self.report_position(drone.node_id, drone.engine.state.position, drone.engine.is_flat)
 
 
 class EngineServer:
@@ -116,7 +119,7 @@ class EngineServer:
         is_due = state.now_s - self._reported_s >= INFO_PERIOD_S - _ROUNDING_S
         if is_due or kind != self._reported:
             self._reported_s, self._reported = state.now_s, kind
-            self._reporter.report(engine_info(self._node_id, state.position, self._engine.is_flat))
+            self._reporter.report_position(self._node_id, state.position, self._engine.is_flat)
 
 
 class EngineServers:

@@ -9,6 +9,7 @@ import rospy
 
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import NO_POSITION
 from drone_mesh.world.drones import VirtualDrone
 
 
@@ -28,7 +29,8 @@ class ExternalEngines:
 
     def _reported(self, info: DroneInfo) -> None:
         x, y, z = info.position
-        if info.sub or not info.on or not math.isfinite(x + y + z):
+        has_position = (x, y, z) != NO_POSITION or info.on
+        if info.sub or not has_position or not math.isfinite(x + y + z):
             return
         for drone in self._drones():
             if drone.node_id == info.nodeID:

@@ -6,8 +6,10 @@ import logging
 from collections import deque
 from typing import Sequence
 
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.nrf24.settings import data_rate
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import NO_POSITION
 from drone_mesh.ros.graph.fleet_parameter import set_fleet_parameter
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
@@ -88,6 +90,13 @@ class RosSimulation:
     def _present(self) -> Sequence[VirtualDrone]:
         return self._factory.drones
 
+    def _place_of(self, node_id: int) -> Vector:
+        """Where the engine of this drone is; NO_POSITION if there is none (yet, or any more)."""
+        for drone in self._present():
+            if drone.node_id == node_id:
+                return drone.engine.state.position
+        return NO_POSITION
+
     def _make_radios(self) -> EmulatedRadios | None:
         """The emulated chips; None: the radio is virtual."""
         configuration, world = self._parameters.configuration, self._world
@@ -107,7 +116,9 @@ class RosSimulation:
         if self._parameters.hosts != 1:
             return None
         world = self._world
-        host = MeshHost(self._parameters.settings, lambda: world.now_s, stop.fail, radios)
+        host = MeshHost(
+            self._parameters.settings, lambda: world.now_s, stop.fail, self._place_of, radios
+        )
         host.start()
         if self._present():
             host.wait_for_radios(stop.requested)
