@@ -2,20 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Callable, Protocol
+from typing import Callable, Protocol, Sequence
 
 from drone_mesh.channel.medium_access import MediumAccess
+from drone_mesh.channel.statistics import RadioStatistics
+from drone_mesh.communication.medium import Medium
+
+
+class Received(Protocol):
+    """A payload from the air."""
+
+    @property
+    def payload(self) -> bytes:
+        """The bytes that were sent."""
+
+    @property
+    def to_all(self) -> bool:
+        """Whether it was broadcast."""
 
 
 class PacketRadio(Protocol):
     """One radio that sends to a node with acknowledgement, and to all without.
 
-    One thread at a time sends. While it sends it hears nothing. A failing radio raises nothing: its
-    sends fail until it works again.
+    One thread sends and one calls `receive`, at the same time. While it sends it hears nothing.
+    Once it has begun, a failing radio raises nothing: sends fail until it works again.
     """
 
     node_id: int
     access: MediumAccess  # when this radio may send
+
+    @property
+    def medium(self) -> Medium:
+        """The properties of its channel. Constant."""
+
+    def begin(self) -> None:
+        """Set it up and listen. Raises a MeshError that names the remedy if it does not work."""
+
+    def power_down(self) -> None:
+        """Neither send nor receive until `begin`."""
+
+    def close(self) -> None:
+        """Power down and release the hardware."""
 
     def try_once(
         self,
@@ -38,3 +65,9 @@ class PacketRadio(Protocol):
 
     def broadcast(self, payload: bytes) -> bool:
         """Send to every node in range, without acknowledgement; True: it was sent."""
+
+    def receive(self, timeout_s: float) -> Sequence[Received]:
+        """What has arrived, oldest first; waits up to `timeout_s` for something."""
+
+    def statistics(self) -> RadioStatistics:
+        """The current counters."""

@@ -43,7 +43,7 @@ class Sender:
     def start(self) -> None:
         """Start sending."""
         self._closed = False
-        self._task = self._runtime.start(self._run, f"nRF24 sender {self._radio.node_id}")
+        self._task = self._runtime.start(self._run, f"sender {self._radio.node_id}")
 
     def stop(self) -> None:
         """Give up waiting packets, without a report, and end the thread."""

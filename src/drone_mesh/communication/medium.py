@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from drone_mesh.communication.timing import HEARTBEAT_ANSWER_S
 
+FAST_HOP_S = 0.0026  # of an nRF24L01+ at 250 kbit/s; the times of the mesh suit hops up to this
+
 
 @dataclass(frozen=True)
 class Medium:
@@ -27,6 +29,7 @@ class Medium:
     * a gateway counts as lost after `heartbeats` unanswered ones.
     """
 
+    hop_s: float = 0.002  # one packet and its acknowledgement, from the decision to listening again
     shared: bool = False
     answer_s: float = HEARTBEAT_ANSWER_S  # how long to wait for the answer to a heartbeat
     answer_per_hop_s: float = 0.0  # additional time for each hop to the gateway
@@ -36,6 +39,27 @@ class Medium:
     missing_quiet_s: float = 0.0
     silence_s: float = 0.0  # a neighbour heard within this time survives one undelivered packet
     data_pause_s: float = 0.005  # between bursts of users' packets
+
+    @classmethod
+    def for_hop(cls, hop_s: float) -> Medium:
+        """A channel shared by packet radios that need `hop_s` for a hop."""
+        fast = cls(hop_s)
+        return cls(
+            hop_s,
+            shared=True,
+            answer_s=fast.stretched(1.0),
+            answer_per_hop_s=100 * hop_s,
+            heartbeats=3,
+            answer_spread_s=200 * hop_s,
+            search_s=800 * hop_s,
+            missing_quiet_s=fast.stretched(5.0),
+            silence_s=fast.stretched(3.0),
+            data_pause_s=4 * hop_s,
+        )
+
+    def stretched(self, seconds: float) -> float:
+        """What a time that suits hops of FAST_HOP_S becomes on this medium; never shorter."""
+        return seconds * max(1.0, self.hop_s / FAST_HOP_S)
 
 
 UNDISTURBED = Medium()

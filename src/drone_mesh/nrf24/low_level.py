@@ -16,7 +16,7 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch
-from drone_mesh.nrf24.pace import access_rules
+from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import Received, Transceiver
@@ -55,6 +55,7 @@ class NRF24LowLevelInterface:
         """`rules`: of access to the channel; by default those of `pace.access_rules`."""
         self.node_id = node_id
         self.settings = settings
+        self.medium = medium_of(settings)
         self._spi, self._ce, self._irq = spi, ce, irq
         self._runtime = runtime or SystemRuntime()
         self.access = MediumAccess(rules or access_rules(settings), rng or random.Random())

@@ -16,15 +16,4 @@ def access_rules(settings: RadioSettings) -> AccessRules:
 
 def medium_of(settings: RadioSettings) -> Medium:
     """The properties of a channel with these settings, for the mesh."""
-    cycle_s = CYCLE_S[settings.data_rate]
-    return Medium(
-        shared=True,
-        answer_s=1.0,
-        answer_per_hop_s=100 * cycle_s,
-        heartbeats=3,
-        answer_spread_s=200 * cycle_s,
-        search_s=800 * cycle_s,
-        missing_quiet_s=5.0,
-        silence_s=3.0,
-        data_pause_s=4 * cycle_s,
-    )
+    return Medium.for_hop(CYCLE_S[settings.data_rate])

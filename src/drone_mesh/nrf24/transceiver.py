@@ -29,6 +29,7 @@ from drone_mesh.nrf24.registers import (
     Register,
 )
 from drone_mesh.nrf24.settings import (
+    BROADCAST_PIPE,
     OWN_PIPE,
     BroadcastMode,
     DataRate,
@@ -50,6 +51,11 @@ class Received(NamedTuple):
 
     pipe: int
     payload: bytes
+
+    @property
+    def to_all(self) -> bool:
+        """Whether it was broadcast."""
+        return self.pipe == BROADCAST_PIPE
 
 
 class Transceiver:
