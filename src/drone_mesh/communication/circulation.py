@@ -13,29 +13,31 @@ count. A plain tuple, as there is one for each packet."""
 
 
 class CirculationGuard:
-    """Remembers for half a second which packets passed through this node.
+    """Remembers for a while which packets passed through this node.
 
     A packet is identified by what does not change on its way: creator, type, final addressee and
     body.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, window_s: float = CIRCULATION_S) -> None:
+        """`window_s`: how long it remembers."""
+        self._window_s = window_s
         # Two tables used in turn, so that old passages are forgotten without a search for them.
         self._passages: dict[Hashable, Passage] = {}
         self._earlier: dict[Hashable, Passage] = {}
         self._turn_s = -math.inf  # when the earlier ones are forgotten
 
     def first_passage(self, identity: Hashable, now_s: float) -> Passage | None:
-        """The packet's first passage, if that was less than half a second ago."""
+        """The packet's first passage, if it remembers one."""
         passage = self._passages.get(identity) or self._earlier.get(identity)
-        return None if passage is None or now_s - passage[2] >= CIRCULATION_S else passage
+        return None if passage is None or now_s - passage[2] >= self._window_s else passage
 
     def passed(
         self, identity: Hashable, came_from: int, went_to: int, now_s: float, hops: int = 0
     ) -> None:
         """Record the first passage of a packet that was forwarded."""
         if now_s >= self._turn_s:
-            self._turn_s = now_s + CIRCULATION_S
+            self._turn_s = now_s + self._window_s
             self._passages, self._earlier = {}, self._passages
         self._passages[identity] = (came_from, went_to, now_s, hops)
 

@@ -9,9 +9,11 @@ from drone_mesh.communication.circulation import CirculationGuard, came_round
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.delivery import Delivery, NodeReport
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.timing import CIRCULATION_S
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 
@@ -26,6 +28,7 @@ class Forwarding:
         delivery: Delivery,
         complaints: Complaints,
         report: NodeReport,
+        medium: Medium,
     ) -> None:
         self._node_id = node_id
         self._routing = routing
@@ -33,7 +36,7 @@ class Forwarding:
         self._delivery = delivery
         self._complaints = complaints
         self._report = report
-        self._circulation = CirculationGuard()
+        self._circulation = CirculationGuard(medium.stretched(CIRCULATION_S))
 
     def forward(
         self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float

@@ -128,30 +128,6 @@ class IWirelessCommunication(abc.ABC):
         """This node's use of a shared channel. Any thread."""
         return ChannelUse()
 
-    def reserved_bytes(self, kind: int) -> int:
-        """How many of the 27 bytes after the header of a packet the antenna itself needs."""
-        return 0
-
-    def seal_message(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
-        """A user's message, readable only by `to`; unchanged without a key."""
-        return payload
-
-    def open_message(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
-        """The message; None unless `creator` sealed it for `to` and this place."""
-        return sealed
-
-    def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
-        """Proves that `creator` acknowledges this to `to`; empty without a key."""
-        return b""
-
-    def may_be_gateway(self, node: int) -> bool:
-        """Whether to believe a forwarded packet that `node` is a gateway."""
-        return True
-
-    def foreign_neighbour(self) -> str:
-        """Why a neighbour seems to have another key or none; empty: nothing points to that."""
-        return ""
-
     def patience(self) -> float:
         """The number of check periods for which the mesh should not probe what is known to work.
 
@@ -197,6 +173,37 @@ class IWirelessCommunication(abc.ABC):
     @abc.abstractmethod
     def on(self) -> bool:
         """Whether the antenna has power."""
+
+
+class IMeshSeals:
+    """What the key of a mesh adds to a node's packets. As it stands here: a mesh without a key."""
+
+    def reserved_bytes(self, kind: int) -> int:
+        """How many of the 27 bytes after the header of a packet the seal needs."""
+        return 0
+
+    def seal_message(self, creator: int, to: int, place: bytes, payload: bytes) -> bytes:
+        """A user's message, readable only by `to`; unchanged without a key."""
+        return payload
+
+    def open_message(self, creator: int, to: int, place: bytes, sealed: bytes) -> bytes | None:
+        """The message; None unless `creator` sealed it for `to` and this place."""
+        return sealed
+
+    def acknowledgement_tag(self, creator: int, to: int, body: bytes) -> bytes:
+        """Proves that `creator` acknowledges this to `to`; empty without a key."""
+        return b""
+
+    def may_be_gateway(self, node: int) -> bool:
+        """Whether to believe a forwarded packet that `node` is a gateway."""
+        return True
+
+    def foreign_neighbour(self) -> str:
+        """Why a neighbour seems to have another key or none; empty: nothing points to that."""
+        return ""
+
+
+NO_SEALS = IMeshSeals()
 
 
 class IInternetConnection(abc.ABC):

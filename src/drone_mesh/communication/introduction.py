@@ -51,7 +51,7 @@ class Introduction:
         parts, node = self._parts, self._node
         hops, connected = node.get_hops_from_gateway_away(), node.get_connected_to_gateway()
         payload = messages.present(parts.node_id, hops, connected)
-        room = messages.EXTENSION_ROOM[_PRESENT] - parts.antenna.reserved_bytes(_PRESENT)
+        room = messages.EXTENSION_ROOM[_PRESENT] - parts.seals.reserved_bytes(_PRESENT)
         extension = parts.routing.extension(_PRESENT, room)
         if extension:
             payload = messages.extended(payload, extension)

@@ -22,11 +22,13 @@ from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
     NO_ROUTE,
+    NO_SEALS,
     IMeshDebugInfo,
+    IMeshSeals,
     IWirelessCommunication,
 )
 from drone_mesh.communication.introduction import Introduction
-from drone_mesh.communication.medium import ChannelUse
+from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.node_search import NodeSearch
 from drone_mesh.communication.observer import MeshObserver, Reporter, ignore_events
@@ -66,6 +68,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         self._node_id = node_id
         self._antenna = antenna
         self._shared = antenna.medium.shared
+        seals = antenna if isinstance(antenna, IMeshSeals) else NO_SEALS
         self._routing = routing
         self._rng = rng
         self._timing = timing or MeshTiming()
@@ -85,7 +88,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
             self._on_neighbour_lost,
         )
         self._forwarding = Forwarding(
-            node_id, routing, self._delivery, self.complaints, self._report
+            node_id, routing, self._delivery, self.complaints, self._report, antenna.medium
         )
         self.places = KnownPlaces()
         self._frame = CommonFrame(engine.frame_digest())
@@ -101,6 +104,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
             self.places,
             self._pilot,
             antenna,
+            seals,
         )
         self._introduction = Introduction(
             self._parts, self, self._frame, rng, lambda neighbour: self.send_heartbeat(neighbour)
@@ -108,7 +112,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         self._search = NodeSearch(self._parts, self._answer_search)
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
-        room = messages.BODY_BYTES - antenna.reserved_bytes(messages.DATA_TYPES.start)
+        room = messages.BODY_BYTES - seals.reserved_bytes(messages.DATA_TYPES.start)
         self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway, room)
 
     # Snapshots -------------------------------------------------------------------------------
@@ -180,6 +184,11 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
     def now_s(self) -> float:
         """The time of the component's latest call."""
         return self._deadlines.now_s
+
+    @property
+    def medium(self) -> Medium:
+        """The properties of the antenna's medium."""
+        return self._antenna.medium
 
     def wake_at(self, at_s: float) -> None:
         """Call the technique's `on_time` at this time."""

@@ -8,7 +8,7 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
-from drone_mesh.communication.interfaces import IWirelessCommunication
+from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
 from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
@@ -33,12 +33,13 @@ class NodeParts:
     places: KnownPlaces
     pilot: Pilot
     antenna: IWirelessCommunication
+    seals: IMeshSeals
 
     def heartbeat(self, to: int, forward: int, connected: bool, gateway: int) -> bytes:
         """A heartbeat of this node for `forward`, including the routing technique's extension."""
         me = self.node_id
         payload = messages.heartbeat(me, me, to, forward, connected, gateway)
-        room = messages.EXTENSION_ROOM[_HEARTBEAT] - self.antenna.reserved_bytes(_HEARTBEAT)
+        room = messages.EXTENSION_ROOM[_HEARTBEAT] - self.seals.reserved_bytes(_HEARTBEAT)
         extension = self.routing.extension(_HEARTBEAT, room)
         return messages.extended(payload, extension) if extension else payload
 

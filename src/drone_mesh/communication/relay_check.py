@@ -32,7 +32,7 @@ class RelayCheck:
         If no answers come, later heartbeats go through another neighbour.
         """
         parts, now_s = self._parts, self._parts.now_s
-        sealed = parts.antenna.reserved_bytes(MessageType.LOCATION) > 0
+        sealed = parts.seals.reserved_bytes(MessageType.LOCATION) > 0
         relayed = next_hop not in (gateway, NO_ROUTE)
         if not (sealed and relayed and parts.routing.TAKES_SHORTCUTS):
             return False

@@ -172,13 +172,13 @@ class MeshnetworkRouter(MeshnetworkComponent):
     ) -> None:
         """A gateway's answer proves the connection of each relay as well."""
         proves = creator == preferred_gateway and self._repair.may_connect(NO_ROUTE, know_gateway)
-        proves = proves and self._antenna.may_be_gateway(creator)
+        proves = proves and self._parts.seals.may_be_gateway(creator)
         if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
             self._repair.on_connected()
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
         """Relays use the gateway's place as well, unless only the addressee can check it."""
-        if self._antenna.reserved_bytes(MessageType.LOCATION):
+        if self._parts.seals.reserved_bytes(MessageType.LOCATION):
             return
         if creator == self._connection.gateway:
             self.places.update_gateway(place_in(payload), self._deadlines.now_s)

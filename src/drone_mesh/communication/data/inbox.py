@@ -10,6 +10,7 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.ordering import PortOrder
 from drone_mesh.communication.data.packets import COMPLETE, Ack, Poll
 from drone_mesh.communication.data.reassembly import Open, Reassembly, Whole, open_plain
+from drone_mesh.communication.medium import UNDISTURBED, Medium
 
 ACK_DELAY_S = 0.02  # our choice: complete messages are acknowledged after a pause of this time
 ACK_LATEST_S = 0.2  # our choice: or after this time without a pause
@@ -23,9 +24,16 @@ class Inbox:
     """Reassembles the messages of one sender, and decides what to acknowledge and when."""
 
     def __init__(
-        self, room: int, acknowledge: Callable[[Ack], None], open_message: Open = open_plain
+        self,
+        room: int,
+        acknowledge: Callable[[Ack], None],
+        open_message: Open = open_plain,
+        medium: Medium = UNDISTURBED,
     ) -> None:
         """`acknowledge` sends an ACK to the sender; `room`: bytes of a body."""
+        self._ack_delay_s = medium.stretched(ACK_DELAY_S)
+        self._ack_within_s = medium.stretched(ACK_LATEST_S)
+        self._repeat_s = medium.stretched(REPEAT_S)
         self._room = room
         self._open = open_message
         self._acknowledge = acknowledge
@@ -43,7 +51,7 @@ class Inbox:
         if index == 0 and not self._is_current(packets.head_of(body).session, now_s):
             return []
         if self.ack_due_s < math.inf:
-            self.ack_due_s = min(now_s + ACK_DELAY_S, self._ack_latest_s)
+            self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
         number, reassembly = body[0], self._reassembly
         if reassembly.is_done(number):
             self._repeat_ack(number, now_s)
@@ -113,11 +121,11 @@ class Inbox:
             self._acknowledge_now()
         else:
             if self.ack_due_s == math.inf:
-                self._ack_latest_s = now_s + ACK_LATEST_S
-            self.ack_due_s = min(now_s + ACK_DELAY_S, self._ack_latest_s)
+                self._ack_latest_s = now_s + self._ack_within_s
+            self.ack_due_s = min(now_s + self._ack_delay_s, self._ack_latest_s)
 
     def _repeat_ack(self, number: int, now_s: float) -> None:
-        if now_s - self._repeated_s >= REPEAT_S:
+        if now_s - self._repeated_s >= self._repeat_s:
             self._repeated_s = now_s
             self._acknowledge(self._ack(number, 0, self._session))
 

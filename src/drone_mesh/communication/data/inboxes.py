@@ -72,12 +72,14 @@ class Inboxes:
                 self._inboxes.popitem(last=False)
             acknowledge = functools.partial(self._acknowledge, sender)
             receiver = TO_ALL if to_all else self._parts.node_id
-            open_message = functools.partial(self._parts.antenna.open_message, sender, receiver)
-            inbox = self._inboxes[key] = Inbox(self._room, acknowledge, open_message)
+            open_message = functools.partial(self._parts.seals.open_message, sender, receiver)
+            inbox = self._inboxes[key] = Inbox(
+                self._room, acknowledge, open_message, self._parts.antenna.medium
+            )
         self._inboxes.move_to_end(key)
         return inbox
 
     def _acknowledge(self, sender: int, ack: Ack) -> None:
         body = packets.ack_body(ack)
-        tag = self._parts.antenna.acknowledgement_tag(self._parts.node_id, sender, body)
+        tag = self._parts.seals.acknowledgement_tag(self._parts.node_id, sender, body)
         self._send_packet(packets.ACK, sender, body + tag)

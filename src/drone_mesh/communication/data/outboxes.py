@@ -162,7 +162,7 @@ class Outboxes:
             self._session = self._rng.randrange(1 << 16)
         outbox = self._outboxes.get(to)
         if outbox is None:
-            seal = functools.partial(self._parts.antenna.seal_message, self._parts.node_id, to)
+            seal = functools.partial(self._parts.seals.seal_message, self._parts.node_id, to)
             outbox = Outbox(to, self._session, self._room, self._ended, seal, self._hint)
             self._outboxes[to] = outbox
         return outbox

@@ -133,7 +133,7 @@ class Transport:
 
     def hint(self) -> str:
         """Text to append to an error: that a neighbour has another key or none. Otherwise empty."""
-        foreign = self._parts.antenna.foreign_neighbour()
+        foreign = self._parts.seals.foreign_neighbour()
         foreign = foreign or self._complaints.foreign_neighbour(self._parts.now_s)
         return f"; {foreign}" if foreign else ""
 
@@ -211,7 +211,7 @@ class Transport:
     def _is_authentic(self, ack: bytes, creator: int) -> bool:
         """Whether an ACK comes from its creator: a relay could forge one."""
         body = packets.untagged(ack)
-        tag = self._parts.antenna.acknowledgement_tag(creator, self._parts.node_id, body)
+        tag = self._parts.seals.acknowledgement_tag(creator, self._parts.node_id, body)
         return hmac.compare_digest(tag, ack[len(body) : len(body) + len(tag)])
 
     def _ended(self, state: TicketState) -> None:

@@ -245,7 +245,7 @@ class ConnectionRepair(RepairViews):
         if self._flight is None:
             return True
         if self._flight.arrived():
-            self.wait_until(self.now_s + ASK_AGAIN_S)
+            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
         return False
 
     def on_landed(self) -> None:
@@ -259,7 +259,7 @@ class ConnectionRepair(RepairViews):
         if not flight.on_ground:
             return False
         if flight.ask_again():
-            self.wait_until(self.now_s + ASK_AGAIN_S)
+            self.wait_until(self.now_s + self.medium.stretched(ASK_AGAIN_S))
             return False
         return True
 

@@ -85,7 +85,7 @@ class GroupRepair(IRepairStrategy):
         """The time for places, bids or the winner's take-off is over."""
         state = self.mesh.state
         if state is RepairState.ASKING:
-            until_s = self._asked_s + PLACES_WITHIN_S
+            until_s = self._asked_s + self._places_within_s()
             if self._all_answered() or self.mesh.now_s >= until_s:
                 self._negotiate()
             else:
@@ -146,11 +146,14 @@ class GroupRepair(IRepairStrategy):
         mesh = self.mesh
         mesh.happened(RouterEvent.ASKED_FOR_PLACES)
         self._asked_s = mesh.now_s
-        mesh.wait_until(self._asked_s + PLACES_WITHIN_S)
+        mesh.wait_until(self._asked_s + self._places_within_s())
         mesh.ask_places()
         owner = mesh.lost_next_hop
         if mesh.reaches(owner) and owner not in mesh.neighbours():
             mesh.ask_place(owner)
+
+    def _places_within_s(self) -> float:
+        return self.mesh.medium.stretched(PLACES_WITHIN_S)
 
     def _all_answered(self) -> bool:
         """Whether all neighbours, and the node whose place it wants, have sent their places."""
@@ -198,7 +201,8 @@ class GroupRepair(IRepairStrategy):
     def _begin_election(self) -> None:
         mesh = self.mesh
         score = as_on_the_air(self.own_bid)
-        settled_s = max(mesh.now_s, self._asked_s + PLACES_WITHIN_S) + SETTLE_S
+        settled_s = max(mesh.now_s, self._asked_s + self._places_within_s())
+        settled_s += mesh.medium.stretched(SETTLE_S)
         self._election.start(mesh.node_id, score, mesh.now_s, settled_s)
         tried = self._was_home() if score < 0 else None
         if tried is None:

@@ -12,6 +12,7 @@ import abc
 from typing import Mapping, NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.medium import UNDISTURBED, Medium
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.communication.router_states import RepairState, RouterEvent
@@ -50,6 +51,11 @@ class IRepairActions(abc.ABC):
     @abc.abstractmethod
     def now_s(self) -> float:
         """The time, in seconds of the core's clock."""
+
+    @property
+    def medium(self) -> Medium:
+        """The properties of the antenna's medium. Constant."""
+        return UNDISTURBED
 
     @property
     @abc.abstractmethod

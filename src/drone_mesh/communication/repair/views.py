@@ -7,6 +7,7 @@ from typing import Mapping
 
 from drone_mesh.communication.connection import GatewayConnection
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair.interfaces import IRepairActions, NeighbourView, Step
 from drone_mesh.communication.repair.options import RepairOptions
@@ -41,6 +42,10 @@ class RepairViews(IRepairActions):
     @property
     def now_s(self) -> float:  # noqa: D102
         return self._parts.now_s
+
+    @property
+    def medium(self) -> Medium:  # noqa: D102
+        return self._parts.antenna.medium
 
     @property
     def range_m(self) -> float:  # noqa: D102

@@ -11,6 +11,7 @@ from typing import ClassVar, Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.medium import UNDISTURBED, Medium
 from drone_mesh.drone.location import Location
 
 _HEARTBEAT = int(messages.MessageType.HEARTBEAT)
@@ -34,6 +35,11 @@ class IRoutingEssentials(abc.ABC):
     @abc.abstractmethod
     def now_s(self) -> float:
         """The time of the current call, in seconds of the component's clock."""
+
+    @property
+    def medium(self) -> Medium:
+        """The properties of the antenna's medium. Constant."""
+        return UNDISTURBED
 
     @abc.abstractmethod
     def wake_at(self, at_s: float) -> None:

@@ -17,6 +17,7 @@ from drone_mesh.communication.interfaces import (
     PAYLOAD_BYTES,
     IMeshDebugInfo,
     IMeshNetwork,
+    IMeshSeals,
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
@@ -46,7 +47,7 @@ class _Unopened:
         self.count = 0
 
 
-class SealedAntenna(IWirelessCommunication, IMeshNetwork):
+class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     """Seals what the component sends, and hands it only what is authentic.
 
     All calls come from the thread of the component, as for every antenna; `on` and `channel_use`

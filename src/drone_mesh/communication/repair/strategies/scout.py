@@ -78,7 +78,7 @@ class Scout(Thesis):
     def on_landed(self) -> None:
         """If this is where it looks around, listen."""
         if self._stood_at is not None:
-            self.mesh.wait_until(self.mesh.now_s + LISTENS_S)
+            self.mesh.wait_until(self.mesh.now_s + self.mesh.medium.stretched(LISTENS_S))
 
     def on_time(self) -> None:
         """If no node is here, fly back."""

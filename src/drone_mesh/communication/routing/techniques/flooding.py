@@ -37,10 +37,12 @@ class Flooding(ChildTableTree):
         if kind == MessageType.PRESENT:
             self._hops[from_] = messages.hops(payload)
             return True
-        assert self._essentials is not None
-        self._heard_s[creator] = self._essentials.now_s()
-        now_s, copy = self._essentials.now_s(), _identity(payload, kind)
-        is_first = now_s - self._seen_s.get(copy, -CIRCULATION_S) >= CIRCULATION_S
+        essentials = self._essentials
+        assert essentials is not None
+        now_s, copy = essentials.now_s(), _identity(payload, kind)
+        self._heard_s[creator] = now_s
+        circulates_s = essentials.medium.stretched(CIRCULATION_S)
+        is_first = now_s - self._seen_s.get(copy, -math.inf) >= circulates_s
         if is_first:
             self._seen_s[copy] = now_s
             self._seen_s.move_to_end(copy)
