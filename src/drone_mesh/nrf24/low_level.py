@@ -19,7 +19,7 @@ from drone_mesh.nrf24.irq_watch import IrqWatch
 from drone_mesh.nrf24.pace import access_rules, medium_of
 from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
-from drone_mesh.nrf24.transceiver import Received, Transceiver
+from drone_mesh.nrf24.transceiver import PipePayload, Transceiver
 
 logger = logging.getLogger(__name__)
 
@@ -191,7 +191,7 @@ class NRF24LowLevelInterface:
                 return False
             return True
 
-    def receive(self, timeout_s: float) -> list[Received]:
+    def receive(self, timeout_s: float) -> list[PipePayload]:
         """Received payloads, oldest first; waits up to `timeout_s` for one. For one thread."""
         until_s = self._runtime.now_s() + timeout_s
         inbox = self._chip.inbox

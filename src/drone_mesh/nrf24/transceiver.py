@@ -46,7 +46,7 @@ _DRAIN_LIMIT = 32  # payloads at a time; the FIFO holds three, more arrive only 
 TX_DELAY_S = {DataRate.KBPS_250: 505e-6, DataRate.MBPS_1: 280e-6, DataRate.MBPS_2: 240e-6}
 
 
-class Received(NamedTuple):
+class PipePayload(NamedTuple):
     """A payload and the pipe on which it arrived."""
 
     pipe: int
@@ -81,7 +81,7 @@ class Transceiver:
         self._statistics = statistics
         self._registers = settings.registers(node_id)
         self._retries = (settings.retransmit_delay, settings.retransmits)  # currently in the chip
-        self.inbox: deque[Received] = deque()
+        self.inbox: deque[PipePayload] = deque()
         self._loaded: tuple[bytes, bytes] | None = None  # address and payload in the TX FIFO
         self._pid = 0  # of the last payload written, relative to an unknown start
         self._last_sent: dict[bytes, tuple[int, bytes]] = {}  # address -> PID and payload
@@ -220,7 +220,7 @@ class Transceiver:
             else:
                 pipe = RX_P_NO.get(self._link.status)
                 payload = self._link.command(Command.R_RX_PAYLOAD, bytes(PAYLOAD_BYTES))
-                self.inbox.append(Received(pipe, payload))
+                self.inbox.append(PipePayload(pipe, payload))
                 self._statistics.received += 1
                 if pipe == OWN_PIPE:
                     self._statistics.airtime_s += self._settings.answer_frame_s
