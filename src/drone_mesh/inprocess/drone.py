@@ -39,6 +39,7 @@ class InProcessDrone(IDroneEngine):
         self._place = start
         self._path: FlightPath | None = None
         self._on_flight = on_flight
+        self.under_pilot = False  # until an order ends the pilot's flight
         self.speed_m_s = SPEED_M_S  # of its next flight; experiments with wind change it
         # Returns None if there is no path; the drone then stays. Obstacles replace this planner.
         self.plan_flight: PlanFlight = FlightPath
@@ -60,12 +61,17 @@ class InProcessDrone(IDroneEngine):
         plan = self.plan_flight(here.to_vector(), goal, self._clock.now_s, self.speed_m_s)
         if plan is None:
             raise GoalRefused(NO_PATH)
+        self.under_pilot = False
         if self._path is None:
             self._on_flight(True)
         else:
             self.flown_m += math.dist(self._path.start, here.to_vector())
         self._path = plan
         self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
+
+    def put(self, place: Location) -> None:
+        """A pilot has flown it there; it is not on a flight."""
+        self._place = place
 
     def why_not_fly(self) -> str:
         """The reason given at creation."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import random
 from dataclasses import replace
-from typing import Callable, Iterable
+from typing import Callable, Iterable, Mapping
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.assembly import assemble_component
@@ -38,10 +38,12 @@ from drone_mesh.inprocess.airs import create_air
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.node import InProcessNode, NoInternet
 from drone_mesh.inprocess.oracle import Oracle
+from drone_mesh.inprocess.pilots import Pilots
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAntenna
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.inprocess.shortest_path import SHORTEST_PATH, LinkMap, ShortestPath
 from drone_mesh.inprocess.status import event_records, mesh_status
+from drone_mesh.mobility import Track
 from drone_mesh.nrf24.emulator.links import LinkModel
 from drone_mesh.nrf24.settings import DEFAULT_RATE
 from drone_mesh.state.model import EventRecord, MeshStatus
@@ -192,6 +194,14 @@ class Network:
     def sealed(self) -> bool:
         """Whether the mesh has a key."""
         return self._key is not None
+
+    def fly(self, tracks: Mapping[int, Track]) -> Pilots:
+        """Pilots fly these drones along their tracks from now on; the mesh is not told.
+
+        See drone_mesh.mobility for tracks; `share` and `gateways` of a Mobility say which drones.
+        """
+        drones = {node_id: node.drone for node_id, node in self.nodes.items()}
+        return Pilots(self.clock, self.air, drones, tracks)
 
     # Acting ----------------------------------------------------------------------------------
 

@@ -6,6 +6,8 @@ import math
 import random
 from typing import Callable, Iterable, Mapping
 
+import numpy as np
+
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import (
     IMeshDebugInfo,
@@ -61,6 +63,8 @@ class InProcessAir:
         self._links: dict[int, dict[int, InProcessAntenna]] = {}
         self._standing: dict[int, Location] = {}  # their positions
         self._flying: set[int] = set()
+        # Which nodes at rest are near each other, in the order of `_standing`; None: to be found.
+        self._near: np.ndarray | None = None
         # Packets that leave at one time also arrive at one time: one event of the clock for all.
         self._under_way: list[tuple[InProcessAntenna, bytes]] = []
         self._left_s = -math.inf  # when those left
@@ -93,6 +97,38 @@ class InProcessAir:
         else:
             self._flying.discard(node)
             self._link(node)
+
+    def moved(self, nodes: Iterable[int]) -> None:
+        """Pilots have flown these drones to other places; their links follow."""
+        moved = [node for node in nodes if node in self._standing]
+        if self._near is None or self.sees is not None:  # obstacles: each line of sight may differ
+            for node in moved:
+                self._unlink(node)
+            for node in moved:
+                self._link(node)
+            self._near = self._near_each_other()
+            return
+        for node in moved:
+            self._standing[node] = self._antennas[node].drone.get_location()
+        before, self._near = self._near, self._near_each_other()
+        ids = list(self._standing)
+        for one, other in np.argwhere(np.triu(before != self._near)):
+            self._set_link(ids[one], ids[other], bool(self._near[one, other]))
+
+    def _near_each_other(self) -> np.ndarray:
+        """Booleans, n x n."""
+        places = np.array(list(self._standing.values())).reshape(-1, 3)
+        away = places[:, None] - places[None]
+        near: np.ndarray = np.einsum("ijk,ijk->ij", away, away) < self.max_distance_m**2
+        return near
+
+    def _set_link(self, one: int, other: int, near: bool) -> None:
+        if not near:
+            self._links[one].pop(other, None)
+            self._links[other].pop(one, None)
+        elif frozenset((one, other)) not in self._cut:
+            self._links[one][other] = self._antennas[other]
+            self._links[other][one] = self._antennas[one]
 
     def cut(self, one: int, other: int, off: bool = True) -> None:
         """Cut the link between two nodes, or restore it. Raises ValueError for an unknown pair."""
@@ -136,6 +172,7 @@ class InProcessAir:
 
     def _link(self, node: int) -> None:
         """Find the links of a node at rest; nothing for a node in flight or without an antenna."""
+        self._near = None
         if node in self._antennas and node not in self._flying:
             links = self._heard_by(node, self._standing)
             self._links[node] = links
@@ -144,6 +181,7 @@ class InProcessAir:
                 self._links[other][node] = self._antennas[node]
 
     def _unlink(self, node: int) -> None:
+        self._near = None
         self._standing.pop(node, None)
         for other in self._links.pop(node, ()):
             del self._links[other][node]

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import abc
 import math
+from typing import Iterable
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -112,6 +113,11 @@ class SharedAir:
         """A drone took off (True) or stopped (False)."""
         (self._flying.add if started else self._flying.discard)(node)
         self._forget(node)
+
+    def moved(self, _nodes: Iterable[int]) -> None:
+        """Pilots have flown these drones to other places."""
+        self._reached.clear()
+        self._power_dbm.clear()
 
     def in_range(self, node: int) -> dict[int, SharedRadio]:
         """The radios that a node could reach on an undisturbed channel, by id."""

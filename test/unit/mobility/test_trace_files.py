@@ -1,0 +1,92 @@
+"""Recorded motion: BonnMotion, ns-2 and CSV."""
+
+from __future__ import annotations
+
+import gzip
+
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.mobility import Area, Mobility, tracks_of
+from drone_mesh.mobility.trace_files import read_trace
+
+
+def read(tmp_path, text, name="trace.txt"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return read_trace(path)
+
+
+def test_bonnmotion_has_a_line_for_each_drone(tmp_path):
+    knots = read(tmp_path, "0.0 1.0 2.0 10.0 3.0 4.0\n0.0 5.0 6.0\n")
+    assert knots == {
+        0: [(0.0, 1.0, 2.0, 0.0), (10.0, 3.0, 4.0, 0.0)],
+        1: [(0.0, 5.0, 6.0, 0.0)],
+    }
+
+
+def test_bonnmotion_in_three_dimensions_is_recognised_by_its_times(tmp_path):
+    knots = read(tmp_path, "0.0 9.0 8.0 7.0 5.0 1.0 2.0 3.0 9.0 4.0 4.0 4.0\n")
+    assert knots == {0: [(0.0, 9.0, 8.0, 7.0), (5.0, 1.0, 2.0, 3.0), (9.0, 4.0, 4.0, 4.0)]}
+
+
+def test_bonnmotions_own_compressed_files_are_read(tmp_path):
+    path = tmp_path / "scenario.movements.gz"
+    path.write_bytes(gzip.compress(b"0.0 1.0 2.0\n"))
+    assert read_trace(path) == {0: [(0.0, 1.0, 2.0, 0.0)]}
+
+
+def test_ns2_nodes_fly_to_their_destinations_until_a_new_one_comes(tmp_path):
+    knots = read(
+        tmp_path,
+        "# nodes: 2\n"
+        "$node_(0) set X_ 1.0\n"
+        "$node_(0) set Y_ 2.0\n"
+        "$node_(0) set Z_ 0.0\n"
+        "$node_(1) set X_ 0.0\n"
+        "$god_ set-dist 0 1 1\n"
+        '$ns_ at 2.0 "$node_(0) setdest 1.0 12.0 2.0"\n'
+        '$ns_ at 4.0 "$node_(0) setdest 7.0 6.0 3.0"\n',
+    )
+    assert knots[0] == [
+        (0.0, 1.0, 2.0, 0.0),
+        (2.0, 1.0, 2.0, 0.0),
+        (4.0, 1.0, 6.0, 0.0),
+        (4.0, 1.0, 6.0, 0.0),
+        (6.0, 7.0, 6.0, 0.0),
+    ]
+    assert knots[1] == [(0.0, 0.0, 0.0, 0.0)]
+
+
+def test_csv_rows_may_come_in_any_order(tmp_path):
+    knots = read(tmp_path, "t,id,x,y,z\n1.0,4,3,3,0\n0.0,4,1,2,0\n0.5,2,9,9,1\n")
+    assert knots == {2: [(0.5, 9.0, 9.0, 1.0)], 4: [(0.0, 1.0, 2.0, 0.0), (1.0, 3.0, 3.0, 0.0)]}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no drone"),
+        ("t,id,x,y,z\n1,2,3\n", "line 2: expected t,id,x,y,z"),
+        ("t,id,x,y,z\n1,2,nan,0,0\n", "line 2"),
+        ("0.0 1.0 two\n", "line 1: expected numbers"),
+        ("5.0 1.0 2.0 4.0 1.0 2.0\n", "rising t"),
+        ("$node_(0) set X_ left\n", "line 1: expected numbers"),
+    ],
+)
+def test_a_file_that_is_no_trace_is_named_with_the_line(tmp_path, text, words):
+    with pytest.raises(ConfigurationError, match=f"trace .*trace.txt: .*{words}"):
+        read(tmp_path, text)
+
+
+def test_a_missing_trace_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match="no-such"):
+        read_trace(tmp_path / "no-such")
+
+
+def test_drones_fly_a_trace_and_rest_before_and_after_it():
+    knots = {1: [(2.0, 0.0, 0.0, 1.0), (4.0, 8.0, 0.0, 1.0)]}
+    places = {0: (0.0, 0.0, 0.0), 1: (3.0, 3.0, 0.0), 2: (5.0, 5.0, 0.0)}
+    mobility = Mobility("trace", knots=knots)
+    (track,) = tracks_of(mobility, places, {0}, Area(0, 0, 1, 1), 1).values()
+    assert [track.position_at(t)[0] for t in (0.0, 2.0, 3.0, 4.0, 9.0)] == [0.0, 0.0, 4.0, 8.0, 8.0]
