@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Callable, Mapping
 
 from drone_mesh.channel.link_quality import LinkQuality, Quality
-from drone_mesh.channel.packet_queue import ALL_NODES, Priority
+from drone_mesh.channel.packet_queue import ALL_NODES
 from drone_mesh.channel.radio import PacketRadio, Received
 from drone_mesh.channel.runtime import Runtime, SystemRuntime, Task
 from drone_mesh.channel.sender import Sender
@@ -22,7 +22,7 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import is_data, readdressed, receiver, sender
+from drone_mesh.communication.messages import priority, readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import PacketInbox
 
@@ -139,13 +139,13 @@ class PacketAntenna(IWirelessCommunication):
         to = receiver(payload)
         if to > MAX_NODE_ID or to == self._radio.node_id:
             return False
-        return self._sender.offer(to, bytes(payload), _priority_of(payload))
+        return self._sender.offer(to, bytes(payload), priority(payload))
 
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all; each receiver's antenna puts its own id into byte 3."""
         if self._powered and not self._silent and len(payload) == PAYLOAD_BYTES:
             packet = readdressed(payload, BROADCAST)
-            self._sender.offer(ALL_NODES, packet, _priority_of(payload))
+            self._sender.offer(ALL_NODES, packet, priority(payload))
 
     def data_room(self) -> int:
         return self._sender.data_room()
@@ -224,7 +224,3 @@ class PacketAntenna(IWirelessCommunication):
         if before == payload and now_s - then_s < DUPLICATE_S:
             self._duplicates += 1
         self._seen[sender(payload)] = (payload, now_s)
-
-
-def _priority_of(payload: bytes) -> Priority:
-    return Priority.DATA if is_data(payload) else Priority.CONTROL

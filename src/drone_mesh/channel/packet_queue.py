@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from collections import deque
 
+from drone_mesh.communication.packet_types import Priority
+
 ALL_NODES = -1  # receiver of a broadcast
-
-
-class Priority(enum.IntEnum):
-    """Which packets go first."""
-
-    CONTROL = 0  # packets of the mesh itself
-    DATA = 1
 
 
 class OutgoingPacket:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Callable
 
 from drone_mesh.channel.medium_access import Fate
-from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, Priority
+from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.channel.radio import PacketRadio
 from drone_mesh.channel.runtime import Runtime, Task
 from drone_mesh.channel.yielding import InTrain
+from drone_mesh.communication.packet_types import Priority
 
 
 class Sender:

@@ -13,7 +13,6 @@ import struct
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines, Due
-from drone_mesh.communication.frames import TYPES_WITH_PLACES
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
@@ -21,18 +20,19 @@ from drone_mesh.communication.interfaces import (
     IMeshNetwork,
 )
 from drone_mesh.communication.mesh_node import MeshNode
-from drone_mesh.communication.messages import (
-    TYPES_WITH_NUMBERS,
-    MessageType,
-)
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.orders.messages import OrderQuery
+from drone_mesh.communication.packet_types import (
+    TYPES_WITH_FLOATS,
+    TYPES_WITH_PLACES,
+    MessageType,
+    receivers,
+)
 from drone_mesh.drone.location import Location
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
 _LOCATION = int(MessageType.LOCATION)
-_REQUESTLOCATION = int(MessageType.REQUESTLOCATION)
 
 
 class MeshnetworkComponent(MeshNode, IMeshNetwork):
@@ -43,6 +43,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def start(self, now_s: float) -> None:
         """Start the antenna, and debugging if configured; schedule the first check; introduce."""
         self._deadlines.now_s = now_s
+        self._receivers = receivers(self, self._drop_unknown)
         self._antenna.start_antenna(self)
         if self._debug:
             self._antenna.debugging_mode(self, True)
@@ -112,7 +113,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         if to != me:
             self._drop("a packet for another node", payload)
             return
-        if kind in TYPES_WITH_NUMBERS and not messages.is_finite(payload):
+        if kind in TYPES_WITH_FLOATS and not messages.is_finite(payload):
             self._drop("a packet with a number that is not finite", payload)
             return
         if self._neighbours.heard(from_, now_s):
@@ -139,14 +140,8 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             elif kind == _LOCATION:
                 self._on_passing_location(creator, payload)
             self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
-        elif kind == _HEARTBEAT:
-            know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
-            self._on_heartbeat(creator, from_, know_gateway, preferred_gateway, hops)
-        elif kind == _PRESENT:
-            hops, know_gateway = messages.present_body(payload)
-            self._on_present(creator, hops, know_gateway)
         else:
-            self._process(payload, creator, from_, kind)
+            self._receivers[kind](payload, creator, from_)
 
     _receive = on_msg  # for an override of on_msg: super() costs as much as a small packet
 
@@ -189,16 +184,6 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         """The antenna was switched off, or a check finds it off."""
 
     @abc.abstractmethod
-    def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
-        """A neighbour introduced itself; the body is that of an IntroduceMessage."""
-
-    @abc.abstractmethod
-    def _on_heartbeat(
-        self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
-    ) -> None:
-        """A heartbeat for this node arrived; the body is that of a HeartbeatMessage."""
-
-    @abc.abstractmethod
     def _on_negotiation(
         self, bid: messages.MovementNegotiationMessage, gateway: messages.GatewayPlace | None
     ) -> None:
@@ -227,50 +212,65 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _on_neighbour_found(self, node: int) -> None:
         """A packet arrived from a node that was not a neighbour."""
 
-    # Receiving -------------------------------------------------------------------------------
+    # Receiving: a method for each type that every node handles -----------------------------------
 
-    def _process(self, payload: bytes, creator: int, from_: int, kind: int) -> None:
-        if kind == _LOCATION:
-            location = messages.place_in(payload)
-            self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
-            if creator == from_ and messages.addressee(payload) == BROADCAST:
-                self._on_goal(creator, location)
-        elif kind == _REQUESTLOCATION:
-            self._send_location(creator)
-        elif kind == MessageType.GATEWAY_PLACE:
-            gateway = messages.GatewayPlace.from_payload(payload)
-            if gateway is not None:
-                self._on_gateway_place(gateway)
-        elif kind == MessageType.MISSING:
-            missing = messages.MissingMessage.from_payload(payload).missing
-            if missing != self._node_id:
-                self._on_missing(creator, missing, reported_by=from_)
-        elif kind == MessageType.MOVE_TO_LOCATION:
-            order = messages.GoToLocationMessage.from_payload(payload)
-            self._orders.on_order(order, messages.order_number(payload))
-        elif kind == MessageType.MOVEMENT_NEGOTIATION:
-            bid = messages.MovementNegotiationMessage.from_payload(payload)
-            self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
-        elif kind in messages.DATA_TYPES:
-            self.data.on_packet(payload)
-        elif kind in messages.TECHNIQUE_TYPES:
-            self._routing.on_packet(creator, from_, kind, messages.body(payload))
-        elif kind in messages.REPORT_TYPES:
-            self._on_report(payload, creator, kind)
-        else:
-            self._drop("a packet of a type that this node does not process", payload)
+    def receive_location(self, payload: bytes, creator: int, from_: int) -> None:
+        """A node's place, and perhaps that of a gateway."""
+        location = messages.place_in(payload)
+        self._on_location(creator, location, messages.GatewayPlace.from_payload(payload))
+        if creator == from_ and messages.addressee(payload) == BROADCAST:
+            self._on_goal(creator, location)
 
-    def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
-        """A report, or the request for one, for this node."""
-        if kind == MessageType.ORDER_QUERY:
-            self._orders.on_query(creator, OrderQuery.number_in(payload))
-        elif kind == MessageType.NODE_SEARCH:
-            self._search.on_packet(creator, payload)
-        elif kind == MessageType.SEAL_CHALLENGE:
-            reason = f"a neighbour, node {creator}, has a mesh key and this node has none"
-            self.complaints.foreign(reason, payload, self._deadlines.now_s)
-        else:
-            self._drop("a packet of a type that this node does not process", payload)
+    def receive_requestlocation(self, _payload: bytes, creator: int, _from: int) -> None:
+        """Answer with this node's place."""
+        self._send_location(creator)
+
+    def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
+        """Where a gateway was, in a mesh with a key."""
+        gateway = messages.GatewayPlace.from_payload(payload)
+        if gateway is not None:
+            self._on_gateway_place(gateway)
+
+    def receive_missing(self, payload: bytes, creator: int, from_: int) -> None:
+        """A node cannot reach another one."""
+        missing = messages.MissingMessage.from_payload(payload).missing
+        if missing != self._node_id:
+            self._on_missing(creator, missing, reported_by=from_)
+
+    def receive_move_to_location(self, payload: bytes, _creator: int, _from: int) -> None:
+        """An order to fly."""
+        order = messages.GoToLocationMessage.from_payload(payload)
+        self._orders.on_order(order, messages.order_number(payload))
+
+    def receive_movement_negotiation(self, payload: bytes, _creator: int, _from: int) -> None:
+        """A neighbour bids for the flight."""
+        bid = messages.MovementNegotiationMessage.from_payload(payload)
+        self._on_negotiation(bid, messages.GatewayPlace.from_payload(payload))
+
+    def receive_data(self, payload: bytes, _creator: int, _from: int) -> None:
+        """Users' data."""
+        self.data.on_packet(payload)
+
+    def receive_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
+        """A packet of the routing technique."""
+        kind = messages.type_of(payload)
+        self._routing.on_packet(creator, from_, kind, messages.body(payload))
+
+    def receive_order_query(self, payload: bytes, creator: int, _from: int) -> None:
+        """A gateway asks for the state of an order."""
+        self._orders.on_query(creator, OrderQuery.number_in(payload))
+
+    def receive_node_search(self, payload: bytes, creator: int, _from: int) -> None:
+        """A gateway looks for a node."""
+        self._search.on_packet(creator, payload)
+
+    def receive_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
+        """A neighbour has a key; with one, the antenna would have answered."""
+        reason = f"a neighbour, node {creator}, has a mesh key and this node has none"
+        self.complaints.foreign(reason, payload, self._deadlines.now_s)
+
+    def _drop_unknown(self, payload: bytes, _creator: int, _from: int) -> None:
+        self._drop("a packet of a type that this node does not process", payload)
 
     def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
         """`creator` reports that it cannot reach the node `missing`."""

@@ -10,8 +10,8 @@ from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.delivery import Delivery, NodeReport
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import Medium
-from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import CIRCULATION_S
 

@@ -8,20 +8,9 @@ hops.
 
 from __future__ import annotations
 
-from drone_mesh.communication.messages import MessageType, frame_digest
+from drone_mesh.communication.messages import frame_digest
 
 NO_FRAME = 0  # the digest of a node without an origin, or without support for origins
-TYPES_WITH_PLACES = frozenset(
-    map(
-        int,
-        (
-            MessageType.LOCATION,
-            MessageType.MOVE_TO_LOCATION,
-            MessageType.NODE_REPORT,
-            MessageType.GATEWAY_PLACE,
-        ),
-    )
-)
 
 
 class CommonFrame:

@@ -17,8 +17,10 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.messages import (
     GatewayPlace,
-    MessageType,
     MovementNegotiationMessage,
+    heartbeat_body,
+    present_body,
+    type_of,
 )
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.order_record import OrderRecord
@@ -128,13 +130,14 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         super()._on_missing(creator, missing, reported_by)
         self._book.on_missing(missing)
 
-    def _on_report(self, payload: bytes, creator: int, kind: int) -> None:
-        if kind in (MessageType.NODE_REPORT, MessageType.NODE_WORDS):
-            self._reports.on_packet(creator, kind, payload, self._deadlines.now_s)
-            return
-        if kind != MessageType.ORDER_REPLY:
-            super()._on_report(payload, creator, kind)
-            return
+    def receive_node_report(self, payload: bytes, creator: int, _from: int) -> None:
+        """Keep the report."""
+        self._reports.on_packet(creator, type_of(payload), payload, self._deadlines.now_s)
+
+    receive_node_words = receive_node_report
+
+    def receive_order_reply(self, payload: bytes, creator: int, _from: int) -> None:
+        """Enter the reply into the book of orders."""
         reply = OrderReply.from_payload(payload)
         if reply is None:
             self._drop("an invalid reply to an order", payload)
@@ -159,13 +162,15 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _antenna_is_off(self) -> None:
         """Nothing changes: without an antenna it is still a gateway."""
 
-    def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
+    def receive_present(self, payload: bytes, neighbour: int, _from: int) -> None:
+        """A neighbour that has no gateway learns of this one."""
+        _hops, know_gateway = present_body(payload)
         if not know_gateway:
             self._introduction.answer_search(neighbour)
 
-    def _on_heartbeat(
-        self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
-    ) -> None:
+    def receive_heartbeat(self, payload: bytes, creator: int, _from: int) -> None:
+        """Answer a node that has this gateway, or none."""
+        _know_gateway, preferred_gateway, hops = heartbeat_body(payload)
         self._heartbeats[creator] = (min(hops + 1, NO_ROUTE), self._deadlines.now_s)
         self._book.on_found(creator)
         if creator != preferred_gateway:  # gateways do not answer each other

@@ -10,7 +10,7 @@ from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.frames import CommonFrame
 from drone_mesh.communication.interfaces import IMeshDebugInfo
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 
 AFTER_POWER_S = 0.2  # our choice: the medium must register the antenna first

@@ -33,6 +33,7 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.node_search import NodeSearch
 from drone_mesh.communication.observer import MeshObserver, Reporter, ignore_events
 from drone_mesh.communication.orders.intake import OrderIntake
+from drone_mesh.communication.packet_types import DATA_TYPES
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
@@ -112,7 +113,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         self._search = NodeSearch(self._parts, self._answer_search)
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
-        room = messages.BODY_BYTES - seals.reserved_bytes(messages.DATA_TYPES.start)
+        room = messages.BODY_BYTES - seals.reserved_bytes(DATA_TYPES.start)
         self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway, room)
 
     # Snapshots -------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ valid (docs/protocol.md, "Bad input").
 
 from __future__ import annotations
 
-import enum
 import math
 import operator
 import struct
@@ -19,6 +18,13 @@ from dataclasses import dataclass
 from typing import Callable, ClassVar, Iterable, Mapping, NamedTuple, Union
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
+from drone_mesh.communication.packet_types import (
+    ABOUT,
+    DATA_TYPES,
+    TYPES_WITH_FLOATS,
+    MessageType,
+    Priority,
+)
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import PacketError
 
@@ -27,34 +33,10 @@ HEADER_BYTES = 5
 BODY_BYTES = PAYLOAD_BYTES - HEADER_BYTES
 _BYTE = tuple(bytes((value,)) for value in range(256))
 _TWICE = tuple(bytes((value, value)) for value in range(256))
-TECHNIQUE_TYPES = range(8, 64)  # docs/protocol.md, "Packets"
-REPORT_TYPES = range(64, 128)
-DATA_TYPES = range(128, 256)  # users' data; data/packets.py describes their bodies
 ROUTE_RECORD = 194  # the only type of users' data to which forwarding nodes add their ids
 ROUTE_RECORD_AT = HEADER_BYTES + 2  # offset of the number of ids; the ids follow it
 MOST_RECORDED = 16
 MAX_HOPS = 254  # of a heartbeat; docs/protocol.md, "Forwarding"
-
-
-class MessageType(enum.IntEnum):
-    """Byte 2. 8..63 belong to routing techniques, 64..127 to reports, 128..255 to users' data."""
-
-    NOTDEFINED = 0
-    LOCATION = 1  # the position of its creator
-    REQUESTLOCATION = 2  # asks for a LOCATION
-    PRESENT = 3  # introduces its creator to every node in range
-    HEARTBEAT = 4  # proof of a path; counts its hops
-    MISSING = 5  # its creator can no longer reach a node
-    MOVE_TO_LOCATION = 6  # an order to fly
-    MOVEMENT_NEGOTIATION = 7  # the bid of its creator to fly
-    ORDER_REPLY = 64  # a drone's reply to a numbered order; see order_messages
-    ORDER_QUERY = 65  # asks for an ORDER_REPLY
-    NODE_REPORT = 66  # the state of its creator, for the gateway; see node_report
-    NODE_WORDS = 67  # why its creator cannot fly
-    NODE_SEARCH = 68  # a gateway looks for a node; see node_search
-    GATEWAY_PLACE = 125  # where a gateway was, in a mesh with a key
-    SEAL_CHALLENGE = 126  # asks a neighbour to prove that it has the key
-    SEAL_ANSWER = 127
 
 
 @dataclass(frozen=True)
@@ -276,11 +258,7 @@ _EXTENSIONS = {  # the bytes after a body that a routing technique may use
     int(MessageType.PRESENT): range(HEADER_BYTES + IntroduceMessage.BODY.size, _FRAME_DIGEST_AT),
     int(MessageType.HEARTBEAT): range(HEADER_BYTES + HeartbeatMessage.BODY.size, PAYLOAD_BYTES),
 }
-TYPES_WITH_NUMBERS: Mapping[int, struct.Struct] = {  # the floats at the start of a body
-    MessageType.LOCATION: struct.Struct("<ff"),
-    MessageType.MOVE_TO_LOCATION: struct.Struct("<ff"),
-    MessageType.MOVEMENT_NEGOTIATION: struct.Struct("<f"),
-}
+_FLOATS = {kind: struct.Struct("<" + "f" * many) for kind, many in TYPES_WITH_FLOATS.items()}
 
 
 class GatewayPlace(NamedTuple):
@@ -360,6 +338,11 @@ addressee: Callable[[bytes], int] = operator.itemgetter(FORWARD_AT)
 def is_data(payload: bytes) -> bool:
     """Whether it is a packet of users' data, of any type."""
     return payload[TYPE_AT] >= DATA_TYPES.start
+
+
+def priority(payload: bytes) -> Priority:
+    """Whether it goes before or after other packets."""
+    return ABOUT[payload[TYPE_AT]].priority
 
 
 def readdressed(payload: bytes, to: int) -> bytes:
@@ -494,8 +477,8 @@ def identity(payload: bytes) -> bytes:
 
 
 def is_finite(payload: bytes) -> bool:
-    """Whether all floats of a packet are finite; its type is one of TYPES_WITH_NUMBERS."""
-    numbers = TYPES_WITH_NUMBERS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
+    """Whether all floats of a packet are finite; its type is one of TYPES_WITH_FLOATS."""
+    numbers = _FLOATS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
     return all(map(math.isfinite, numbers))
 
 

@@ -13,7 +13,7 @@ from typing import Callable
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 
 BODY = struct.Struct("<BH")  # the node, the number of the search

@@ -9,9 +9,9 @@ from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.delivery import Delivery
 from drone_mesh.communication.flight import Pilot
 from drone_mesh.communication.interfaces import IMeshSeals, IWirelessCommunication
-from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.messages import MessageType, packet
+from drone_mesh.communication.messages import packet
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 
 

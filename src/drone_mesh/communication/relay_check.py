@@ -9,7 +9,7 @@ import logging
 
 from drone_mesh.communication.detours import SWALLOWER_AVOIDED_S, Detours
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_for_place
 from drone_mesh.communication.swallowing import Swallowing

@@ -19,11 +19,13 @@ from drone_mesh.communication.interfaces import (
 )
 from drone_mesh.communication.messages import (
     GatewayPlace,
-    MessageType,
     MovementNegotiationMessage,
+    heartbeat_body,
     place_in,
+    present_body,
 )
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
@@ -137,7 +139,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _antenna_is_off(self) -> None:
         self._repair.on_antenna_off()
 
-    def _on_present(self, neighbour: int, hops: int, know_gateway: bool) -> None:
+    def receive_present(self, payload: bytes, neighbour: int, _from: int) -> None:
+        """A neighbour introduces itself."""
+        hops, know_gateway = present_body(payload)
         self._neighbours.set_hops(neighbour, hops)
         if not self._repair.may_connect(neighbour, know_gateway):
             return
@@ -149,9 +153,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
             else:
                 self._introduction.answer_search(neighbour)
 
-    def _on_heartbeat(
-        self, creator: int, from_: int, know_gateway: bool, preferred_gateway: int, hops: int
-    ) -> None:
+    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+        """A gateway's answer, or the heartbeat of another node."""
+        know_gateway, preferred_gateway, hops = heartbeat_body(payload)
         if creator == self._node_id:
             return  # its own heartbeat came back, which proves nothing
         if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:

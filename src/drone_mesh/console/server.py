@@ -25,6 +25,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from drone_mesh.communication.packet_types import PacketKind
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
@@ -44,7 +45,6 @@ from drone_mesh.console.orders import (
 )
 from drone_mesh.console.page import Page
 from drone_mesh.console.stage import Stage
-from drone_mesh.state.packets import PacketKind
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied
 

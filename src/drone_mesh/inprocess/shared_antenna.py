@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Callable
 
 from drone_mesh.channel.medium_access import Fate, MediumAccess
-from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket, Priority
+from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import (
@@ -18,7 +18,7 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import is_data, readdressed, receiver
+from drone_mesh.communication.messages import priority, readdressed, receiver
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
@@ -102,14 +102,14 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         to = receiver(payload)
         if not self.powered or to > MAX_NODE_ID or to == self.node_id:
             return False
-        taken = self.access.offer(to, payload, self._clock.now_s, _priority_of(payload))
+        taken = self.access.offer(to, payload, self._clock.now_s, priority(payload))
         self._plan()
         return taken
 
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all nodes."""
         if self.powered:
-            self.access.offer(ALL_NODES, payload, self._clock.now_s, _priority_of(payload))
+            self.access.offer(ALL_NODES, payload, self._clock.now_s, priority(payload))
             self._plan()
 
     def data_room(self) -> int:
@@ -262,7 +262,3 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.delivered += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
-
-
-def _priority_of(payload: bytes) -> Priority:
-    return Priority.DATA if is_data(payload) else Priority.CONTROL

@@ -9,10 +9,11 @@ from typing import Callable
 
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import Fate, MediumAccess
-from drone_mesh.channel.packet_queue import OutgoingPacket, Priority
+from drone_mesh.channel.packet_queue import OutgoingPacket
 from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
+from drone_mesh.communication.packet_types import Priority
 from drone_mesh.nrf24.errors import RadioError
 from drone_mesh.nrf24.gpio import CePin, IrqPin
 from drone_mesh.nrf24.irq_watch import IrqWatch

@@ -9,12 +9,89 @@
 local PAYLOAD_BYTES = 32
 local HEADER_BYTES = 5
 
+-- packet types, written by scripts/packet_tables
 local types = {
-  [0] = "NOTDEFINED", [1] = "LOCATION", [2] = "REQUESTLOCATION", [3] = "PRESENT",
-  [4] = "HEARTBEAT", [5] = "MISSING", [6] = "MOVE_TO_LOCATION", [7] = "MOVEMENT_NEGOTIATION",
-  [64] = "ORDER_REPLY", [65] = "ORDER_QUERY", [66] = "NODE_REPORT", [67] = "NODE_WORDS",
-  [125] = "GATEWAY_PLACE", [126] = "SEAL_CHALLENGE", [127] = "SEAL_ANSWER",
+  [0] = "NOTDEFINED",
+  [1] = "LOCATION",
+  [2] = "REQUESTLOCATION",
+  [3] = "PRESENT",
+  [4] = "HEARTBEAT",
+  [5] = "MISSING",
+  [6] = "MOVE_TO_LOCATION",
+  [7] = "MOVEMENT_NEGOTIATION",
+  [64] = "ORDER_REPLY",
+  [65] = "ORDER_QUERY",
+  [66] = "NODE_REPORT",
+  [67] = "NODE_WORDS",
+  [68] = "NODE_SEARCH",
+  [125] = "GATEWAY_PLACE",
+  [126] = "SEAL_CHALLENGE",
+  [127] = "SEAL_ANSWER",
 }
+local bodies = { -- name, form, bytes
+  [1] = {
+    { "latitude", "float", 4 },
+    { "longitude", "float", 4 },
+    { "height", "int16", 2 },
+    { "timeSincePosix", "uint32", 4 },
+  },
+  [3] = {
+    { "hopsUntilGateway", "uint8", 1 },
+    { "knowGateway", "bool", 1 },
+  },
+  [4] = {
+    { "knowGateway", "bool", 1 },
+    { "preferredGateway", "uint8", 1 },
+    { "hops", "uint8", 1 },
+  },
+  [5] = {
+    { "missing", "uint8", 1 },
+  },
+  [6] = {
+    { "latitude", "float", 4 },
+    { "longitude", "float", 4 },
+    { "height", "int16", 2 },
+  },
+  [7] = {
+    { "cost", "float", 4 },
+  },
+  [64] = {
+    { "order", "uint16", 2 },
+    { "outcome", "uint8", 1 },
+    { "part", "uint8", 1 },
+    { "text", "string", 10 },
+  },
+  [65] = {
+    { "order", "uint16", 2 },
+  },
+  [66] = {
+    { "neighbours", "uint8", 1 },
+    { "hopsUntilGateway", "uint8", 1 },
+    { "nextHop", "uint8", 1 },
+    { "latitudeSteps", "int16", 2 },
+    { "longitudeSteps", "int16", 2 },
+    { "heightSteps", "int16", 2 },
+    { "battery", "uint8", 1 },
+    { "flags", "uint8", 1 },
+    { "tries", "uint8", 1 },
+  },
+  [67] = {
+    { "part", "uint8", 1 },
+    { "text", "string", 13 },
+  },
+  [68] = {
+    { "node", "uint8", 1 },
+    { "number", "uint16", 2 },
+  },
+  [125] = {
+    { "agePlusOne", "uint16", 2 },
+    { "gateway", "uint8", 1 },
+    { "latitude", "float", 4 },
+    { "longitude", "float", 4 },
+    { "height", "int16", 2 },
+  },
+}
+-- end of packet types
 local outcomes = {
   [1] = "accepted", [2] = "refused", [3] = "arrived", [4] = "given up", [5] = "unknown",
 }
@@ -50,24 +127,25 @@ local f = {
   data = ProtoField.bytes("drone_mesh.data", "Data"),
   rest = ProtoField.bytes("drone_mesh.rest", "Behind the body"),
 }
-mesh.fields = f
 
--- Fields of the body by type: {field, bytes}; the order is that on the air, little-endian.
-local bodies = {
-  [1] = { { f.latitude, 4 }, { f.longitude, 4 }, { f.height, 2 }, { f.time, 4 } },
-  [3] = { { f.hops, 1 }, { f.know_gateway, 1 } },
-  [4] = { { f.know_gateway, 1 }, { f.gateway, 1 }, { f.hops, 1 } },
-  [5] = { { f.missing, 1 } },
-  [6] = { { f.latitude, 4 }, { f.longitude, 4 }, { f.height, 2 }, { f.order, 2 } },
-  [7] = { { f.cost, 4 } },
-  [64] = { { f.order, 2 }, { f.outcome, 1 }, { f.last_part, 1, f.part }, { f.text, 10 } },
-  [65] = { { f.order, 2 } },
-  [66] = {
-    { f.neighbours, 1 }, { f.hops, 1 }, { f.next_hop, 1 }, { f.place, 2 }, { f.place, 2 },
-    { f.place, 2 }, { f.battery, 1 }, { f.flying, 1, f.can_fly }, { f.tries, 1 },
-  },
-  [67] = { { f.last_part, 1, f.part }, { f.text, 13 } },
+-- The fields that show a part of a body with this name; most names have a field of their own.
+local shown_as = {
+  hopsUntilGateway = { f.hops }, knowGateway = { f.know_gateway }, preferredGateway = { f.gateway },
+  timeSincePosix = { f.time }, nextHop = { f.next_hop }, part = { f.last_part, f.part },
+  latitudeSteps = { f.place }, longitudeSteps = { f.place }, heightSteps = { f.place },
+  flags = { f.flying, f.can_fly },
 }
+table.insert(bodies[6], { "order", "uint16", 2 }) -- behind the body of a MOVE_TO_LOCATION
+for _, body in pairs(bodies) do
+  for _, entry in ipairs(body) do
+    local name, form = entry[1], entry[2]
+    if not shown_as[name] then
+      f[name] = f[name] or ProtoField[form]("drone_mesh." .. name, name)
+      shown_as[name] = { f[name] }
+    end
+  end
+end
+mesh.fields = f
 
 function mesh.dissector(tvb, pinfo, root)
   if tvb:len() < PAYLOAD_BYTES then
@@ -87,12 +165,10 @@ function mesh.dissector(tvb, pinfo, root)
   end
   local at = HEADER_BYTES
   for _, entry in ipairs(bodies[kind] or {}) do
-    local range = tvb(at, entry[2])
-    tree:add_le(entry[1], range)
-    if entry[3] then
-      tree:add_le(entry[3], range)
+    for _, field in ipairs(shown_as[entry[1]]) do
+      tree:add_le(field, tvb(at, entry[3]))
     end
-    at = at + entry[2]
+    at = at + entry[3]
   end
   tree:add(kind >= 128 and f.data or f.rest, tvb(at, PAYLOAD_BYTES - at))
   return PAYLOAD_BYTES

@@ -2,56 +2,18 @@
 
 from __future__ import annotations
 
-import enum
 import random
-from typing import Mapping, NamedTuple, Sequence
+from typing import NamedTuple, Sequence
 
-from drone_mesh.communication.messages import (
-    DATA_TYPES,
-    MessageType,
-    receiver,
-    sender,
-    type_of,
-)
+from drone_mesh.communication.messages import receiver, sender, type_of
+from drone_mesh.communication.packet_types import ABOUT, PacketKind
 
 MOST_SAMPLED = 120  # our choice, for a fifth of a second: more dots cannot be followed
 
 
-class PacketKind(enum.Enum):
-    """The subject of a packet, as a legend shows it."""
-
-    HEARTBEAT = "heartbeat"
-    INTRODUCTION = "introduction"
-    POSITION = "position"
-    REPAIR = "repair"  # a node is missing, or a bid to fly
-    ORDER = "order"  # to fly, and the answers to it
-    REPORT = "report"  # of a node to the gateway
-    DATA = "data"  # of users
-    OTHER = "other"  # of a routing technique, of keys, or of unknown type
-
-
-_KINDS: Mapping[int, PacketKind] = {
-    MessageType.LOCATION: PacketKind.POSITION,
-    MessageType.REQUESTLOCATION: PacketKind.POSITION,
-    MessageType.GATEWAY_PLACE: PacketKind.POSITION,
-    MessageType.PRESENT: PacketKind.INTRODUCTION,
-    MessageType.HEARTBEAT: PacketKind.HEARTBEAT,
-    MessageType.MISSING: PacketKind.REPAIR,
-    MessageType.MOVEMENT_NEGOTIATION: PacketKind.REPAIR,
-    MessageType.MOVE_TO_LOCATION: PacketKind.ORDER,
-    MessageType.ORDER_REPLY: PacketKind.ORDER,
-    MessageType.ORDER_QUERY: PacketKind.ORDER,
-    MessageType.NODE_REPORT: PacketKind.REPORT,
-    MessageType.NODE_WORDS: PacketKind.REPORT,
-    MessageType.NODE_SEARCH: PacketKind.REPORT,
-}
-
-
 def kind_of(packet_type: int) -> PacketKind:
     """The kind of a packet whose byte 2 is `packet_type`."""
-    if packet_type in DATA_TYPES:
-        return PacketKind.DATA
-    return _KINDS.get(packet_type, PacketKind.OTHER)
+    return ABOUT[packet_type].kind
 
 
 class SampledPacket(NamedTuple):

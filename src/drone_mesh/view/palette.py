@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Mapping
 
+from drone_mesh.communication.packet_types import PacketKind
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition
 from drone_mesh.state.links import LinkUse
-from drone_mesh.state.packets import PacketKind
 from drone_mesh.state.trouble import Severity
 
 Colour = str  # "#rrggbb"

@@ -7,8 +7,9 @@ import logging
 import pytest
 from scenarios import line
 
-from drone_mesh.communication.frames import TYPES_WITH_PLACES, CommonFrame
+from drone_mesh.communication.frames import CommonFrame
 from drone_mesh.communication.messages import IntroduceMessage, frame_digest, with_frame_digest
+from drone_mesh.communication.packet_types import TYPES_WITH_PLACES
 from drone_mesh.inprocess.drone import InProcessDrone
 
 ONE, OTHER = 0x1234, 0x4321

@@ -95,6 +95,7 @@ def test_the_fields_of_each_message_are_those_that_were_packed(tmp_path):
         HeartbeatMessage(5, 6, 7, 0, True, 0, 4).to_payload(),
         *reply_packets(9, OrderOutcome.REFUSED, "too far", 5, 0),
         report.packet(6, 0),
+        bytes.fromhex("00 00 44 fe fe 09 05 01").ljust(32, b"\0"),
         bytes((1, 2, 200, 3, 4)).ljust(32, b"\5"),
     )
     columns = ("type", "hops", "height", "gateway", "outcome", "text", "place", "flying", "can_fly")
@@ -107,9 +108,12 @@ def test_the_fields_of_each_message_are_those_that_were_packed(tmp_path):
         ["4", "4", "", "0", "", "", "", "", ""],
         ["64", "", "", "", "2", "too far", "", "", ""],
         ["66", "2", "", "", "", "", "5,-12,15", yes, no],
+        ["68", "", "", "", "", "", "", "", ""],
         ["200", "", "", "", "", "", "", "", ""],
     ]
     assert shown(path, "_ws.col.Info")[1] == ["PRESENT made by 7, for 254"]
+    assert shown(path, "_ws.col.Info")[5] == ["NODE_SEARCH made by 0, for 254"]
+    assert shown(path, "drone_mesh.node", "drone_mesh.number")[5] == ["9", "261"]
 
 
 def test_what_a_radio_hears_is_in_the_file_with_the_command_that_opens_it(tmp_path, capsys):

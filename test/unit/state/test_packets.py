@@ -7,7 +7,8 @@ from collections import Counter
 
 import pytest
 
-from drone_mesh.state.packets import PacketKind, PacketSampler, SampledPacket, kind_of
+from drone_mesh.communication.packet_types import PacketKind
+from drone_mesh.state.packets import PacketSampler, SampledPacket, kind_of
 
 
 def packet(sender: int, receiver: int, packet_type: int) -> bytes:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.messages import HEADER_BYTES, MessageType
+from drone_mesh.communication.messages import HEADER_BYTES
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.text_parts import is_valid, split
 
 TEXT_BYTES = 10  # of a reason, in one packet

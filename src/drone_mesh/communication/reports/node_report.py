@@ -11,7 +11,8 @@ from typing import ClassVar
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.messages import HEADER_BYTES, MessageType
+from drone_mesh.communication.messages import HEADER_BYTES
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.text_parts import split
 from drone_mesh.drone.location import Location
 

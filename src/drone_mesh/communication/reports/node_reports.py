@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.reports.node_report import (
     NOTHING_REPORTED,

@@ -9,12 +9,12 @@ from __future__ import annotations
 import abc
 from typing import ClassVar, Sequence
 
-from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import UNDISTURBED, Medium
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.location import Location
 
-_HEARTBEAT = int(messages.MessageType.HEARTBEAT)
+_HEARTBEAT = int(MessageType.HEARTBEAT)
 
 
 class IRoutingEssentials(abc.ABC):

@@ -22,8 +22,8 @@ from drone_mesh.communication.messages import (
     FORWARD_AT,
     FROM_AT,
     TYPE_AT,
-    MessageType,
 )
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.replay import ReplayWindow
 from drone_mesh.communication.seals.seal import SEAL_AT, SEAL_BYTES

@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
-from drone_mesh.communication.messages import FORWARD_AT, FROM_AT, TO_AT, MessageType
+from drone_mesh.communication.messages import FORWARD_AT, FROM_AT, TO_AT
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.replay import ReplayWindow
 

@@ -21,7 +21,8 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TYPE_AT, MessageType
+from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TYPE_AT
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven, reserved_bytes
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.message_seal import MessageSeal

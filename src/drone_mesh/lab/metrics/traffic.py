@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import statistics
 
-from drone_mesh.communication.messages import MessageType
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.lab.metrics.registry import METRICS, NAN, Metric, metric
 from drone_mesh.lab.record import RunRecord
 

@@ -13,11 +13,11 @@ from drone_mesh.communication.interfaces import BROADCAST
 from drone_mesh.communication.messages import (
     GoToLocationMessage,
     LocationMessage,
-    MessageType,
     MovementNegotiationMessage,
     header,
     readdressed,
 )
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.lab.proofs.stranger import Stranger
 

@@ -8,7 +8,8 @@ from typing import Callable, Iterator, NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, IMeshNetwork, IWirelessCommunication
-from drone_mesh.communication.messages import MessageType, header
+from drone_mesh.communication.messages import header
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.location import Location

@@ -6,7 +6,8 @@ import threading
 from collections import deque
 from typing import Callable, Protocol
 
-from drone_mesh.communication.messages import MessageType, packet
+from drone_mesh.communication.messages import packet
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.msg import DroneInfo
 from drone_mesh.ros.graph import names

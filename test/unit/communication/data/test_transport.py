@@ -2,11 +2,11 @@ import pytest
 
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import MediumAccess
-from drone_mesh.channel.packet_queue import Priority
 from drone_mesh.communication.data.outgoing import LIFETIME_S
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, TicketState
 from drone_mesh.communication.data.transport import MOST_QUEUED
 from drone_mesh.communication.messages import is_data
+from drone_mesh.communication.packet_types import Priority
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.inprocess import Network
 

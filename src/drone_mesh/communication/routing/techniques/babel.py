@@ -10,7 +10,7 @@ import struct
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.feasible_routes import Distance, FeasibleRoutes
 from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes
 

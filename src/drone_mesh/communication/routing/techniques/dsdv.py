@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes
 
 ENTRY = struct.Struct("<BHB")  # gateway + 1 (0: no entry), sequence number, hops

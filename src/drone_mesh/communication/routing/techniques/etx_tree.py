@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.messages import MessageType
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.techniques.gateway_routes import GatewayRoutes
 
 RANK_PER_ETX = 128  # RFC 6719: ranks are ETX in units of 1/128

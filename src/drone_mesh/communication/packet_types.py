@@ -1,0 +1,168 @@
+"""The packet types of the mesh: one declaration per type (docs/protocol.md, "Packets").
+
+Everything that differs by type follows from here: the checks and the dispatch of a component, the
+kinds that pages show, the counters of the lab and, through `scripts/packet_tables`, the table in
+docs/protocol.md and the Wireshark dissector.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Callable, NamedTuple, Sequence
+
+TECHNIQUE_TYPES = range(8, 64)
+REPORT_TYPES = range(64, 128)
+DATA_TYPES = range(128, 256)  # users' data; data/packets.py describes their bodies
+
+
+class PacketKind(enum.Enum):
+    """The subject of a packet, as a legend shows it."""
+
+    HEARTBEAT = "heartbeat"
+    INTRODUCTION = "introduction"
+    POSITION = "position"
+    REPAIR = "repair"  # a node is missing, or a bid to fly
+    ORDER = "order"  # to fly, and the answers to it
+    REPORT = "report"  # of a node to the gateway
+    DATA = "data"  # of users
+    OTHER = "other"  # of a routing technique, of keys, or of unknown type
+
+
+class Priority(enum.IntEnum):
+    """Which packets an antenna sends first."""
+
+    CONTROL = 0  # packets of the mesh itself
+    DATA = 1
+
+
+class Handler(enum.Enum):
+    """Who handles a packet when it has arrived; the values are words of docs/protocol.md."""
+
+    NODE = "every node"
+    GATEWAY = "a gateway"
+    SEAL = "the seals"  # without a key, a node at most reports that a neighbour has one
+    TECHNIQUE = "the routing technique"
+    USERS = "the users' data service"
+    NOBODY = "no node"
+
+
+class PacketType(NamedTuple):
+    """What is declared about a type."""
+
+    kind: PacketKind
+    handler: Handler
+    body: str = ""  # its fields in their order, as "uint8 name" or "bytes[10] name"
+    made_of: str = "Message"  # the class that encodes it
+    priority: Priority = Priority.CONTROL
+
+    @property
+    def floats(self) -> int:
+        """How many floats the body starts with. A packet with one that is not finite is bad."""
+        fields = self.body.split(", ")
+        return next((n for n, one in enumerate(fields) if one[:7] != "float32"), len(fields))
+
+    @property
+    def has_place(self) -> bool:
+        """Whether it carries a place, in the coordinates of its creator (see frames)."""
+        return " latitude" in self.body
+
+
+_UNKNOWN = PacketType(PacketKind.OTHER, Handler.NOBODY)
+_TECHNIQUE = PacketType(PacketKind.OTHER, Handler.TECHNIQUE)
+_DATA = PacketType(PacketKind.DATA, Handler.USERS, priority=Priority.DATA)
+_NODE, _GATEWAY, _SEAL = Handler.NODE, Handler.GATEWAY, Handler.SEAL
+# Bodies that fill a line
+_PLACE = "float32 latitude, float32 longitude, int16 height"
+_LOCATION = f"{_PLACE}, uint32 timeSincePosix"
+_PRESENT = "uint8 hopsUntilGateway, bool knowGateway"
+_HEARTBEAT = "bool knowGateway, uint8 preferredGateway, uint8 hops"
+_REPLY = "uint16 order, uint8 outcome, uint8 part, bytes[10] text"
+_REPORT = (
+    "uint8 neighbours, uint8 hopsUntilGateway, uint8 nextHop, int16 latitudeSteps, "
+    "int16 longitudeSteps, int16 heightSteps, uint8 battery, uint8 flags, uint8 tries"
+)
+_WORDS = "uint8 part, bytes[13] text"
+_GATEWAY_PLACE = f"uint16 agePlusOne, uint8 gateway, {_PLACE}"
+
+
+class MessageType(enum.IntEnum):
+    """Byte 2, with what is declared about it. See also the three ranges above."""
+
+    about: PacketType
+
+    def __new__(cls, number: int, about: PacketType = _UNKNOWN) -> MessageType:
+        member = int.__new__(cls, number)
+        member._value_ = number
+        member.about = about
+        return member
+
+    NOTDEFINED = 0, _UNKNOWN
+    # The position of its creator, and the question for it
+    LOCATION = 1, PacketType(PacketKind.POSITION, _NODE, _LOCATION, "LocationMessage")
+    REQUESTLOCATION = 2, PacketType(PacketKind.POSITION, _NODE)
+    # Introduces its creator to every node in range
+    PRESENT = 3, PacketType(PacketKind.INTRODUCTION, _NODE, _PRESENT, "IntroduceMessage")
+    # Proof of a path; counts its hops
+    HEARTBEAT = 4, PacketType(PacketKind.HEARTBEAT, _NODE, _HEARTBEAT, "HeartbeatMessage")
+    # Its creator can no longer reach a node
+    MISSING = 5, PacketType(PacketKind.REPAIR, _NODE, "uint8 missing", "MissingMessage")
+    # An order to fly
+    MOVE_TO_LOCATION = 6, PacketType(PacketKind.ORDER, _NODE, _PLACE, "GoToLocationMessage")
+    # The bid of its creator to fly
+    MOVEMENT_NEGOTIATION = (
+        7,
+        PacketType(PacketKind.REPAIR, _NODE, "float32 cost", "MovementNegotiationMessage"),
+    )
+    # A drone's reply to a numbered order, and the question for it
+    ORDER_REPLY = 64, PacketType(PacketKind.ORDER, _GATEWAY, _REPLY, "OrderReply")
+    ORDER_QUERY = 65, PacketType(PacketKind.ORDER, _NODE, "uint16 order", "OrderQuery")
+    # The state of its creator, and why that cannot fly
+    NODE_REPORT = 66, PacketType(PacketKind.REPORT, _GATEWAY, _REPORT, "NodeReport")
+    NODE_WORDS = 67, PacketType(PacketKind.REPORT, _GATEWAY, _WORDS, "NodeWords")
+    # A gateway looks for a node
+    NODE_SEARCH = (
+        68,
+        PacketType(PacketKind.REPORT, _NODE, "uint8 node, uint16 number", "NodeSearch"),
+    )
+    # Where a gateway was, in a mesh with a key
+    GATEWAY_PLACE = 125, PacketType(PacketKind.POSITION, _NODE, _GATEWAY_PLACE, "GatewayPlace")
+    # Asks a neighbour to prove that it has the key, and the proof
+    SEAL_CHALLENGE = 126, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
+    SEAL_ANSWER = 127, PacketType(PacketKind.OTHER, _SEAL, made_of="HopSeal")
+
+
+def _about(number: int) -> PacketType:
+    if number in MessageType.__members__.values():
+        return MessageType(number).about
+    if number in DATA_TYPES:
+        return _DATA
+    return _TECHNIQUE if number in TECHNIQUE_TYPES else _UNKNOWN
+
+
+def _handler_name(number: int) -> str:
+    if number in MessageType.__members__.values():
+        return f"receive_{MessageType(number).name.lower()}"
+    if number in DATA_TYPES:
+        return "receive_data"
+    return "receive_of_technique" if number in TECHNIQUE_TYPES else ""
+
+
+ABOUT = tuple(map(_about, range(256)))
+"""What is declared about each number, also about those that are no MessageType."""
+
+HANDLER_NAMES = tuple(map(_handler_name, range(256)))
+"""The method that handles packets with this number; empty: no node handles them."""
+
+TYPES_WITH_FLOATS = {number: ABOUT[number].floats for number in range(256) if ABOUT[number].floats}
+"""The numbers of the types whose bodies start with floats, and how many."""
+
+TYPES_WITH_PLACES = frozenset(number for number in range(256) if ABOUT[number].has_place)
+
+
+Receiver = Callable[[bytes, int, int], None]
+"""Handles a packet, given with its creator and the sender of this hop."""
+
+
+def receivers(node: object, otherwise: Receiver) -> Sequence[Receiver]:
+    """By number: the method of `node` for that type, or `otherwise`."""
+    return [getattr(node, name, otherwise) if name else otherwise for name in HANDLER_NAMES]
