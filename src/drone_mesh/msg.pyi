@@ -86,6 +86,58 @@ class HostReport(Message):
         events: Sequence[MeshEvent] = ...,
     ) -> None: ...
 
+class LayoutAction(Message): ...
+
+class LayoutFeedback(Message):
+    id: int
+    arrived: bytes
+    flying: bytes
+    message: str
+    def __init__(
+        self,
+        id: int = ...,
+        arrived: bytes | Sequence[int] = ...,
+        flying: bytes | Sequence[int] = ...,
+        message: str = ...,
+    ) -> None: ...
+
+class LayoutGoal(Message):
+    caseID: int
+    def __init__(self, caseID: int = ...) -> None: ...
+
+class LayoutProgress(Message):
+    id: int
+    case_id: int
+    arrived: bytes
+    flying: bytes
+    waiting: bytes
+    refused: bytes
+    reasons: Sequence[str]
+    replaced: bytes
+    not_in_fleet: bytes
+    over: bool
+    message: str
+    def __init__(
+        self,
+        id: int = ...,
+        case_id: int = ...,
+        arrived: bytes | Sequence[int] = ...,
+        flying: bytes | Sequence[int] = ...,
+        waiting: bytes | Sequence[int] = ...,
+        refused: bytes | Sequence[int] = ...,
+        reasons: Sequence[str] = ...,
+        replaced: bytes | Sequence[int] = ...,
+        not_in_fleet: bytes | Sequence[int] = ...,
+        over: bool = ...,
+        message: str = ...,
+    ) -> None: ...
+
+class LayoutResult(Message):
+    id: int
+    complete: bool
+    message: str
+    def __init__(self, id: int = ..., complete: bool = ..., message: str = ...) -> None: ...
+
 class Location(Message):
     latitude: float
     longitude: float
@@ -152,6 +204,7 @@ class MeshState(Message):
     repair_strategy: str
     nodes: list[NodeState]
     shape: str
+    layouts: Sequence[str]
     obstacles: list[Obstacle]
     def __init__(
         self,
@@ -164,6 +217,7 @@ class MeshState(Message):
         repair_strategy: str = ...,
         nodes: Sequence[NodeState] = ...,
         shape: str = ...,
+        layouts: Sequence[str] = ...,
         obstacles: Sequence[Obstacle] = ...,
     ) -> None: ...
 

@@ -70,12 +70,14 @@ class OrderLayoutRequest(Message):
     def __init__(self, caseID: int = ...) -> None: ...
 
 class OrderLayoutResponse(Message):
+    id: int
     sent: bytes
     no_route: bytes
     not_in_fleet: bytes
     message: str
     def __init__(
         self,
+        id: int = ...,
         sent: bytes | Sequence[int] = ...,
         no_route: bytes | Sequence[int] = ...,
         not_in_fleet: bytes | Sequence[int] = ...,
@@ -212,3 +214,16 @@ class WirelessMessagesResponse(Message):
 class WirelessMessages:
     _request_class = WirelessMessagesRequest
     _response_class = WirelessMessagesResponse
+
+class WithdrawLayoutRequest(Message):
+    id: int
+    def __init__(self, id: int = ...) -> None: ...
+
+class WithdrawLayoutResponse(Message):
+    success: bool
+    message: str
+    def __init__(self, success: bool = ..., message: str = ...) -> None: ...
+
+class WithdrawLayout:
+    _request_class = WithdrawLayoutRequest
+    _response_class = WithdrawLayoutResponse

@@ -74,7 +74,7 @@ class ManagerTest(unittest.TestCase):
         answer = call("/DroneManager/orderLayout", OrderLayout, 101)
         self.assertEqual((list(answer.sent), list(answer.no_route)), ([6, 4, 3, 1], [5, 2]))
         self.assertEqual(list(answer.not_in_fleet), [])
-        self.assertEqual(answer.message, "ordered 4 of 6 drones; no route to drones 2, 5")
+        self.assertEqual(answer.message, "ordered 4 of 6 drones; no route yet to drones 2, 5")
 
     def test_drones_that_are_not_in_the_fleet_are_not_ordered(self) -> None:
         self.listen()

@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 from typing import Sequence
 
+from drone_mesh.arguments import whole
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.seals.key_file import read_key_file, write_key_file
 from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
 from drone_mesh.errors import ConfigurationError, naming_argument
-from drone_mesh.raspberry.wiring_options import whole
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

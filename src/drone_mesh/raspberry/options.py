@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Mapping, Sequence
 
+from drone_mesh.arguments import whole
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.repair.named_strategies import (
     REPAIR_STRATEGIES,
@@ -39,7 +40,7 @@ from drone_mesh.raspberry.emulated_fleet import FleetOptions, add_fleet_options,
 from drone_mesh.raspberry.flight_options import add_flight_options, flight_options
 from drone_mesh.raspberry.http_options import add_http_options, http_options
 from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqtt_options
-from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
+from drone_mesh.raspberry.wiring_options import add_wiring_options
 
 MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
 LOG_LEVELS = ("debug", "info", "warning", "error")

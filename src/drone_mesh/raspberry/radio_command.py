@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from typing import Callable, Iterator, Sequence
 
+from drone_mesh.arguments import whole
 from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.location import Location
@@ -23,7 +24,7 @@ from drone_mesh.raspberry import radio_tests, range_test
 from drone_mesh.raspberry.emulated_partner import PARTNER_ID, EmulatedPartner
 from drone_mesh.raspberry.field_radio import FieldRadio
 from drone_mesh.raspberry.node_status import version
-from drone_mesh.raspberry.wiring_options import add_wiring_options, whole
+from drone_mesh.raspberry.wiring_options import add_wiring_options
 
 REPORT_ROUNDS = 20
 USUAL_NODES = 17  # our choice: the field case

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import Callable
 
+from drone_mesh.arguments import whole
 from drone_mesh.nrf24.gpio import CE_GPIO, IRQ_GPIO
 from drone_mesh.nrf24.spi import SPI_HZ
 
@@ -43,23 +43,6 @@ def add_wiring_options(parser: argparse.ArgumentParser) -> None:
         metavar="HZ",
         help="SPI clock; 1000000 for long wires (default: %(default)s)",
     )
-
-
-def whole(lowest: int, highest: int) -> Callable[[str], int]:
-    """A type for argparse: a whole number within these bounds."""
-
-    def number_of(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            number = lowest - 1
-        if not lowest <= number <= highest:
-            raise argparse.ArgumentTypeError(
-                f"invalid value {text!r}: must be a whole number {lowest}..{highest}"
-            )
-        return number
-
-    return number_of
 
 
 def _spi_device(text: str) -> tuple[int, int]:

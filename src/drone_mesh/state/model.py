@@ -107,6 +107,7 @@ class MeshStatus:
     repair_strategy: str = ""  # name of the repair strategy; empty: not known
     obstacles: Sequence[ObstacleStatus] = ()
     shape: str = ""  # how drones are drawn: a value of view.picture.Shape; empty: the default
+    layouts: Sequence[str] = ()  # how far each ordered layout has come, in words
 
 
 def channel_in_words(node: NodeStatus) -> str:

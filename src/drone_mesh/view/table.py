@@ -41,7 +41,7 @@ def mesh_table(mesh: MeshStatus, colours: bool) -> str:
             connected_badly = condition is Condition.CONNECTED and node.id in troubles
             what = troubles[node.id].severity if connected_badly else condition
             lines[number] = ansi(lines[number], what)
-    return "\n".join([heading, *lines])
+    return "\n".join([heading, *mesh.layouts, *lines])
 
 
 def _row(node: NodeStatus, trouble: Trouble | None) -> tuple[str, ...]:

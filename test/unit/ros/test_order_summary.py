@@ -18,10 +18,10 @@ from drone_mesh.ros.services.order_summary import OrderSummary
         ),
         (
             OrderSummary([1, 2], [3, 9, 5, 4], list(range(18, 101))),
-            "ordered 2 of 89 drones; no route to drones 3..5, 9; "
+            "ordered 2 of 89 drones; no route yet to drones 3..5, 9; "
             "drones 18..100 are not in this fleet",
         ),
-        (OrderSummary([], [7], []), "ordered 0 of 1 drone; no route to drone 7"),
+        (OrderSummary([], [7], []), "ordered 0 of 1 drone; no route yet to drone 7"),
     ],
 )
 def test_a_summary_counts_the_orders_and_names_the_drones_without_one(summary, line):

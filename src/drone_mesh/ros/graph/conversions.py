@@ -117,6 +117,7 @@ def state_msg(mesh: MeshStatus) -> MeshState:
         repair_strategy=mesh.repair_strategy,
         nodes=[node if isinstance(node, NodeState) else _node_msg(node) for node in mesh.nodes],
         shape=mesh.shape,
+        layouts=list(mesh.layouts),
         obstacles=[Obstacle(box.center, box.size, box.yaw) for box in mesh.obstacles],
     )
     message.header.stamp = ros_time(mesh.stamp_s)
@@ -143,6 +144,7 @@ def mesh_status(message: MeshState) -> MeshStatus:
         getattr(message, "repair_strategy", ""),
         getattr(message, "obstacles", ()),
         getattr(message, "shape", ""),
+        getattr(message, "layouts", ()),
     )
 
 

@@ -16,6 +16,10 @@ GATEWAY_ANSWERS_TOPIC = "/gateway/answers"  # FlightOrderAnswer: each gateway ->
 REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"
 SET_TO_CASUS_SERVICE = "/DroneManager/SetToCasus"
 ORDER_LAYOUT_SERVICE = "/DroneManager/orderLayout"  # OrderLayout
+WITHDRAW_LAYOUT_SERVICE = "/DroneManager/withdrawLayout"  # WithdrawLayout
+LAYOUT_ACTION = "/DroneManager/layout"  # Layout
+LAYOUTS_TOPIC = "/DroneManager/layouts"  # LayoutProgress, latched: DroneManager -> users
+STANDING_PARAM = "/DroneManager/standing"  # what is left to order, for a restarted DroneManager
 # The same services under their short names.
 SHORT_REQUEST_MOVEMENT_SERVICE = "/requestDroneMovement"
 SHORT_SET_TO_CASUS_SERVICE = "/SetToCasus"

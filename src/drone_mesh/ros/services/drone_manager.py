@@ -6,6 +6,7 @@ import logging
 import time
 from typing import Sequence
 
+import actionlib
 import rospy
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID
@@ -24,6 +25,7 @@ from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.services.order_answers import OrderAnswers
 from drone_mesh.ros.services.order_summary import OrderSummary
+from drone_mesh.ros.services.standing_layouts import StandingLayouts
 from drone_mesh.srv import (
     Casus,
     CasusRequest,
@@ -34,6 +36,9 @@ from drone_mesh.srv import (
     RequestDroneFlight,
     RequestDroneFlightRequest,
     RequestDroneFlightResponse,
+    WithdrawLayout,
+    WithdrawLayoutRequest,
+    WithdrawLayoutResponse,
 )
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/protocol.md, "Drone manager")
@@ -52,10 +57,12 @@ class DroneManager:
     Subscribes: /gateway/answers (FlightOrderAnswer)
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
                 (Casus), also as /requestDroneMovement and /SetToCasus;
-                /DroneManager/orderLayout (OrderLayout)
+                /DroneManager/orderLayout (OrderLayout), /DroneManager/withdrawLayout
+                (WithdrawLayout)
+    Standing orders: see StandingLayouts
     """
 
-    # The layouts, the only state, never change, so the handlers may run in parallel.
+    # The handlers may run in parallel: the layouts never change, StandingLayouts has its own lock.
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts = layouts
@@ -66,11 +73,13 @@ class DroneManager:
             queue_size=ORDERS_IN_QUEUE,
         )
         self._answers = OrderAnswers()
+        self._standing = StandingLayouts(self._publish, self._carry_out)
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
             rospy.Service(name, RequestDroneFlight, self._request_movement)
         for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
             rospy.Service(name, Casus, self._set_to_casus)
         rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
+        rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, self._withdraw_layout)
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
         """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
@@ -89,6 +98,7 @@ class DroneManager:
         if not self._gateway_is_there():
             _log.warning("drone %d: order dropped: no gateway is running", request.ID)
             return RequestDroneFlightResponse(status=0)
+        self._standing.replace(request.ID)
         _sent, no_route = self._order([Order(request.ID, goal)], fleet)
         if no_route:
             _log.warning("drone %d: no gateway has a route to it", request.ID)
@@ -99,12 +109,21 @@ class DroneManager:
         return CasusResponse()
 
     def _order_layout(self, request: OrderLayoutRequest) -> OrderLayoutResponse:
-        summary = self._carry_out(request.caseID)
+        number, summary = self._carry_out(request.caseID)
         return OrderLayoutResponse(
-            summary.sent, summary.no_route, summary.not_in_fleet, summary.in_words()
+            number, summary.sent, summary.no_route, summary.not_in_fleet, summary.in_words()
         )
 
-    def _carry_out(self, case: int) -> OrderSummary:
+    def _withdraw_layout(self, request: WithdrawLayoutRequest) -> WithdrawLayoutResponse:
+        words = self._standing.withdraw(request.id)
+        if words is None:
+            return WithdrawLayoutResponse(False, f"there is no standing order {request.id}")
+        return WithdrawLayoutResponse(True, words)
+
+    def _carry_out(
+        self, case: int, handle: actionlib.ServerGoalHandle | None = None
+    ) -> tuple[int, OrderSummary]:
+        """Order a layout; returns the number of its standing order, and its first outcome."""
         try:
             orders = self._layouts.orders(case)
         except UnknownCase as error:
@@ -114,26 +133,29 @@ class DroneManager:
         fleet = drones_if_known()
         known = [o for o in orders if fleet is None or o.node_id in fleet.roles]
         missing = [order.node_id for order in orders if order not in known]
+        number = self._standing.give(case, orders, handle)
         sent, no_route = self._order(known, fleet)
         summary = OrderSummary(sent, no_route, missing)
         complete = len(sent) == len(orders)
         _log.log(
             logging.INFO if complete else logging.WARNING, "case %d: %s", case, summary.in_words()
         )
-        return summary
+        return number, summary
+
+    def _publish(self, orders: Sequence[Order]) -> None:
+        for node_id, goal in orders:
+            self._gateways.publish(flight_order(node_id, goal))
 
     def _order(
         self, orders: Sequence[Order], fleet: PresentDrones | None
     ) -> tuple[list[int], list[int]]:
         """Publish these orders in sequence; returns the ids (sent, without a route)."""
 
-        def publish() -> None:
-            for node_id, goal in orders:
-                self._gateways.publish(flight_order(node_id, goal))
-
         gateways = self._gateways.get_num_connections() if fleet is None else len(fleet.gateways)
         drones = [order.node_id for order in orders]
-        return self._answers.await_outcomes(drones, publish, gateways, ANSWERS_TIMEOUT_S)
+        return self._answers.await_outcomes(
+            drones, lambda: self._publish(orders), gateways, ANSWERS_TIMEOUT_S
+        )
 
     def _gateway_is_there(self) -> bool:
         """Whether a gateway subscribes; waits for one, which may be starting."""

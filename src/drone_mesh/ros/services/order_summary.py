@@ -21,7 +21,7 @@ class OrderSummary:
         total = len(self.sent) + len(self.no_route) + len(self.not_in_fleet)
         parts = [f"ordered {len(self.sent)} of {_counted(total, 'drone')}"]
         if self.no_route:
-            parts.append(f"no route to {_named(self.no_route)}")
+            parts.append(f"no route yet to {_named(self.no_route)}")
         if self.not_in_fleet:
             verb = "is" if len(self.not_in_fleet) == 1 else "are"
             parts.append(f"{_named(self.not_in_fleet)} {verb} not in this fleet")

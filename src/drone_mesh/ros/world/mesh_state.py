@@ -11,7 +11,7 @@ from typing import Callable, Iterable, Sequence
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 
-from drone_mesh.msg import GroundedDrones, HostReport, MeshEvent, MeshState
+from drone_mesh.msg import GroundedDrones, HostReport, LayoutProgress, MeshEvent, MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, state_msg
 from drone_mesh.ros.world.diagnostics import diagnostics_msg
@@ -38,13 +38,13 @@ class WorldView:
 class MeshStatePublisher:
     """Merges the hosts' reports with the world's positions and flights.
 
-    Subscribes: /mesh/reports (HostReport)
+    Subscribes: /mesh/reports (HostReport), /DroneManager/layouts (LayoutProgress)
     Publishes:  /mesh/state (MeshState, latched), 5 Hz while watched, else 1 Hz, of wall time
                 /mesh/events (MeshEvent)
                 /diagnostics (DiagnosticArray), 1 Hz
                 /Drones/grounded (GroundedDrones, latched), when it changes
 
-    rospy's handlers only put reports into a queue; the object's thread owns everything else.
+    rospy's handlers only put messages into queues; the object's thread owns everything else.
     """
 
     def __init__(
@@ -82,7 +82,12 @@ class MeshStatePublisher:
         self._happened = happened
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="mesh state", daemon=True)
-        self._subscriber = rospy.Subscriber(names.REPORTS_TOPIC, HostReport, self._reported)
+        self._progress: deque[LayoutProgress] = deque()
+        self._layouts: dict[int, LayoutProgress] = {}  # by standing order
+        self._subscribers = (
+            rospy.Subscriber(names.REPORTS_TOPIC, HostReport, self._reported),
+            rospy.Subscriber(names.LAYOUTS_TOPIC, LayoutProgress, self._progress.append),
+        )
 
     @property
     def latest(self) -> MeshStatus | None:
@@ -99,7 +104,8 @@ class MeshStatePublisher:
 
     def stop(self) -> None:
         """Stop publishing; returns when the thread has ended."""
-        self._subscriber.unregister()
+        for subscriber in self._subscribers:
+            subscriber.unregister()
         self._stopped.set()
         self._thread.join()
         for publisher in (self._state, self._events, self._diagnostics, self._grounded):
@@ -130,8 +136,15 @@ class MeshStatePublisher:
                 self._events.publish(event)
         while self._forgotten:
             self._roster.forget(self._forgotten.popleft())
+        while self._progress:
+            self._note_progress(self._progress.popleft())
         while self._happened:
             self._events.publish(event_msg(self._happened.popleft()))
+
+    def _note_progress(self, progress: LayoutProgress) -> None:
+        """What is over stays until there is other news."""
+        self._layouts = {n: other for n, other in self._layouts.items() if not other.over}
+        self._layouts[progress.id] = progress
 
     def _publish(self, now_s: float) -> None:
         view = self._read_view()
@@ -149,6 +162,7 @@ class MeshStatePublisher:
             self._repair_strategy,
             self._obstacles,
             self._shape,
+            [f"layout {p.case_id}: {p.message}" for p in self._layouts.values()],
         )
         self._latest = mesh
         self._state.publish(state_msg(mesh))

@@ -6,6 +6,8 @@ import logging
 from collections import deque
 from typing import Sequence
 
+import rospy
+
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.nrf24.settings import data_rate
 from drone_mesh.ros.graph import names
@@ -158,6 +160,8 @@ class RosSimulation:
             watch,
             MQTT_SENDER if configuration.internet == "mqtt" else {},
         )
+        if rospy.has_param(names.STANDING_PARAM):  # of a world that has ended
+            rospy.delete_param(names.STANDING_PARAM)
         set_fleet_parameter(configuration)  # last: hosts wait for it
         watch.start()
         window = window_of(world, self._present, state) if configuration.gui else None

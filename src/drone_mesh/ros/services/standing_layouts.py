@@ -1,0 +1,210 @@
+"""StandingLayouts: the ROS side of the DroneManager's standing orders."""
+
+from __future__ import annotations
+
+import json
+import logging
+import threading
+from typing import Callable, Sequence
+
+import actionlib
+import rospy
+
+from drone_mesh.layouts import Order
+from drone_mesh.msg import (
+    LayoutAction,
+    LayoutFeedback,
+    LayoutProgress,
+    LayoutResult,
+    MeshEvent,
+    MeshState,
+)
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import event_record, mesh_status
+from drone_mesh.ros.graph.master_watch import NO_ANSWER
+from drone_mesh.state.standing_orders import PartState, Progress, StandingOrders
+
+_QUEUE = 1000  # events that may wait
+
+_log = logging.getLogger(__name__)
+
+
+def progress_msg(progress: Progress, over: bool) -> LayoutProgress:
+    """The progress of a standing order as a message."""
+    ids = {state: bytes(drones) for state, drones in progress.drones.items()}
+    return LayoutProgress(
+        id=progress.number,
+        case_id=progress.case,
+        arrived=ids[PartState.ARRIVED],
+        flying=ids[PartState.FLYING],
+        waiting=ids[PartState.WAITING],
+        refused=ids[PartState.REFUSED],
+        reasons=[progress.reasons[drone] for drone in progress.drones[PartState.REFUSED]],
+        replaced=ids[PartState.REPLACED],
+        not_in_fleet=ids[PartState.ABSENT],
+        over=over,
+        message=progress.in_words(),
+    )
+
+
+class StandingLayouts:
+    """Orders again what was not accepted, and reports how far each layout has come.
+
+    Subscribes: /mesh/state (MeshState), /mesh/events (MeshEvent)
+    Publishes:  /DroneManager/layouts (LayoutProgress, latched)
+    Action:     /DroneManager/layout (Layout)
+    Parameter:  /DroneManager/standing, what is left to order, for the next start
+
+    `_lock` guards the orders and the actions; nothing is published or stored while it is held.
+    """
+
+    def __init__(
+        self,
+        order: Callable[[Sequence[Order]], None],
+        begin: Callable[[int, actionlib.ServerGoalHandle], object],
+    ) -> None:
+        """`order` publishes orders; `begin` orders a layout for the goal of an action.
+
+        Both are called in threads of rospy. `begin` calls `give`, or raises rospy.ServiceException
+        with the reason if the layout cannot be ordered.
+        """
+        self._order = order
+        self._begin = begin
+        self._lock = threading.Lock()
+        self._orders = StandingOrders()
+        self._shown: dict[int, Progress] = {}
+        self._saved = ""
+        self._handles: dict[int, actionlib.ServerGoalHandle] = {}
+        self._publisher = rospy.Publisher(
+            names.LAYOUTS_TOPIC, LayoutProgress, queue_size=_QUEUE, latch=True
+        )
+        self._restore()
+        self._server = actionlib.ActionServer(
+            names.LAYOUT_ACTION, LayoutAction, self._goal_came, self._cancel_came, auto_start=False
+        )
+        self._server.start()
+        rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, self._event_came, queue_size=_QUEUE)
+        rospy.Subscriber(names.STATE_TOPIC, MeshState, self._state_came, queue_size=1)
+
+    def give(
+        self, case: int, orders: Sequence[Order], handle: actionlib.ServerGoalHandle | None
+    ) -> int:
+        """Make a standing order of these, which the caller publishes next. Returns its number.
+
+        `handle` is the accepted goal of the action, if it was ordered by one.
+        """
+        with self._lock:
+            number = self._orders.give(case, dict(orders), rospy.get_time())
+            if handle is not None:
+                self._handles[number] = handle
+        self._show()
+        return number
+
+    def replace(self, drone: int) -> None:
+        """This drone is ordered elsewhere."""
+        with self._lock:
+            self._orders.replace([drone])
+        self._show()
+
+    def withdraw(self, number: int) -> str | None:
+        """Order its drones no more; returns how far it came, in words. None: it is unknown."""
+        with self._lock:
+            progress = self._orders.withdraw(number)
+            handle = self._handles.pop(number, None)
+            self._shown.pop(number, None)
+        if progress is None:
+            return None
+        words = progress.in_words()
+        self._publisher.publish(progress_msg(progress, over=True))
+        if handle is not None:
+            handle.set_canceled(LayoutResult(number, False, words), words)
+        _log.info("case %d: withdrawn: %s", progress.case, words)
+        self._save()
+        return words
+
+    # Threads of rospy ------------------------------------------------------------------------
+
+    def _event_came(self, event: MeshEvent) -> None:
+        with self._lock:
+            self._orders.take(event_record(event))
+
+    def _state_came(self, state: MeshState) -> None:
+        with self._lock:
+            wanted = self._orders.update(mesh_status(state))
+        if wanted:
+            self._order([Order(drone, goal) for drone, goal in wanted])
+        self._show()
+
+    def _goal_came(self, handle: actionlib.ServerGoalHandle) -> None:
+        handle.set_accepted()  # first: it may be over before `begin` returns
+        try:
+            self._begin(handle.get_goal().caseID, handle)
+        except rospy.ServiceException as error:
+            handle.set_aborted(LayoutResult(0, False, str(error)), str(error))
+
+    def _cancel_came(self, handle: actionlib.ServerGoalHandle) -> None:
+        with self._lock:
+            numbers = [n for n, other in self._handles.items() if other == handle]
+        for number in numbers:
+            self.withdraw(number)
+
+    def _show(self) -> None:
+        """Publish what has changed since the last call, and end what is over."""
+        with self._lock:
+            progresses = self._orders.all_progress()
+            changed = [p for p in progresses if self._shown.get(p.number) != p]
+            self._shown = {p.number: p for p in progresses if not p.is_over}
+            self._orders.forget_complete()
+            handles = {p.number: self._handles.get(p.number) for p in changed}
+            for progress in changed:
+                if progress.is_over:
+                    self._handles.pop(progress.number, None)
+        for progress in changed:
+            self._publisher.publish(progress_msg(progress, progress.is_over))
+            if progress.is_over:
+                _log.info("case %d: %s", progress.case, progress.in_words())
+            handle = handles[progress.number]
+            if handle is not None:
+                _tell(handle, progress)
+        if changed:
+            self._save()
+
+    # For a restart ---------------------------------------------------------------------------
+
+    def _save(self) -> None:
+        with self._lock:
+            left = json.dumps(self._orders.saved())
+            if left == self._saved:
+                return
+            self._saved = left
+        try:
+            rospy.set_param(names.STANDING_PARAM, left)
+        except NO_ANSWER as error:
+            _log.debug("what is left to order is not stored: %s", error)
+
+    def _restore(self) -> None:
+        try:
+            with self._lock:
+                self._orders.restore(json.loads(rospy.get_param(names.STANDING_PARAM, "[]")))
+        except (KeyError, TypeError, ValueError) as error:
+            _log.warning("parameter %s is ignored: %s", names.STANDING_PARAM, error)
+            return
+        for progress in self._orders.all_progress():
+            _log.info("case %d: goes on: %s", progress.case, progress.in_words())
+
+
+def _tell(handle: actionlib.ServerGoalHandle, progress: Progress) -> None:
+    words = progress.in_words()
+    if not progress.is_over:
+        arrived, flying = (
+            bytes(progress.drones[state]) for state in (PartState.ARRIVED, PartState.FLYING)
+        )
+        handle.publish_feedback(LayoutFeedback(progress.number, arrived, flying, words))
+        return
+    total = sum(len(drones) for drones in progress.drones.values())
+    complete = len(progress.drones[PartState.ARRIVED]) == total
+    result = LayoutResult(progress.number, complete, words)
+    if complete:
+        handle.set_succeeded(result, words)
+    else:
+        handle.set_aborted(result, words)

@@ -1,0 +1,128 @@
+"""rosrun drone_mesh fly: orders one drone to a place and shows its progress."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import queue
+import sys
+
+import rospy
+
+from drone_mesh.arguments import decimal, whole
+from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.order_record import OrderState
+from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import MeshError
+from drone_mesh.msg import MeshEvent, MeshState
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import join_graph, run_tool
+from drone_mesh.ros.graph.conversions import event_record
+from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
+from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
+from drone_mesh.state.orders import OrderProgress
+
+SHOW_EVERY_S = 2.0  # simulated; our choice
+CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the processes of a state and of a gateway
+
+
+def main() -> None:
+    """Entry point of nodes/fly."""
+    options = _parser().parse_args(_with_negative_numbers(rospy.myargv()[1:]))
+    goal = Location(latitude=options.y, longitude=options.x, height=float(options.height))
+    run_tool("fly", lambda: _run(options.drone, goal))
+
+
+def _with_negative_numbers(words: list[str]) -> list[str]:
+    """argparse takes -1e3 for an option; nothing here begins with a dash but -h and --help."""
+    return words if {"-h", "--help"} & set(words) else ["--", *words]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rosrun drone_mesh fly",
+        description="Orders a drone to a place, through the mesh, and shows how far it is. "
+        "After Ctrl-C the drone flies on.",
+        epilog="Exit code: 0 it arrived, 1 it did not, 2 it was not ordered.",
+    )
+    limit_m = MAX_COORDINATE_M
+    parser.add_argument("drone", type=whole(0, MAX_NODE_ID), help="its id")
+    parser.add_argument("x", type=decimal(-limit_m, limit_m), help="metres")
+    parser.add_argument("y", type=decimal(-limit_m, limit_m), help="metres")
+    parser.add_argument(
+        "height",
+        nargs="?",
+        default=0,
+        type=whole(0, int(MAX_HEIGHT_M)),
+        help="metres above the ground, a whole number (default: 0)",
+    )
+    return parser
+
+
+def _run(drone: int, goal: Location) -> int:
+    join_graph("order_flight")
+    heard: queue.Queue[MeshEvent | MeshState] = queue.Queue()
+    rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, heard.put)
+    rospy.Subscriber(names.STATE_TOPIC, MeshState, heard.put, queue_size=1)
+    since_s = _first_state_s(heard) - CLOCKS_DIFFER_S
+    _order(drone, goal)
+    try:
+        return _follow(heard, OrderProgress(drone, goal, since_s), drone, goal)
+    except KeyboardInterrupt:
+        print(f"drone {drone} flies on", file=sys.stderr)
+        raise
+
+
+def _first_state_s(heard: queue.Queue[MeshEvent | MeshState]) -> float:
+    """Simulated time, by the first state of the mesh. Raises MeshError if none comes."""
+    while True:
+        try:
+            message = heard.get(timeout=10.0)
+        except queue.Empty:
+            raise MeshError("no state of a mesh: is the simulation running?") from None
+        if isinstance(message, MeshState):
+            return message.header.stamp.to_sec()
+
+
+def _order(drone: int, goal: Location) -> None:
+    request = RequestDroneFlightRequest(drone, goal.latitude, goal.longitude, int(goal.height))
+    try:
+        status = call_once(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request).status
+    except ServiceGone as error:
+        raise MeshError(f"{error}: is the simulation running?") from None
+    except ServiceRefused as error:
+        raise MeshError(str(error)) from None
+    if status == 0:
+        raise MeshError("no gateway is running")
+    if status == 2:
+        raise MeshError(f"no gateway has a route to drone {drone}")
+
+
+def _follow(
+    heard: queue.Queue[MeshEvent | MeshState],
+    progress: OrderProgress,
+    drone: int,
+    goal: Location,
+) -> int:
+    """Print the progress until the order is over; returns the exit code."""
+    shown_s, shown = -math.inf, OrderState.ASKED
+    while not progress.is_over:
+        try:
+            message = heard.get(timeout=1.0)  # or else Ctrl-C would wait for a message
+        except queue.Empty:
+            continue
+        if isinstance(message, MeshEvent):
+            progress.take(event_record(message))
+            continue
+        now_s = message.header.stamp.to_sec()
+        if now_s - shown_s >= SHOW_EVERY_S or progress.state is not shown:
+            shown_s, shown = now_s, progress.state
+            for node in message.nodes:
+                if node.id == drone:
+                    left_m = Location.from_vector(node.position).distance_m(goal)
+                    print(f"{shown.value}: {left_m:.1f} m left", flush=True)
+    arrived = progress.state is OrderState.ARRIVED
+    reason = f": {progress.reason}" if progress.reason and not arrived else ""
+    print(f"{progress.state.value}{reason}")
+    return 0 if arrived else 1

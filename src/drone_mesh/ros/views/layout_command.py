@@ -1,0 +1,75 @@
+"""rosrun drone_mesh layout: orders a layout and shows the progress of its drones."""
+
+from __future__ import annotations
+
+import argparse
+import queue
+import sys
+
+import rospy
+
+from drone_mesh.arguments import whole
+from drone_mesh.errors import MeshError
+from drone_mesh.layouts import MAX_CASE
+from drone_mesh.msg import LayoutProgress
+from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.command_line import join_graph, run_tool
+from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
+from drone_mesh.srv import OrderLayout, OrderLayoutRequest, WithdrawLayout, WithdrawLayoutRequest
+
+
+def main() -> None:
+    """Entry point of nodes/layout."""
+    options = _parser().parse_args(rospy.myargv()[1:])
+    run_tool("layout", lambda: _run(options.case))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rosrun drone_mesh layout",
+        description="Sends the drones of a layout to their places, and shows how far they are. "
+        "Drones without a route are ordered as soon as they have one. Ctrl-C withdraws the "
+        "layout; drones in flight fly on.",
+        epilog="Exit code: 0 all drones are at their places, 1 some are not, 2 not ordered.",
+    )
+    parser.add_argument("case", type=whole(0, MAX_CASE), help="its number, such as 0 or 202")
+    return parser
+
+
+def _run(case: int) -> int:
+    join_graph("order_layout")
+    heard: queue.Queue[LayoutProgress] = queue.Queue()
+    rospy.Subscriber(names.LAYOUTS_TOPIC, LayoutProgress, heard.put)
+    try:
+        answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, OrderLayoutRequest(case))
+    except ServiceGone as error:
+        raise MeshError(f"{error}: is the simulation running?") from None
+    except ServiceRefused as error:
+        raise MeshError(str(error)) from None
+    print(answer.message, flush=True)
+    try:
+        return _follow(heard, answer.id)
+    except KeyboardInterrupt:
+        words = call_once(
+            names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, WithdrawLayoutRequest(answer.id)
+        ).message
+        print(f"withdrawn, drones in flight fly on: {words}", file=sys.stderr)
+        raise
+
+
+def _follow(heard: queue.Queue[LayoutProgress], number: int) -> int:
+    """Print each change until it is over; returns the exit code."""
+    shown = ""
+    while True:
+        try:
+            progress = heard.get(timeout=1.0)  # or else Ctrl-C would wait for a message
+        except queue.Empty:
+            continue
+        if progress.id != number:
+            continue
+        if progress.message != shown:
+            shown = progress.message
+            print(shown, flush=True)
+        if progress.over:
+            missing = progress.waiting + progress.refused + progress.replaced
+            return 1 if missing + progress.not_in_fleet else 0

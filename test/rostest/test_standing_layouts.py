@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""A layout is a standing order: kept until each drone is at its place, replaced, or withdrawn."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import unittest
+
+import actionlib
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalStatus
+from rostest_support import LogWatch, MeshWatch, call, pid_of, wait_for
+
+from drone_mesh.layouts import Layouts
+from drone_mesh.msg import LayoutAction, LayoutFeedback, LayoutGoal, LayoutProgress, MeshState
+from drone_mesh.srv import OrderLayout, WithdrawLayout
+
+FLIGHTS_S = 120  # wall; the longest takes less than 30 simulated seconds
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["rosrun", "drone_mesh", *arguments], capture_output=True, text=True, timeout=300
+    )
+
+
+class StandingLayoutsTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        rospy.init_node("test_standing_layouts")
+        cls.log = LogWatch()
+        cls.mesh = MeshWatch(18)
+        cls.progress: dict[int, LayoutProgress] = {}
+        rospy.Subscriber("/DroneManager/layouts", LayoutProgress, cls.heard)
+        cls.mesh.wait("all connected at the start", 60, cls.mesh.connected)
+
+    @classmethod
+    def heard(cls, progress: LayoutProgress) -> None:
+        cls.progress[progress.id] = progress
+
+    def order(self, case: int) -> int:
+        return int(call("/DroneManager/orderLayout", OrderLayout, case).id)
+
+    def wait_until_over(self, number: int) -> LayoutProgress:
+        what = f"standing order {number} is over"
+        wait_for(what, FLIGHTS_S, lambda: number in self.progress and self.progress[number].over)
+        return self.progress[number]
+
+    def test_1_a_second_layout_reaches_the_drones_that_were_in_flight_when_it_came(self) -> None:
+        first = self.order(0)
+        self.mesh.pass_time(3.0)
+        second = self.order(202)
+        done = self.wait_until_over(second)
+        drones = sorted(dict(Layouts.shipped().orders(202)))
+        self.assertEqual(sorted(done.arrived), drones)
+        self.assertEqual(sorted(self.wait_until_over(first).replaced), drones)
+        states: list[MeshState] = []
+        rospy.Subscriber("/mesh/state", MeshState, states.append)
+        wait_for("the state says so", 20, lambda: states and states[-1].layouts)
+        self.assertRegex(states[-1].layouts[-1], r"^layout (0|202): \d+ of \d+ at their places")
+
+    def test_2_an_action_reports_progress_and_success(self) -> None:
+        client = actionlib.SimpleActionClient("/DroneManager/layout", LayoutAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(60)), "no action server")
+        heard: list[LayoutFeedback] = []
+        client.send_goal(LayoutGoal(0), feedback_cb=heard.append)
+        self.assertTrue(client.wait_for_result(rospy.Duration(600)), "the layout did not end")
+        self.assertEqual(client.get_state(), GoalStatus.SUCCEEDED, client.get_goal_status_text())
+        self.assertEqual(client.get_result().message, "17 of 17 at their places")
+        self.assertTrue(any(feedback.flying for feedback in heard))
+
+    def test_3_an_unknown_layout_is_refused_with_a_list_of_those_that_exist(self) -> None:
+        client = actionlib.SimpleActionClient("/DroneManager/layout", LayoutAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(60)), "no action server")
+        client.send_goal_and_wait(LayoutGoal(77))
+        self.assertEqual(client.get_state(), GoalStatus.ABORTED)
+        self.assertIn("unknown case 77", client.get_result().message)
+
+    def test_4_a_restarted_manager_goes_on_and_a_withdrawn_layout_ends(self) -> None:
+        self.mesh.switch(17, False)
+        number = self.order(100)
+        wait_for("it waits for 17", FLIGHTS_S, lambda: bytes([17]) == self.waiting(number))
+        before = pid_of("/DroneManager")
+        os.kill(before, signal.SIGKILL)
+        wait_for("another manager", 60, lambda: pid_of("/DroneManager") not in (None, before))
+        self.mesh.switch(17, True)
+        self.assertEqual(self.wait_until_over(number).arrived, bytes([17]))
+        self.mesh.switch(17, False)
+        number = self.order(0)
+        wait_for("it waits for 17", FLIGHTS_S, lambda: bytes([17]) == self.waiting(number))
+        self.assertTrue(call("/DroneManager/withdrawLayout", WithdrawLayout, number).success)
+        self.assertEqual(bytes(self.wait_until_over(number).waiting), bytes([17]))
+        self.assertFalse(call("/DroneManager/withdrawLayout", WithdrawLayout, number).success)
+
+    def test_5_the_commands_show_progress_and_withdraw_on_ctrl_c(self) -> None:
+        flight = run("fly", "1", "-1.5", "2", "0")
+        self.assertEqual(flight.returncode, 0, flight.stderr)
+        self.assertRegex(flight.stdout, r"under way: \d+\.\d m left\n(.*\n)*arrived\n")
+        done = run("layout", "1")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("1 of 1 at their place", done.stdout)
+        self.mesh.switch(16, False)
+        layout = subprocess.Popen(
+            ["rosrun", "drone_mesh", "layout", "16"], stdout=subprocess.PIPE, text=True
+        )
+        self.assertIn("ordered", layout.stdout.readline())
+        number = max(self.progress)
+        os.kill(layout.pid, signal.SIGINT)
+        self.assertEqual(layout.wait(60), 130)
+        self.assertTrue(self.wait_until_over(number).over)
+        for wrong in (["fly", "254", "0", "0"], ["fly", "1", "nan", "0"], ["layout", "0x1"]):
+            refused = run(*wrong)
+            self.assertEqual(refused.returncode, 2)
+            self.assertIn("invalid value", refused.stderr)
+
+    def waiting(self, number: int) -> bytes | None:
+        """Its drones without a route, once no drone flies any more."""
+        progress = self.progress.get(number)
+        return bytes(progress.waiting) if progress and not progress.flying else None
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "standing_layouts", StandingLayoutsTest)

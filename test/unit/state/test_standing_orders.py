@@ -1,0 +1,162 @@
+"""A layout that was ordered is kept as a goal until each drone is at its place."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.drone.fleet import ids_in_words
+from drone_mesh.drone.location import Location
+from drone_mesh.inprocess.network import Network
+from drone_mesh.layouts import Layouts
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.standing_orders import PartState, StandingOrders
+
+HOME = Location(0.0, 0.0, 0.0)
+EAST = Location(latitude=0.0, longitude=6.0, height=0.0)
+NORTH = Location(latitude=6.0, longitude=0.0, height=1.0)
+
+
+def drone(node_id, at=HOME, to=None, connected=True):
+    path = () if to is None else (*at.to_vector(), *to.to_vector())
+    return NodeStatus(node_id, connected=connected, position=at.to_vector(), path=path)
+
+
+def state(now_s, *nodes):
+    return MeshStatus(now_s, nodes)
+
+
+def words(orders):
+    return [progress.in_words() for progress in orders.all_progress()]
+
+
+def test_a_drone_without_a_route_is_ordered_as_soon_as_it_has_one():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST}, now_s=0.0)
+    assert orders.update(state(6.0, drone(4, connected=False))) == []
+    assert words(orders) == ["0 of 1 at their place, 1 without a route: 4"]
+    assert orders.update(state(7.0, drone(4))) == [(4, EAST)]
+
+
+def test_an_order_that_a_drone_does_not_carry_out_is_repeated_less_and_less_often():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST}, now_s=0.0)
+    ordered = [s for s in range(100) if orders.update(state(float(s), drone(4)))]
+    assert ordered == [5, 10, 20, 40, 80]
+
+
+def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    flying = state(20.0, drone(4, to=EAST), drone(5, to=NORTH))
+    assert orders.update(flying) == []
+    assert words(orders) == ["0 of 2 at their places, 2 flying"]
+    assert orders.update(state(30.0, drone(4, at=EAST), drone(5, at=NORTH))) == []
+    assert words(orders) == ["2 of 2 at their places"]
+    assert orders.all_progress()[0].is_over
+
+
+def test_a_drone_that_flies_elsewhere_is_ordered_once_more():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST}, now_s=0.0)
+    assert orders.update(state(6.0, drone(4, to=NORTH))) == [(4, EAST)]
+
+
+def test_a_drone_that_has_arrived_once_is_not_ordered_back_after_a_repair():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    orders.update(state(10.0, drone(4, at=EAST), drone(5)))
+    assert orders.update(state(60.0, drone(4, at=HOME), drone(5))) == [(5, NORTH)]
+
+
+def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST, 5: EAST}, now_s=0.0)
+    orders.give(8, {4: NORTH}, now_s=3.0)
+    ordered = orders.update(state(60.0, drone(4), drone(5)))
+    assert ordered == [(5, EAST), (4, NORTH)]
+    assert "1 replaced by a later order: 4" in words(orders)[0]
+
+
+def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
+    orders = StandingOrders()
+    orders.give(7, {4: NORTH}, now_s=10.0)
+    sent = "order 3: to x 0.00 m, y 6.00 m, z 1 m"
+    elsewhere = "order 4: to x 9.00 m, y 0.00 m, z 0 m"
+    orders.take(EventRecord(5.0, 0, "order sent", (4,), elsewhere))  # an older one
+    orders.take(EventRecord(10.0, 0, "order sent", (4,), sent))
+    assert words(orders) == ["0 of 1 at their place, 1 without a route: 4"]
+    orders.take(EventRecord(11.0, 0, "order sent", (4,), elsewhere))
+    assert words(orders) == ["0 of 1 at their place, 1 replaced by a later order: 4"]
+
+
+def test_a_refusal_is_shown_with_its_reason_and_tried_again():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST}, now_s=0.0)
+    orders.take(EventRecord(1.0, 0, "order refused", (4,), "order 3: battery at 9 %"))
+    assert words(orders) == ["0 of 1 at their place, 4 refused: battery at 9 %"]
+    assert orders.update(state(6.0, drone(4))) == [(4, EAST)]
+
+
+def test_drones_that_do_not_exist_are_named():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST, 9: EAST}, now_s=0.0)
+    orders.update(state(1.0, drone(4, at=EAST)))
+    assert words(orders) == ["1 of 2 at their places, 1 not in this fleet: 9"]
+    assert orders.all_progress()[0].is_over
+
+
+def test_a_withdrawn_layout_orders_nothing_more():
+    orders = StandingOrders()
+    number = orders.give(7, {4: EAST}, now_s=0.0)
+    assert orders.withdraw(number).drones[PartState.WAITING] == (4,)
+    assert orders.update(state(60.0, drone(4))) == []
+    assert orders.withdraw(number) is None
+
+
+def test_what_is_left_to_do_survives_a_restart():
+    before, after = StandingOrders(), StandingOrders()
+    before.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    before.update(state(10.0, drone(4, at=EAST), drone(5)))
+    after.restore(before.saved())
+    assert after.update(state(11.0, drone(4), drone(5))) == [(5, NORTH)]
+    assert after.give(8, {4: EAST}, now_s=11.0) == 2
+
+
+LAYOUTS = Layouts.shipped()
+
+
+def order_layout(network, orders, case):
+    """As the DroneManager does it: the first orders at once, the far end first."""
+    present = {node.id for node in network.status().nodes}
+    wanted = [(n, goal) for n, goal in LAYOUTS.orders(case) if n in present]
+    orders.give(case, dict(wanted), network.now_s())
+    for node_id, goal in wanted:
+        network.order(node_id, goal.longitude, goal.latitude, int(goal.height))
+
+
+def follow(network, orders, seconds):
+    for _ in range(int(seconds)):
+        network.run_for(1.0)
+        for event in network.event_records():
+            orders.take(event)
+        for node_id, goal in orders.update(network.status()):
+            network.order(node_id, goal.longitude, goal.latitude, int(goal.height))
+
+
+@pytest.mark.parametrize("pause_s", [1, 3, 8, 20])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_last_layout_ordered_is_reached_whatever_was_ordered_before(seed, pause_s):
+    network = Network(seed=seed)
+    network.add_gateway(0, -1.0, 0.0)
+    for k in range(17):
+        network.add_router(k + 1, float(k % 6), float(k // 6))
+    assert network.run_until(network.all_connected, 30.0)
+    orders = StandingOrders()
+    for case in (0, 202, 101, 0):
+        order_layout(network, orders, case)
+        follow(network, orders, pause_s)
+    follow(network, orders, 120)
+    last = orders.all_progress()[-1]
+    places = dict(LAYOUTS.orders(0))
+    astray = [n for n in places if network.location(n).distance_m(places[n]) > 0.5]
+    assert astray == [], f"{ids_in_words(astray)}: {last.in_words()}"
