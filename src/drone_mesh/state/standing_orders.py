@@ -51,7 +51,7 @@ class _Part:
 
 
 @dataclass(frozen=True)
-class Progress:
+class StandingProgress:
     """How far one standing order has come: ids, ascending, by state."""
 
     number: int
@@ -92,14 +92,14 @@ class _StandingOrder:
         self.given_s = given_s
         self.parts = {drone: _Part(goal, due_s=due_s) for drone, goal in goals.items()}
 
-    def progress(self) -> Progress:
+    def progress(self) -> StandingProgress:
         """A snapshot."""
         by_state = {
             state: tuple(sorted(d for d, part in self.parts.items() if part.state is state))
             for state in PartState
         }
         reasons = {drone: self.parts[drone].reason for drone in by_state[PartState.REFUSED]}
-        return Progress(self.number, self.case, by_state, reasons)
+        return StandingProgress(self.number, self.case, by_state, reasons)
 
 
 class StandingOrders:
@@ -131,7 +131,7 @@ class StandingOrders:
                 if drone in order.parts and order.parts[drone].state.is_open:
                     order.parts[drone].state = PartState.REPLACED
 
-    def withdraw(self, number: int) -> Progress | None:
+    def withdraw(self, number: int) -> StandingProgress | None:
         """Order no drone of this layout any more; returns how far it came. None: unknown."""
         order = self._orders.pop(number, None)
         return None if order is None else order.progress()
@@ -186,7 +186,7 @@ class StandingOrders:
         part.pause_s = min(2.0 * part.pause_s, LONGEST_PAUSE_S)
         return True
 
-    def all_progress(self) -> list[Progress]:
+    def all_progress(self) -> list[StandingProgress]:
         """How far each has come, oldest first."""
         return [order.progress() for order in self._orders.values()]
 

@@ -22,14 +22,14 @@ from drone_mesh.msg import (
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.master_watch import NO_ANSWER
-from drone_mesh.state.standing_orders import PartState, Progress, StandingOrders
+from drone_mesh.state.standing_orders import PartState, StandingOrders, StandingProgress
 
 _QUEUE = 1000  # events that may wait
 
 _log = logging.getLogger(__name__)
 
 
-def progress_msg(progress: Progress, over: bool) -> LayoutProgress:
+def progress_msg(progress: StandingProgress, over: bool) -> LayoutProgress:
     """The progress of a standing order as a message."""
     ids = {state: bytes(drones) for state, drones in progress.drones.items()}
     return LayoutProgress(
@@ -72,7 +72,7 @@ class StandingLayouts:
         self._begin = begin
         self._lock = threading.Lock()
         self._orders = StandingOrders()
-        self._shown: dict[int, Progress] = {}
+        self._shown: dict[int, StandingProgress] = {}
         self._saved = ""
         self._handles: dict[int, actionlib.ServerGoalHandle] = {}
         self._publisher = rospy.Publisher(
@@ -193,7 +193,7 @@ class StandingLayouts:
             _log.info("case %d: goes on: %s", progress.case, progress.in_words())
 
 
-def _tell(handle: actionlib.ServerGoalHandle, progress: Progress) -> None:
+def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> None:
     words = progress.in_words()
     if not progress.is_over:
         arrived, flying = (
