@@ -7,36 +7,75 @@ import math
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.deadlines import Deadlines, Due
 from drone_mesh.communication.timing import FLIGHT_POSITION_PERIOD_S, LANDED_WITHIN_M
+from drone_mesh.drone.flight_path import SPEED_M_S
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 STANDS_STILL_WITHIN_M = 1e-3  # our choice: far below what a drone flies in a second
 ASKS_WITHOUT_ANSWER = 10  # our choice: then the mesh continues with an unknown position
+SETS_OUT_WITHIN_S = 10.0  # our choice: a goal may reach a busy engine seconds later
 
 
 class Flight:
-    """One flight: its goal, and whether it is over."""
+    """One flight: its goal, and whether it has begun and ended."""
 
-    def __init__(self, goal: Location) -> None:
+    def __init__(
+        self, goal: Location, start: Location | None, replaced: Location | None, now_s: float
+    ) -> None:
+        """From `start` (None: unknown); `replaced`: the goal of a flight that it takes over from.
+
+        A drone that rests at one of these may not have begun yet.
+        """
         self.goal = goal
+        self.may_begin = True  # its engine has not refused it
+        self.did_not_set_out = False
+        self._start = start
+        self._replaced = replaced
+        self._ordered_s = now_s
         self._last: Location | None = None
+        self._was_flying = False  # as its engine says
         self._unanswered = 0
 
-    def is_over(self, location: Location | None) -> bool:
+    def is_over(
+        self, location: Location | None, is_flying: bool | None, can_fly: bool, now_s: float
+    ) -> bool:
         """Process the drone's location (None: unknown); returns whether it has landed.
 
-        Landed: within 0.1 m of the goal, or not moving between two requests.
+        Landed: the engine says that it flew and flies no longer. Where it says nothing
+        (`is_flying` None): within 0.1 m of the goal, or not moving between two requests anywhere
+        but where it began. A drone that does not set out has landed, too.
         """
+        if is_flying:
+            self._was_flying = True
+            return False
+        if self._was_flying:
+            return True
         if location is None:
             self._unanswered += 1
             return self._unanswered >= ASKS_WITHOUT_ANSWER
         self._unanswered = 0
-        if location.distance_m(self.goal) <= LANDED_WITHIN_M:
+        if _is_at(location, self.goal):
             return True
-        still = self._last is not None and location.distance_m(self._last) < STANDS_STILL_WITHIN_M
-        self._last = location
-        return still
+        if is_flying is None:
+            last, self._last = self._last, location
+            if last is None or location.distance_m(last) >= STANDS_STILL_WITHIN_M:
+                return False
+            self._start = self._start or last
+            if not (_is_at(location, self._start) or _is_at(location, self._replaced)):
+                return True
+        may_set_out = self.may_begin and can_fly
+        self.did_not_set_out = not may_set_out or now_s >= self._sets_out_until_s(location)
+        return self.did_not_set_out
+
+    def _sets_out_until_s(self, location: Location) -> float:
+        """Until when it may still set out: the nearer the goal, the sooner it would be there."""
+        flies_s = location.distance_m(self.goal) / SPEED_M_S
+        return self._ordered_s + SETS_OUT_WITHIN_S + min(flies_s, SETS_OUT_WITHIN_S)
+
+
+def _is_at(location: Location, place: Location | None) -> bool:
+    return place is not None and location.distance_m(place) <= LANDED_WITHIN_M
 
 
 class Pilot:
@@ -48,6 +87,7 @@ class Pilot:
         self._complaints = complaints
         self._flight: Flight | None = None
         self._origin: Location | None = None  # start of the flight, or of the first of several
+        self.flight_end = ""  # why the last flight ended short of its goal
 
     @property
     def goal(self) -> Location | None:
@@ -89,10 +129,11 @@ class Pilot:
 
     def step_back_to(self, goal: Location) -> None:
         """Start a repair flight, or change the goal of the current one."""
-        self._begin(goal)
+        flight = self._begin(goal)
         try:
             self._engine.step_back_to(*goal)
-        except GoalRefused as error:  # the flight then ends at the first position request
+        except GoalRefused as error:  # the flight ends as soon as the drone stands still
+            flight.may_begin = False
             self._complaints.add("goal refused", str(error), self._deadlines.now_s)
 
     def distance_m(self) -> float:
@@ -101,20 +142,23 @@ class Pilot:
             return math.inf
         return self._origin.distance_m(self._flight.goal)
 
-    def _begin(self, goal: Location) -> None:
+    def _begin(self, goal: Location) -> Flight:
+        here = self.location()
         if self._flight is None:
-            self._origin = self.location()
-        self._flight = Flight(goal)
+            self._origin = here
+        self._flight = flight = Flight(goal, here, self.goal, self._deadlines.now_s)
         self._ask_position_later()
+        return flight
 
     def watch(self) -> bool:
         """Request the position; returns whether the flight is over."""
         assert self._flight is not None
-        location, is_flying = self.location(), self._engine.is_flying()
-        is_over = self._flight.is_over(location) if is_flying is None else not is_flying
-        if not is_over:
+        flight, engine, now_s = self._flight, self._engine, self._deadlines.now_s
+        if not flight.is_over(self.location(), engine.is_flying(), engine.can_fly(), now_s):
             self._ask_position_later()
             return False
+        did_not = flight.did_not_set_out
+        self.flight_end = "the drone did not set out" if did_not else "the flight ended"
         self.forget_flight()
         return True
 

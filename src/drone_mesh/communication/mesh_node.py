@@ -43,8 +43,6 @@ from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 
-SILENCE_PERIODS = 1.5  # our choice: each neighbour is asked once a check period
-
 
 class MeshNode(IMeshDebugInfo, IRoutingEssentials):
     """Owns the parts; MeshnetworkComponent passes them packets and deadlines."""
@@ -75,7 +73,7 @@ class MeshNode(IMeshDebugInfo, IRoutingEssentials):
         self._timing = timing or MeshTiming()
         self._debug = debug
         self._deadlines = Deadlines()
-        self._neighbours = Neighbours(SILENCE_PERIODS * self._timing.check_period_s)
+        self._neighbours = Neighbours(self._timing.check_period_s, noticed_late=self._shared)
         self._report = Reporter(node_id, self._deadlines, observer)
         self.complaints = Complaints(node_id)
         self._delivery = Delivery(

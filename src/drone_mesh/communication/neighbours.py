@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -22,46 +23,60 @@ class Neighbours:
     gateway and place of a node are kept when it is no longer a neighbour.
     """
 
-    def __init__(self, silence_s: float) -> None:
-        """`silence_s`: neighbours lost within this time count as lost together."""
-        self._silence_s = silence_s
+    def __init__(self, check_period_s: float, noticed_late: bool) -> None:
+        """Neighbours that fall silent within a check period do so together.
+
+        `noticed_late`: a loss may be noticed several checks later, as on a shared channel, so that
+        the time of a neighbour's last packet says more.
+        """
+        self._check_period_s = check_period_s
+        self._noticed_late = noticed_late
         self._heard_s: dict[int, float] = {}
-        self._lost_s: dict[int, float] = {}
+        self._fell_silent_s: dict[int, float] = {}  # when each of those lost did so
+        self._stands_since_s = -math.inf  # infinity: this node flies
         self._gateways: dict[int, int] = {}
         self._hops: dict[int, int] = {}
         self._places: dict[int, HeardPlace] = {}
-        self.silent = False  # all neighbours (2 or more) were lost together; none heard since
-        self._leaves_them = False  # this node leaves its neighbours by order
+        self.silent = False  # all neighbours (2 or more) fell silent together; none heard since
 
     def heard(self, node: int, now_s: float) -> bool:
         """A packet arrived from `node`. Returns whether it is a new neighbour."""
         is_new = node not in self._heard_s
         self._heard_s[node] = now_s
         if is_new:
-            self._lost_s.pop(node, None)
+            self._fell_silent_s.pop(node, None)
             self.silent = False
         return is_new
 
     def lost(self, node: int, now_s: float) -> bool:
         """`node` is out of reach. Returns whether it was a neighbour."""
-        if self._heard_s.pop(node, None) is None:
+        heard_s = self._heard_s.pop(node, None)
+        if heard_s is None:
             return False
-        self._lost_s[node] = now_s
-        if not self._heard_s and not self._leaves_them:
-            together = [at_s for at_s in self._lost_s.values() if now_s - at_s <= self._silence_s]
-            self.silent = len(together) >= 2
+        if heard_s >= self._stands_since_s:  # otherwise this node flew away from it
+            self._fell_silent_s[node] = heard_s if self._noticed_late else now_s
+        if not self._heard_s and self._fell_silent_s:
+            since_s = max(self._fell_silent_s.values()) - self._check_period_s
+            self.silent = sum(at_s > since_s for at_s in self._fell_silent_s.values()) >= 2
         return True
 
-    def left_by_order(self) -> None:
-        """This node flies elsewhere by order: if it hears no node, its medium still works."""
-        self._leaves_them = True
-        self.silent = False
+    def takes_off(self, by_order: bool) -> None:
+        """This node flies: if it no longer hears its neighbours, its medium still works.
+
+        A repair flight does not end a silence that was before.
+        """
+        self._stands_since_s = math.inf
+        self._fell_silent_s.clear()
+        self.silent = self.silent and not by_order
+
+    def stands(self, now_s: float) -> None:
+        """This node no longer flies."""
+        self._stands_since_s = now_s
 
     def forget_all(self) -> None:
         """This node moved and may have other neighbours."""
-        self._leaves_them = False
         self._heard_s.clear()
-        self._lost_s.clear()
+        self._fell_silent_s.clear()
 
     def ids(self) -> frozenset[int]:
         """The current neighbours."""

@@ -239,6 +239,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
                 heard = self._neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:
                     self._delivery.neighbour_leaves(neighbour)
+        self._neighbours.takes_off(by_order=True)
         if not self._is_short_flight():
             self._repair.on_ordered_flight()
 
@@ -255,6 +256,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._landed()
 
     def _landed(self) -> None:
+        self._neighbours.stands(self._deadlines.now_s)
         if self._states.repair is RepairState.FLYING:
             self._repair.on_landed()
             super()._landed()

@@ -85,6 +85,17 @@ def test_a_flight_that_ends_elsewhere_is_given_up_with_the_distance():
     assert "".join(text for _, _, text in said) == "the flight ended; 3.0 m from the goal"
 
 
+def test_a_drone_that_does_not_set_out_says_so():
+    rig = drone_rig()
+    rig.hear(f"00 00 06 01 01 {TO_Y_20} 07 00")
+    rig.forget()
+    rig.wait(21.0)
+    rig.connect_to_gateway()
+    rig.wait(1.1)
+    said = "".join(text for _, _, text in replies(rig))
+    assert said == "the drone did not set out; 20.0 m from the goal"
+
+
 def test_a_refusal_carries_its_reason_in_as_many_packets_as_it_needs():
     rig = drone_rig()
     rig.engine.grounded = "it stands on the ground"

@@ -188,6 +188,64 @@ def test_it_has_landed_when_it_no_longer_moves():
     assert "LANDED" in rig.kinds()
 
 
+def test_a_flight_that_has_not_begun_is_not_over():
+    rig = Rig()
+    rig.hear("02 02 06 01 01 00 00 a0 41")
+    for _ in range(9):
+        fly(rig, Location(0.0, 0.0, 0.0))
+    fly(rig, Location(2.0, 0.0, 0.0))
+    assert "LANDED" not in rig.kinds()
+    fly(rig, Location(20.0, 0.0, 0.0))
+    assert "LANDED" in rig.kinds()
+
+
+def test_a_flight_that_goes_on_to_another_goal_is_not_over_at_the_first_one():
+    rig = Rig()
+    rig.hear("02 02 06 01 01 00 00 a0 41")
+    fly(rig, Location(19.0, 0.0, 0.0))
+    rig.hear("02 02 06 01 01 00 00 20 41")  # back to latitude 10, which the engine hears late
+    for latitude in (20.0, 20.0, 20.0, 19.0):
+        fly(rig, Location(latitude, 0.0, 0.0))
+    assert "LANDED" not in rig.kinds()
+    fly(rig, Location(10.0, 0.0, 0.0))
+    assert "LANDED" in rig.kinds()
+
+
+@pytest.mark.parametrize(
+    ("goal", "distance_m"), [("00 00 00 40", 2.0), ("00 00 a0 41", 20.0), ("00 00 fa 43", 500.0)]
+)
+def test_a_drone_that_does_not_set_out_in_a_time_that_fits_the_distance_has_landed(
+    goal, distance_m
+):
+    rig = Rig()
+    rig.hear(f"02 02 06 01 01 {goal}")
+    gone_s = 10.0 + min(distance_m / 2.0, 10.0)
+    rig.wait_until(gone_s - 0.5)
+    assert "LANDED" not in rig.kinds()
+    rig.wait_until(gone_s + 0.5)
+    assert "LANDED" in rig.kinds()
+
+
+def test_a_drone_that_can_no_longer_fly_does_not_set_out():
+    rig = Rig()
+    rig.hear("02 02 06 01 01 00 00 a0 41")
+    rig.engine.grounded = "battery empty"
+    rig.wait(2.0)
+    assert "LANDED" in rig.kinds()
+
+
+@pytest.mark.parametrize("begins_s", [1.0, 5.0])
+def test_an_engine_that_says_whether_it_flies_ends_the_flight_once_it_has_begun(begins_s):
+    rig = Rig()
+    rig.engine.is_flying = lambda: rig.now_s >= begins_s
+    rig.hear("02 02 06 01 01 00 00 a0 41")
+    rig.wait_until(8.0)
+    assert "LANDED" not in rig.kinds()
+    rig.engine.is_flying = lambda: False
+    rig.wait_until(9.0)
+    assert "LANDED" in rig.kinds()
+
+
 def test_it_asks_for_its_position_once_a_second_and_not_before():
     rig = Rig()
     rig.hear("02 02 06 01 01")  # where it stands
@@ -891,6 +949,26 @@ def test_a_node_that_is_heard_again_gives_the_mesh_time_to_recover():
     assert rig.sent(BID) == []
 
 
+def test_neighbours_that_fall_silent_at_different_checks_did_not_do_so_together():
+    rig = group_rig(3)
+    rig.wait_until(6.0)  # the check at 5 s found 2 dead
+    rig.antenna.dead = {2, 3}
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert len(rig.engine.goals) == 1
+
+
+def test_neighbours_that_it_flew_away_from_are_not_silent():
+    """A flight so short that it keeps its routes, to where no neighbour hears it."""
+    rig = group_rig(3, 4)
+    rig.antenna.dead = set()
+    rig.hear("00 02 06 01 01 00 00 60 41")  # 2 m on, to latitude 14
+    fly(rig, Location(14.0, 0.0, 0.0))
+    assert "LANDED" in rig.kinds()
+    rig.antenna.dead = {2, 3, 4}
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert rig.engine.goals[1:] == [NEIGHBOUR_PLACE]
+
+
 # In flight -----------------------------------------------------------------------------------
 
 
@@ -992,6 +1070,33 @@ def test_on_the_ground_it_asks_again_and_moves_aside_for_a_drone_that_it_did_not
 
 
 # The place of the gateway --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.1, 0.35, 0.55])
+def test_the_flight_ends_although_the_antenna_goes_off_on_the_ground(after_s):
+    rig = flying_rig()
+    fly(rig, NEIGHBOUR_PLACE)
+    rig.wait(after_s)
+    assert "LANDED" not in rig.kinds()
+    rig.antenna.powered = False
+    rig.mesh.on_antenna_power(False, rig.now_s)
+    rig.wait(1.0)
+    assert "LANDED" in rig.kinds()
+    rig.antenna.powered = True
+    rig.mesh.on_antenna_power(True, rig.now_s)
+    rig.wait(0.5)
+    assert packet("01 01 03 fe fe ff") in rig.broadcasts()
+
+
+def test_the_flight_ends_although_a_gateway_answers_on_the_ground():
+    rig = flying_rig()
+    rig.hear("02 02 01 01 01 00 00 00 41")  # 2 lives there: it may end where it is connected
+    fly(rig, rig.engine.goals[-1])
+    rig.hear("00 02 04 01 01 01 00 01")
+    assert rig.mesh.get_connected_to_gateway()
+    assert "LANDED" not in rig.kinds()
+    rig.wait(1.0)
+    assert "LANDED" in rig.kinds()
 
 
 def test_a_next_hop_passes_on_where_the_gateway_is():

@@ -109,7 +109,7 @@ class OrderIntake:
             if off_m <= ARRIVED_WITHIN_M:
                 self._reply(order, OrderOutcome.ARRIVED)
             else:
-                why = self._parts.pilot.why_not_fly() or "the flight ended"
+                why = self._parts.pilot.why_not_fly() or self._parts.pilot.flight_end
                 self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {off_m:.1f} m from the goal")
 
     def on_due(self) -> None:

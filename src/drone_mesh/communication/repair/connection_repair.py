@@ -94,7 +94,6 @@ class ConnectionRepair(RepairViews):
     def on_ordered_flight(self) -> None:
         """An ordered flight has started."""
         self._flight = None
-        self._parts.neighbours.left_by_order()
         self._took_off()
 
     def on_neighbour_found(self, node: int) -> None:
@@ -167,8 +166,10 @@ class ConnectionRepair(RepairViews):
         if step.owner != self.node_id:
             self._tried_goals.append(step.place)
         self._parts.neighbours.forget_all()
+        self._parts.neighbours.takes_off(by_order=False)
         self._parts.routing.node_moved_location()
         flight.start()
+        self._flight = None
         self._took_off()
         self._flight = flight
 
@@ -296,5 +297,7 @@ class ConnectionRepair(RepairViews):
         self._parts.places.left_own_place(self._connection.gateway)
 
     def _clear(self) -> None:
+        """Forget what was under way; not the end of a flight, which is due whatever happens."""
         self._checked_s = None
-        self.wait_until(math.inf)
+        if self._flight is None:
+            self.wait_until(math.inf)
