@@ -29,7 +29,12 @@ def floors_in_the_contract(package):
 
 
 @pytest.mark.parametrize(
-    ("heading", "package"), [("rooms", "drone_mesh"), ("rooms of `ros`", "drone_mesh.ros")]
+    ("heading", "package"),
+    [
+        ("rooms", "drone_mesh"),
+        ("rooms of `ros`", "drone_mesh.ros"),
+        ("rooms of `communication`", "drone_mesh.communication"),
+    ],
 )
 def test_the_floors_of_the_page_are_those_of_the_contracts(heading, package):
     assert floors_on_the_page(heading) == floors_in_the_contract(package)
@@ -56,3 +61,33 @@ def test_each_room_has_a_floor():
     }
     floors = {room for floor in floors_in_the_contract("drone_mesh") for room in floor}
     assert rooms - {"__init__", "msg", "srv"} == floors
+
+
+def test_each_room_of_the_mesh_has_a_floor():
+    package = ROOT / "src" / "drone_mesh" / "communication"
+    rooms = {path.parent.name for path in package.glob("*/__init__.py")}
+    floors = {
+        room for floor in floors_in_the_contract("drone_mesh.communication") for room in floor
+    }
+    assert rooms <= floors
+    assert {name for name in floors if not (package / name).is_dir()} <= {
+        path.stem for path in package.glob("*.py")
+    }
+
+
+def test_each_room_of_the_mesh_says_what_it_decides():
+    package = ROOT / "src" / "drone_mesh" / "communication"
+    for path in package.glob("*/__init__.py"):
+        text = path.read_text(encoding="utf-8")
+        assert 3 <= len(text.splitlines()) <= 8, path
+        assert re.search(r"Decides|[Dd]ecides", text), path
+
+
+def test_the_tests_of_a_room_of_the_mesh_lie_in_its_folder():
+    of_modules = {
+        path.stem: path.parent.name
+        for path in (ROOT / "src" / "drone_mesh" / "communication").glob("*/*.py")
+        if path.stem not in ("__init__", "interfaces", "messages", "flight", "status")
+    }
+    for path in (ROOT / "test" / "unit" / "communication").glob("test_*.py"):
+        assert path.stem[len("test_") :] not in of_modules, path
