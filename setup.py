@@ -33,5 +33,6 @@ setup(
     packages=find_packages("src"),
     package_dir={"": "src"},
     package_data={"": ["*.csv", "*.html", "*.lua", "*.pyi", "*.service", "py.typed", "static/*"]},
+    install_requires=requirements("base"),
     extras_require={extra: requirements(extra) for extra in EXTRAS},
 )

@@ -13,8 +13,7 @@ from functools import partial
 
 import rospy
 
-from drone_mesh.drone.fleet import plan_fleet
-from drone_mesh.drone.location import Location
+from drone_mesh import Location, plan_fleet
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.srv import RequestGPS, RequestGPSResponse

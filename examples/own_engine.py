@@ -9,9 +9,7 @@ import os
 import socket
 import threading
 
-from drone_mesh.drone import IDroneEngine, Location
-from drone_mesh.drone.goal import check_goal
-from drone_mesh.errors import LocationUnknown
+from drone_mesh import IDroneEngine, Location, LocationUnknown, check_goal
 
 ADDRESS = ("127.0.0.1", int(os.environ.get("DRONE_PORT", "5770")))
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from drone_mesh.communication.repair.interfaces import Step
-from drone_mesh.communication.repair.strategies.thesis import Thesis
-from drone_mesh.lab.sequence import run_sequence
+from drone_mesh import Step, Thesis
+from drone_mesh.lab import run_sequence
 
 
 class LowestId(Thesis):

@@ -12,10 +12,8 @@ import statistics
 from pathlib import Path
 from typing import Sequence
 
-from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.inprocess import Network
-from drone_mesh.state.model import MeshStatus
+from drone_mesh import NO_ROUTE, ChildTableTree
+from drone_mesh.inprocess import MeshStatus, Network
 
 
 class SteadyTree(ChildTableTree):
@@ -75,8 +73,7 @@ def main() -> None:
         parser.error("--runs must be 1 or more, --gridsize 2 or more")
     if options.page:
         try:  # here, because only pages need them; now, because a comparison takes minutes
-            from drone_mesh.report.page import render_page
-            from drone_mesh.report.story import tell_story
+            from drone_mesh.lab import render_page, tell_story
         except ImportError as error:
             parser.error(f"--page needs matplotlib and jinja2: {error}")
     print("technique                   connected   healed after   packets   most by one router")

@@ -1,1 +1,29 @@
 """The lab: an experiment is one file, thousands of seeded runs, and one report. Without ROS."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from drone_mesh.lab.record import RunRecord
+    from drone_mesh.lab.sequence import run_sequence
+    from drone_mesh.report.page import render_page
+    from drone_mesh.report.story import tell_story
+    from drone_mesh.view.table import mesh_table
+
+__all__ = ["RunRecord", "mesh_table", "render_page", "run_sequence", "tell_story"]
+
+_MODULES = {  # each with other requirements, so that a name loads only its own
+    "RunRecord": "drone_mesh.lab.record",
+    "mesh_table": "drone_mesh.view.table",
+    "render_page": "drone_mesh.report.page",
+    "run_sequence": "drone_mesh.lab.sequence",
+    "tell_story": "drone_mesh.report.story",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__} has no attribute {name}")
+    return getattr(importlib.import_module(_MODULES[name]), name)

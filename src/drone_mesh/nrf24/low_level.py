@@ -22,6 +22,8 @@ from drone_mesh.nrf24.settings import RadioSettings
 from drone_mesh.nrf24.spi import SpiDevice
 from drone_mesh.nrf24.transceiver import PipePayload, Transceiver
 
+__all__ = ["NRF24LowLevelInterface"]  # for users; see docs/architecture.md
+
 logger = logging.getLogger(__name__)
 
 POLL_S = 5e-3  # three payloads fit in the FIFO, and take 5.4 ms to arrive at 250 kbit/s

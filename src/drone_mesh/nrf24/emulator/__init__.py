@@ -3,3 +3,18 @@
 An emulated chip has the interface of a real one: an SPI device with `xfer2`, a CE pin and an IRQ
 pin. Any driver that accepts these runs on it.
 """
+
+from drone_mesh.nrf24.emulator.air import Air
+from drone_mesh.nrf24.emulator.chip import EmulatedChip
+from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance
+from drone_mesh.nrf24.emulator.trace import FrameTrace
+from drone_mesh.nrf24.emulator.wall_clock import WallClock
+
+__all__ = [
+    "Air",
+    "EmulatedChip",
+    "FrameTrace",
+    "IdealDisc",
+    "LogDistance",
+    "WallClock",
+]

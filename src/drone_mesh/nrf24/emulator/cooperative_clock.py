@@ -25,6 +25,8 @@ from drone_mesh.channel.runtime import Runtime, Signal, Task
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
 
+__all__ = ["CooperativeClock"]  # for users; see docs/architecture.md
+
 logger = logging.getLogger(__name__)
 
 

@@ -14,6 +14,8 @@ from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.present_drones import PresentDrones
 
+__all__ = ["drones_if_known"]  # for users; see docs/architecture.md
+
 
 def set_fleet_parameter(configuration: FactoryConfiguration) -> None:
     """Publish the settings of the nodes to hosts in other processes."""
