@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -75,6 +77,16 @@ class ConsoleProcess:
         match = re.fullmatch(r"serving on port (\d+)", said)
         assert match, f"the console did not start, it said {said!r}"
         self.port = int(match[1])
+
+    @contextlib.contextmanager
+    def stopped(self) -> Iterator[None]:
+        """It does nothing meanwhile; its connections stay open."""
+        assert self._pid is not None
+        os.kill(self._pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.kill(self._pid, signal.SIGCONT)
 
     def stop(self) -> int:
         """Ask it to end; returns its exit code."""

@@ -44,9 +44,48 @@ def test_an_order_without_a_connection_gets_a_readable_answer(start_console, vis
     page.expect_complaints(REFUSED)
     console.stop()
     page.wait_for("it noticed", lambda: page.page.locator("#link").is_visible())
-    page.page.click("#pause")
+    page.page.click("#pause", force=True)  # it is locked
     page.page.wait_for_selector(".toast.bad")
     assert "there is no connection to the console" in page.page.inner_text(".toast.bad")
+
+
+def test_a_console_that_is_silent_is_shown_as_such_and_nothing_is_carried_out_later(
+    start_console, visit
+):
+    console = start_console("--skip", "25")
+    page = visit(console.url)
+    page.wait_for_drones(len(PLACES))
+    page.page.click("#nodes tr[data-id='3']")
+    with console.stopped():
+        page.wait_for("it says so", lambda: page.page.locator("#link").is_visible())
+        assert "the console is silent, this is" in page.page.inner_text("#link")
+        assert page.page.get_attribute("#power", "aria-disabled") == "true"
+        assert page.page.evaluate("document.body.hasAttribute('data-old')")
+        page.page.keyboard.press("p")
+        page.page.wait_for_selector(".toast.bad")
+        assert "nothing was sent" in page.page.inner_text(".toast.bad")
+    page.wait_for("the present again", lambda: not page.page.locator("#link").is_visible())
+    assert page.page.get_attribute("#power", "aria-disabled") == "false"
+    assert page.row(3, 2) == "connected"
+
+
+def test_an_order_that_was_held_up_on_its_way_is_refused(start_console):
+    with connect(start_console("--skip", "25")) as page:
+        heard = None
+        while heard is None:
+            message = json.loads(page.recv(timeout=WAIT_WITHIN_S))
+            heard = message.get("at") if message["type"] == "alive" else None
+        order = {"do": "power", "node": 3, "on": False}
+        page.send(json.dumps({**order, "number": 1, "heard": heard - 60.0}))
+        page.send(json.dumps({**order, "number": 2, "heard": heard}))
+        answers = {}
+        while len(answers) < 2:
+            message = json.loads(page.recv(timeout=WAIT_WITHIN_S))
+            if message["type"] == "answer":
+                answers[message["number"]] = message
+    assert not answers[1]["done"]
+    assert "60 s after the page last heard the console" in answers[1]["text"]
+    assert answers[2]["done"]
 
 
 def clock(page) -> float:

@@ -97,6 +97,7 @@ class FrameStore:
             "severity": int(summary.severity),
             "routing": mesh.routing,
             "repair": mesh.repair_strategy,
+            "layouts": list(mesh.layouts),
             "shape": shape_named(mesh.shape).value,
         }
         for gone in self._nodes.keys() - {node.id for node in mesh.nodes}:

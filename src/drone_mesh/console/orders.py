@@ -27,6 +27,7 @@ NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
 MomentOrNone = Optional[Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]]  # simulated s
+HeardOrNone = Optional[Annotated[float, Field(allow_inf_nan=False)]]  # `at` of the last "alive"
 SwitchOrNone = Optional[bool]
 FactorOrNone = Optional[Annotated[float, Field(gt=0, le=MAX_REAL_TIME_FACTOR, allow_inf_nan=False)]]
 
@@ -56,6 +57,7 @@ class PageOrder(_Request, abc.ABC):
     """One order of one page; the answer carries the same `number`."""
 
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
+    heard: HeardOrNone = None
 
     @abc.abstractmethod
     def carry_out(self, controls: MeshControls) -> str:
@@ -157,6 +159,7 @@ class Demonstrate(_Request):
 
     do: Literal["demonstrate"]
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
+    heard: HeardOrNone = None
     on: bool
 
 

@@ -12,6 +12,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import math
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Sequence
@@ -57,6 +58,8 @@ MOST_PAGES = 32
 MOST_ORDERS_WAITING = 16  # per page
 ORDER_THREADS = 8
 EVENT_WITHIN_S = 5.0  # wall, our choice: after the answer to an order; hosts report every second
+ALIVE_PERIOD_S = 0.5  # our choice: a page takes two seconds without a message for silence
+MOST_LATE_S = 3.0  # our choice: an order of a page that has heard nothing for longer is refused
 ALL_ACTIONS = ("fly", "power", "layout", "speed", "add", "remove", "demonstrate", "packets")
 COOKIE = "drone_mesh_token"
 POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1
@@ -227,12 +230,16 @@ class ConsoleServer:
             }
             await self._send(page, json.dumps(hello))
             before_s = loop.time()
+            alive_s = -math.inf
             # Before Python 3.12 wait_for may swallow a cancellation that arrives as a send ends.
             while page in self._pages:
                 started_s = loop.time()
                 for text in page.messages(started_s - before_s):
                     await self._send(page, text)
                 before_s = started_s
+                if started_s - alive_s >= ALIVE_PERIOD_S:
+                    alive_s = started_s
+                    await self._send(page, json.dumps({"type": "alive", "at": loop.time()}))
                 await asyncio.sleep(max(0.0, started_s + FRAME_PERIOD_S - loop.time()))
         except asyncio.TimeoutError:
             log.info("console: disconnected a page that accepted nothing for %g s", SEND_TIMEOUT_S)
@@ -248,6 +255,12 @@ class ConsoleServer:
         except OrderRefused as error:
             await self._answer(page, number_of(text), False, str(error))
             return
+        if isinstance(request, (PageOrder, Demonstrate)) and request.heard is not None:
+            late_s = asyncio.get_running_loop().time() - request.heard
+            if late_s > MOST_LATE_S:  # it was queued while page and console did not hear each other
+                why = f"sent {late_s:.0f} s after the page last heard the console: not carried out"
+                await self._answer(page, request.number, False, why)
+                return
         if isinstance(request, NeighbourWatch):
             page.watching = request.node
             if request.node is not None:

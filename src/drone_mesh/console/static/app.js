@@ -103,13 +103,15 @@ function setText(id, text) {
 }
 
 function showHead() {
-  const { t, achieved, factor, paused, summary, severity, routing, repair } = mesh.clock;
+  const { t, achieved, factor, paused, summary, severity, routing, repair, layouts } = mesh.clock;
   if (t === undefined) return;
   setText(
     "clock",
     paused ? `${t.toFixed(1)} s, paused` : `${t.toFixed(1)} s, ${achieved.toFixed(1)}×`,
   );
   setText("summary", summary);
+  setText("standing", layouts.at(-1) ?? "");
+  byId("standing").hidden = !layouts.length;
   byId("summary").dataset.severity = severity;
   const named = { Routing: routing, repair };
   const names = Object.entries(named).filter(([, name]) => name);
@@ -124,9 +126,24 @@ function showHead() {
   }
 }
 
+const ACTING = "button.live, .live button, .live select, #power, #demonstrate, #fly-form button";
+let wasLocked = false;
+
 function showLink() {
-  const text = connection.open ? mesh.link : "no connection to the console, trying again";
+  const seconds =
+    connection.age < 10 ? Math.round(connection.age) : 10 * Math.floor(connection.age / 10); // read out less often
+  const age = Number.isFinite(seconds) ? `, this is ${seconds} s old` : "";
+  let text = mesh.link;
+  if (!connection.open) text = `no connection to the console, trying again${age}`;
+  else if (connection.silent && age) text = `the console is silent${age}`;
   setText("link", text);
+  document.body.toggleAttribute("data-old", Boolean(text)); // what is shown is not the present
+  const locked = connection.silent;
+  if (document.body.toggleAttribute("data-locked", locked) !== wasLocked) {
+    wasLocked = locked;
+    for (const acting of document.querySelectorAll(ACTING))
+      acting.setAttribute("aria-disabled", locked);
+  }
   byId("link").dataset.severity = 2;
   byId("link").hidden = !text;
 }
