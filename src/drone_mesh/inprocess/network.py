@@ -32,6 +32,7 @@ from drone_mesh.drone.fleet import (
     DEFAULT_SPACING_M,
     plan_fleet,
 )
+from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.airs import create_air
@@ -39,6 +40,7 @@ from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.node import InProcessNode, NoInternet
 from drone_mesh.inprocess.oracle import Oracle
 from drone_mesh.inprocess.pilots import Pilots
+from drone_mesh.inprocess.positions import PositionErrors, PositionReceiver
 from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAntenna
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.inprocess.shortest_path import SHORTEST_PATH, LinkMap, ShortestPath
@@ -76,6 +78,7 @@ class Network:
         repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
         repair_options: RepairOptions | None = None,
         key: Keys | Callable[[int], Keys | None] | None = None,
+        positions: PositionErrors | None = None,
     ) -> None:
         """`loss`, `delay_s` and `jitter_s` as for InProcessAir; `routing` as in a launch file, or
         "shortest_path", which knows all links: the bound for every other technique.
@@ -99,6 +102,7 @@ class Network:
             create_repair_strategy(repair)  # raises here for an unknown name, not per node
         self._repair_options = repair_options
         self._key = key
+        self._positions = positions or PositionErrors()
         self.clock = VirtualClock()
         self.air = create_air(
             radio, self.clock, self._rng, max_distance_m, loss, delay_s, jitter_s, rate, links
@@ -168,7 +172,7 @@ class Network:
         node.component = assemble_component(
             node_id,
             antenna,
-            node.drone,
+            self._engine(node, node_id),
             random.Random(self._rng.random()),
             internet=NoInternet() if node.is_gateway else None,
             routing=self._technique(node_id),
@@ -184,6 +188,12 @@ class Network:
     def _sealed(self, antenna: IWirelessCommunication, node_id: int, keys: Keys) -> SealedAntenna:
         rng = random.Random(f"{self._seed} seal {node_id} {self.now_s()}")  # new at each start
         return SealedAntenna(antenna, node_id, keys, rng, self.now_s, self._timing)
+
+    def _engine(self, node: InProcessNode, node_id: int) -> IDroneEngine:
+        if self._positions.none:
+            return node.drone
+        rng = random.Random(f"{self._seed} position {node_id}")
+        return PositionReceiver(node.drone, self.clock, self._positions, rng)
 
     def _technique(self, node_id: int) -> str | IRoutingTechnique:
         if self._routing == SHORTEST_PATH:

@@ -13,7 +13,7 @@ from typing_extensions import Annotated, Literal
 
 from drone_mesh.air import obstacle_file
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab import extensions, places
+from drone_mesh.lab import extensions, movement, places
 from drone_mesh.lab.dotted_path import NoSuchPlace, put
 from drone_mesh.lab.experiment_source import Source, nearest_name
 from drone_mesh.lab.expression import ExpressionError, Where
@@ -225,6 +225,7 @@ def _read_files(content: Dict[str, Any], source: Source) -> None:
     for part, key, read in (
         ("layout", "places", places.rows_of_file),
         ("obstacles", "boxes", obstacle_file.rows_of_file),
+        ("mobility", "knots", movement.rows_of_file),
     ):
         holder = content.get(part)
         if not isinstance(holder, dict) or not isinstance(holder.get("path"), str):

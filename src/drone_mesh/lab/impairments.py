@@ -7,11 +7,13 @@ import random
 from dataclasses import dataclass, field
 from typing import Callable
 
+from drone_mesh.channel.packet_queue import OutgoingPacket
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
+from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio
 
 
 @dataclass
@@ -46,6 +48,7 @@ class Impairments:
     lost: int = 0
     jams: list[Jamming] = field(default_factory=list)
     sent_by: dict[int, int] = field(default_factory=dict)
+    frames: dict[str, int] | None = None  # on the shared channel: "control" and "data"
     arrives: Callable[[Location, Location], float] | None = None  # share, by fading
 
     def __post_init__(self) -> None:
@@ -56,6 +59,8 @@ class Impairments:
         else:
             for node in self.network.nodes.values():
                 self._watch(node.antenna)
+            self.frames = {"control": 0, "data": 0}
+            self._watch_frames(air)
 
     @property
     def disc(self) -> InProcessAir:
@@ -77,6 +82,19 @@ class Impairments:
 
         antenna.send_message_to = counted_send  # type: ignore[method-assign]
         antenna.broadcast_message = counted_broadcast  # type: ignore[method-assign]
+
+    def _watch_frames(self, air: SharedAir) -> None:
+        """Count the frames on the air, tries and acknowledgements included."""
+        transmit, frames = air.transmit, self.frames
+        assert frames is not None
+
+        def counted(
+            sender: SharedRadio, packet: OutgoingPacket, answers: SharedRadio | None = None
+        ) -> None:
+            frames["data" if messages.is_data(packet.payload) else "control"] += 1
+            transmit(sender, packet, answers)
+
+        air.transmit = counted  # type: ignore[method-assign]
 
     def carries(self, payload: bytes) -> bool:
         """Whether a packet is not lost."""

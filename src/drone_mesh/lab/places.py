@@ -177,10 +177,15 @@ def width_for(drones: int, mean_degree: float, range_m: float) -> float:
     return (low + high) / 2
 
 
+def side_of(layout: Layout, range_m: float) -> float:
+    """Side of the square of a uniform layout, in metres."""
+    return layout.width_m or width_for(layout.drones, layout.mean_degree or MEAN_DEGREE, range_m)
+
+
 def _uniform(
     layout: Layout, range_m: float, draw: Callable[[], float]
 ) -> list[tuple[float, float]]:
-    width_m = layout.width_m or width_for(layout.drones, layout.mean_degree or MEAN_DEGREE, range_m)
+    width_m = side_of(layout, range_m)
     return [(draw() * width_m, draw() * width_m) for _ in range(layout.drones)]
 
 

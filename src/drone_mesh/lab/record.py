@@ -8,7 +8,9 @@ from typing import Mapping, NamedTuple, Sequence, Tuple
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.impairments import Traffic
+from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.network_sample import NetworkSample
+from drone_mesh.lab.probes import ProbeFate
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.timeline import Happened, OrderAttempt
 from drone_mesh.state.model import EventRecord
@@ -61,6 +63,9 @@ class RunRecord:
     airtime_s: float | None  # of all frames, on the shared channel
     frames_destroyed: int | None  # by other frames, on the shared channel
     refused_flights: int = 0
+    links: LinkWatch | None = None  # of a run with motion or probes
+    probes: Sequence[ProbeFate] = ()
+    frames: Mapping[str, int] | None = None  # shared channel: "control" and "data"
 
     @property
     def healed_at_s(self) -> float | None:

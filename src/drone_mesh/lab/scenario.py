@@ -1,7 +1,7 @@
 """One run as an experiment file describes it: layout, radio, techniques and faults."""
 
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
-from typing import Any, ClassVar, Dict, FrozenSet, List, Optional, Tuple
+from typing import Any, ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
 
 from pydantic import (
     BaseModel,
@@ -20,7 +20,11 @@ from drone_mesh.communication.routing.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_HEIGHT_M
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.conditions import parse_condition
+from drone_mesh.mobility import Mobility
+from drone_mesh.mobility.named_models import check as check_mobility
+from drone_mesh.mobility.settings import Knot
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Above0 = Annotated[float, Field(gt=0, le=1e6)]
@@ -107,6 +111,77 @@ class Radio(Part):
     def _dump_keys_of_its_kind(self, dump: Any) -> Dict[str, Any]:
         left_out = {"rate"} if self.kind == "disc" else {"loss", "delay_s", "jitter_s"}
         return {key: value for key, value in dump(self).items() if key not in left_out}
+
+
+class MotionSettings(Part):
+    """How drones move that the mesh does not steer, as in Mobility; see docs/motion.md."""
+
+    kind: Literal[
+        "none", "random_waypoint", "gauss_markov", "group", "patrol", "oval", "eight", "trace"
+    ] = "none"
+    told: bool = False  # each leg is ordered through the mesh, and flown like every order
+    speed_m_s: Union[Above0, Annotated[List[Above0], Field(min_length=2, max_length=2)]] = 0.3
+    pause_s: AtLeast0 = Mobility.pause_s
+    height_m: Annotated[float, Field(ge=0, le=MAX_HEIGHT_M)] = Mobility.height_m
+    share: Share = Mobility.share
+    gateways: bool = Mobility.gateways
+    steady: bool = Mobility.steady
+    climbs: bool = Mobility.climbs
+    alpha: Share = Mobility.alpha
+    update_s: Above0 = Mobility.update_s
+    groups: Annotated[int, Field(ge=1, le=MAX_DRONES)] = Mobility.groups
+    radius_m: Above0 = Mobility.radius_m
+    lanes: Annotated[int, Field(ge=1, le=1000)] = Mobility.lanes
+    waypoints: List[Point] = []
+    area: Optional[Annotated[List[float], Field(min_length=4, max_length=4)]] = None
+    # x, y, width and depth in m; default: the layout's
+    path: Optional[str] = None  # trace: a file beside the experiment
+    knots: Optional[List[Annotated[List[float], Field(min_length=5, max_length=5)]]] = None
+    # its content: id, t, x, y, z
+
+    @model_validator(mode="after")
+    def _can_move(self) -> "MotionSettings":
+        if self.kind == "trace" and self.path is None:
+            raise ValueError("mobility of kind trace needs path")
+        if self.area is not None and min(self.area[2:]) <= 0:
+            raise ValueError("area needs a width and a depth above 0")
+        try:
+            check_mobility(self.mobility)
+        except ConfigurationError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+    @property
+    def mobility(self) -> Mobility:
+        """The same for the models."""
+        given = self.model_dump(exclude={"told", "area", "path", "speed_m_s", "waypoints", "knots"})
+        speed = self.speed_m_s if isinstance(self.speed_m_s, list) else [self.speed_m_s] * 2
+        knots: Dict[int, List[Knot]] = {}
+        for node, t, x, y, z in self.knots or ():
+            knots.setdefault(int(node), []).append((t, x, y, z))
+        return Mobility(
+            speed_m_s=(speed[0], speed[1]),
+            waypoints=tuple((x, y) for x, y in self.waypoints),
+            knots=knots,
+            **given,
+        )
+
+
+class Probes(Part):
+    """Messages and echoes that measure the delivery, each between a gateway and a random drone."""
+
+    per_s: AtLeast0 = 0.0  # of each: message up, message down, echo; at random times
+    from_s: AtLeast0 = 20.0
+    within_s: Above0 = 2.0  # later ones count as lost
+
+
+class Positions(Part):
+    """What the mesh software knows of positions, as in PositionErrors."""
+
+    known: bool = True
+    sigma_m: AtLeast0 = 0.0
+    outliers: Share = 0.0
+    outlier_m: AtLeast0 = 0.0
 
 
 class Timing(Part):
@@ -297,6 +372,9 @@ class Scenario(Part):
     repair_options: Repair = Repair()
     timing: Timing = Timing()
     obstacles: ObstacleSettings = ObstacleSettings()
+    mobility: MotionSettings = MotionSettings()
+    positions: Positions = Positions()
+    probes: Probes = Probes()
     faults: List[Fault] = []
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
     sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # sampling period of the network

@@ -12,10 +12,13 @@ import numpy as np
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.positions import PositionErrors
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.impairments import Impairments
+from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.metrics import STACKED_M
+from drone_mesh.lab.movement import ToldPilots, tracks
 from drone_mesh.lab.network_sample import (
     NetworkSample,
     gateways_of,
@@ -24,11 +27,13 @@ from drone_mesh.lab.network_sample import (
     sample_of,
 )
 from drone_mesh.lab.places import StartPoint, draw_places
+from drone_mesh.lab.probes import ProbeSender
 from drone_mesh.lab.propagation import obstacles_of, put_obstacles
 from drone_mesh.lab.record import RunRecord, Topology
-from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.scenario import Positions, Scenario
 from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.timeline import Timeline
+from drone_mesh.mobility import Track
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.observation import describe_obstacles
 
@@ -43,13 +48,20 @@ class Simulation:
     def __init__(self, scenario: Scenario, streams: Streams) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self.scenario = scenario
-        self.network = _network(scenario, streams)
+        places = _places(scenario, streams)
+        self.network = _network(scenario, streams, places)
         self.impairments = Impairments(self.network, streams.of, scenario.radio.loss)
         self._planner = put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
         self.timeline = Timeline(
             scenario, self.network, self.impairments, self.flights, streams, self
         )
+        self._move(tracks(scenario, places, streams))
+        self._probes = ProbeSender(
+            self.network, scenario.probes, scenario.duration_s, streams.of("probes")
+        )
+        is_watched = scenario.probes.per_s or scenario.mobility.kind != "none"
+        self._links = LinkWatch(scenario.probes.from_s) if is_watched else None
         self._samples: list[NetworkSample] = []
         self._start_places = self._places()
         self._start: Topology | None = None
@@ -103,8 +115,17 @@ class Simulation:
             end_s=scenario.duration_s,
             airtime_s=getattr(network.air, "airtime_s", None),
             frames_destroyed=getattr(network.air, "collisions", None),
+            links=self._links,
+            probes=self._probes.results(),
+            frames=self.impairments.frames,
             refused_flights=0 if self._planner is None else len(self._planner.refused),
         )
+
+    def _move(self, flown: dict[int, Track]) -> None:
+        if self.scenario.mobility.told:
+            ToldPilots(self.network, flown, self.timeline.send_order)
+        elif flown:
+            self.network.fly(flown)
 
     def event_hash(self) -> str:
         """A hash of all events of the mesh software: equal for equal runs."""
@@ -126,6 +147,8 @@ class Simulation:
     def _take_sample(self) -> NetworkSample:
         sample = sample_of(self.network)
         self._samples.append(sample)
+        if self._links is not None:
+            self._links.look(sample, physical_graph(self.network), gateways_of(self.network))
         return sample
 
     def before_disruption(self) -> None:
@@ -166,7 +189,7 @@ class Simulation:
                 self._pairs.add((min(node, other), max(node, other)))
 
 
-def _network(scenario: Scenario, streams: Streams) -> Network:
+def _network(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> Network:
     timing = MeshTiming(
         check_period_s=scenario.timing.check_period_s,
         connection_lost_after_s=scenario.timing.connection_lost_after_s,
@@ -179,7 +202,7 @@ def _network(scenario: Scenario, streams: Streams) -> Network:
         max_distance_m=scenario.range_m,
         **_options(scenario),
     )
-    for place in _places(scenario, streams):
+    for place in places:
         add = network.add_gateway if place.gateway else network.add_router
         add(place.node_id, place.x, place.y)
     return network
@@ -200,6 +223,8 @@ def _options(scenario: Scenario) -> dict[str, Any]:
             avoid_wrecks=scenario.repair_options.avoid_wrecks,
         ),
     }
+    if scenario.positions != Positions():
+        options["positions"] = PositionErrors(**scenario.positions.model_dump())
     if scenario.radio.kind == "disc":
         options["delay_s"] = scenario.radio.delay_s
         options["jitter_s"] = scenario.radio.jitter_s

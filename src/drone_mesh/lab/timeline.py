@@ -231,7 +231,7 @@ class Timeline:
         what = fault.what
         if what.id is not None:
             x, y, height = (*what.to, 0.0)[:3]
-            self._send_order(what.id, x, y, int(height))
+            self.send_order(what.id, x, y, int(height))
             return [what.id]
         clock = self._network.clock
         end_s = self._scenario.duration_s - 1.0
@@ -256,9 +256,10 @@ class Timeline:
             here, angle = self._network.location(node), 2 * math.pi * direction
             x = here.longitude + within_m * math.cos(angle)
             y = here.latitude + within_m * math.sin(angle)
-            self._send_order(node, x, y, 0)
+            self.send_order(node, x, y, 0)
 
-    def _send_order(self, node: int, x: float, y: float, height: int) -> None:
+    def send_order(self, node: int, x: float, y: float, height: int) -> None:
+        """Order a drone to x, y (m) through the first gateway that is on."""
         gateway = next(
             (g for g in gateways_of(self._network) if self._network.nodes[g].antenna.powered), None
         )

@@ -42,7 +42,10 @@ def _none(_fleet: Fleet) -> dict[int, Track]:
 
 def _random_waypoint(fleet: Fleet) -> dict[int, Track]:
     mobility, area = fleet.mobility, fleet.area
-    return {n: random_waypoint(mobility, area, fleet.rng(n)) for n in fleet.places}
+    return {
+        node: random_waypoint(mobility, area, fleet.rng(node), None if mobility.steady else place)
+        for node, place in fleet.places.items()
+    }
 
 
 def _gauss_markov(fleet: Fleet) -> dict[int, Track]:

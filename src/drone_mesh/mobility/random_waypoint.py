@@ -6,25 +6,33 @@ import math
 import random
 from typing import Iterator
 
+from drone_mesh.drone.flight_path import Vector
 from drone_mesh.mobility.area import Area
 from drone_mesh.mobility.settings import Mobility
 from drone_mesh.mobility.track import Legs, Segment, climbing, leg_to, rest
 
 
-def random_waypoint(mobility: Mobility, area: Area, rng: random.Random) -> Legs:
-    """A drone on random waypoints, in the steady state from time 0 on.
+def random_waypoint(
+    mobility: Mobility, area: Area, rng: random.Random, start: Vector | None = None
+) -> Legs:
+    """A drone on random waypoints, in the steady state from time 0 on; or from a place `start` on.
 
-    Without that start, places, speeds and the neighbours' number drift for minutes. Navidi, Camp:
-    Stationary distributions for the random waypoint mobility model, IEEE TMC 2004.
+    Without the steady state, places, speeds and the number of neighbours drift for minutes. Navidi,
+    Camp: Stationary distributions for the random waypoint mobility model, IEEE TMC 2004.
     """
-    legs = _legs(mobility, area, rng)
+    legs = _legs(mobility, area, rng, start)
     if mobility.climbs:
         return Legs(part for leg in legs for part in climbing(leg))
     return Legs(legs)
 
 
-def _legs(mobility: Mobility, area: Area, rng: random.Random) -> Iterator[Segment]:
-    if rng.random() < _share_at_rest(mobility, area):
+def _legs(
+    mobility: Mobility, area: Area, rng: random.Random, start: Vector | None
+) -> Iterator[Segment]:
+    if start is not None:
+        leg = rest(0.0, start, 0.0)
+        yield leg
+    elif rng.random() < _share_at_rest(mobility, area):
         leg = rest(0.0, area.point(rng, mobility.height_m), rng.random() * mobility.pause_s)
         yield leg
     else:

@@ -20,6 +20,7 @@ class Mobility:
     height_m: float = 0.0  # of all flights
     share: float = 1.0  # of the drones; they are drawn
     gateways: bool = False  # move as well
+    steady: bool = True  # random_waypoint: from its steady state on; False: from where drones stand
     climbs: bool = False  # random_waypoint: each leg by the document's profile
     alpha: float = 0.85  # gauss_markov: memory, 0 (none) to 1 (straight ahead)
     update_s: float = 1.0  # gauss_markov: between two draws

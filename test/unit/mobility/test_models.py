@@ -297,3 +297,9 @@ def test_the_sum_of_two_motions_changes_when_either_does():
     assert (leg.start_s, leg.end_s) == (10.0, 15.0)
     assert leg.position_at(12.0) == pytest.approx((8.0, 17.0, 1.0))
     assert leg.velocity == pytest.approx((-1.0, 1.0, 0.0))
+
+
+def test_random_waypoints_can_begin_where_the_drones_stand():
+    flown = tracks("random_waypoint", {4: (3.0, 2.0, 0.0)}, steady=False, speed_m_s=(1.0, 1.0))
+    assert flown[4].position_at(0.0) == (3.0, 2.0, 0.0)
+    assert math.dist(flown[4].position_at(2.0), (3.0, 2.0, 0.0)) == pytest.approx(2.0)

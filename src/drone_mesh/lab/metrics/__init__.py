@@ -2,7 +2,7 @@
 
 # The order of these imports is that of the columns of runs.csv.
 # isort: off
-from drone_mesh.lab.metrics import healing, movement, shape, traffic
+from drone_mesh.lab.metrics import healing, movement, shape, motion, traffic
 
 # isort: on
 from drone_mesh.lab.metrics.movement import STACKED_M
@@ -16,6 +16,7 @@ __all__ = [
     "covered",
     "healing",
     "measure_all",
+    "motion",
     "movement",
     "shape",
     "traffic",

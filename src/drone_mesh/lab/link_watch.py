@@ -1,0 +1,43 @@
+"""Watches the links of a moving mesh: how many change, how long they live, whom they serve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from drone_mesh.lab.graph import Graph
+from drone_mesh.lab.network_sample import NetworkSample
+
+
+@dataclass
+class LinkWatch:
+    """Sums over the samples of a run, from `from_s` on."""
+
+    from_s: float
+    seconds: float = 0.0  # of observation
+    drone_s: float = 0.0  # live drones, gateways included, times seconds
+    link_s: float = 0.0  # links times seconds
+    appeared: int = 0
+    disappeared: int = 0
+    router_s: float = 0.0  # live routers times seconds
+    reachable_s: float = 0.0  # of these, with a path over existing links
+    served_s: float = 0.0  # of these, served
+    _links: set[tuple[int, int]] | None = field(default=None, repr=False)
+    _last_s: float = field(default=0.0, repr=False)
+
+    def look(self, sample: NetworkSample, graph: Graph, gateways: list[int]) -> None:
+        """Take one sample; a link that lives shorter than the sampling period is missed."""
+        if sample.now_s < self.from_s:
+            return
+        links = {(a, b) for a, others in graph.near.items() for b in others if a < b}
+        if self._links is not None:
+            passed_s = sample.now_s - self._last_s
+            reachable = sample.alive & graph.hops_from(gateways).keys()
+            self.seconds += passed_s
+            self.drone_s += len(graph.near) * passed_s
+            self.link_s += len(links) * passed_s
+            self.appeared += len(links - self._links)
+            self.disappeared += len(self._links - links)
+            self.router_s += len(sample.alive) * passed_s
+            self.reachable_s += len(reachable) * passed_s
+            self.served_s += len(sample.served & reachable) * passed_s
+        self._links, self._last_s = links, sample.now_s

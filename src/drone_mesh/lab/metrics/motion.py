@@ -1,0 +1,86 @@
+"""Metrics of a moving mesh: its links, whom it serves, and what arrives."""
+
+from __future__ import annotations
+
+import statistics
+
+from drone_mesh.lab.metrics.registry import NAN, metric
+from drone_mesh.lab.record import RunRecord
+
+
+@metric("1/min", "links that appear or disappear, per drone and minute")
+def link_changes(run: RunRecord) -> float:
+    watch = run.links
+    if watch is None or not watch.drone_s:
+        return NAN
+    return 2 * (watch.appeared + watch.disappeared) / (watch.drone_s / 60.0)
+
+
+@metric("s", "mean life of a link: time of all links per link that ended; empty: none ended")
+def link_life_s(run: RunRecord) -> float:
+    watch = run.links
+    return NAN if watch is None or not watch.disappeared else watch.link_s / watch.disappeared
+
+
+@metric("share", "time of live routers with any path to a gateway over existing links")
+def reachable(run: RunRecord) -> float:
+    watch = run.links
+    return NAN if watch is None or not watch.router_s else watch.reachable_s / watch.router_s
+
+
+@metric("share", "time of these routers in which they are served", better="more")
+def served(run: RunRecord) -> float:
+    watch = run.links
+    return NAN if watch is None or not watch.reachable_s else watch.served_s / watch.reachable_s
+
+
+@metric(
+    "share",
+    "best-effort messages to the gateway that arrived in time, of drones with a path",
+    better="more",
+)
+def pdr_up(run: RunRecord) -> float:
+    return _arrived(run, "up")
+
+
+@metric("share", "the same from the gateway", better="more")
+def pdr_down(run: RunRecord) -> float:
+    return _arrived(run, "down")
+
+
+@metric("share", "echoes of a gateway that a drone with a path answered in time", better="more")
+def pdr_echo(run: RunRecord) -> float:
+    return _arrived(run, "echo")
+
+
+@metric("ms", "median time of these messages that arrived, up and down", better="less")
+def delay_ms(run: RunRecord) -> float:
+    delays = [p.delay_s for p in run.probes if p.kind != "echo" and p.delay_s is not None]
+    return 1000.0 * statistics.median(delays) if delays else NAN
+
+
+@metric("hops", "mean hops of an echo beyond the shortest path at its time", better="less")
+def detours(run: RunRecord) -> float:
+    more = [probe.hops - probe.shortest for probe in run.probes if probe.hops is not None]
+    return statistics.fmean(more) if more else NAN
+
+
+@metric("1/s", "frames per drone and second, acknowledgements included; shared radio only")
+def frame_rate(run: RunRecord) -> float:
+    if run.frames is None:
+        return NAN
+    return sum(run.frames.values()) / run.end_s / len(run.start.places)
+
+
+@metric("1/s", "of these, frames that carry no data of users", better="less")
+def control_frame_rate(run: RunRecord) -> float:
+    if run.frames is None:
+        return NAN
+    return run.frames["control"] / run.end_s / len(run.start.places)
+
+
+def _arrived(run: RunRecord, kind: str) -> float:
+    probes = [probe for probe in run.probes if probe.kind == kind]
+    if not probes:
+        return NAN
+    return sum(probe.delay_s is not None for probe in probes) / len(probes)

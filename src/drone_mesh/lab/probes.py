@@ -1,0 +1,99 @@
+"""Probes: messages up, messages down and echoes, each from a drone that had a path at the time."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+
+from drone_mesh.communication.data.echo import EchoAnswer
+from drone_mesh.communication.data.ticket import TO_GATEWAY
+from drone_mesh.errors import MeshError
+from drone_mesh.inprocess import Network
+from drone_mesh.lab.network_sample import gateways_of, physical_graph
+from drone_mesh.lab.scenario import Probes
+
+KINDS = ("up", "down", "echo")
+PORT = 77  # our choice: of these messages
+
+
+@dataclass
+class ProbeFate:
+    """One message or echo, and its fate."""
+
+    kind: str  # one of KINDS
+    node: int
+    sent_s: float
+    shortest: int  # hops of the shortest path over existing links
+    delay_s: float | None = None  # until it arrived, or until the answer; None: not in time
+    hops: int | None = None  # echo: of its way out
+
+
+class ProbeSender:
+    """Sends the probes of one run, at random times and for random drones of a stream of its own."""
+
+    def __init__(self, network: Network, probes: Probes, end_s: float, rng: random.Random) -> None:
+        self.sent: list[ProbeFate] = []
+        self._network, self._probes = network, probes
+        last_s = end_s - probes.within_s
+        count = int(probes.per_s * max(0.0, last_s - probes.from_s))
+        for kind in KINDS:
+            for _ in range(count):
+                at_s, draw = rng.uniform(probes.from_s, last_s), rng.random()
+                network.clock.call_at(at_s, self._send, (kind, draw))
+
+    def results(self) -> list[ProbeFate]:
+        """The probes with the fates of the messages; to be called once, at the end."""
+        arrived = {
+            int.from_bytes(message.payload, "big"): (node, message.received_s)
+            for node, messages in self._network.received.items()
+            for message in messages
+            if message.port == PORT
+        }
+        gateways = set(gateways_of(self._network))
+        for number, probe in enumerate(self.sent):
+            if probe.kind == "echo" or number not in arrived:
+                continue
+            node, received_s = arrived[number]
+            if node in gateways if probe.kind == "up" else node == probe.node:
+                self._note(probe, received_s - probe.sent_s)
+        return self.sent
+
+    def _send(self, what: tuple[str, float]) -> None:
+        kind, draw = what
+        network = self._network
+        graph = physical_graph(network)
+        gateways = gateways_of(network)
+        hops = graph.hops_from(gateways)
+        fit = [node for node in sorted(hops) if not network.nodes[node].is_gateway]
+        if not fit:
+            return
+        node = fit[int(draw * len(fit))]
+        number = len(self.sent)
+        probe = ProbeFate(kind, node, network.clock.now_s, hops[node])
+        self.sent.append(probe)
+        payload = number.to_bytes(4, "big")
+        try:
+            if kind == "up":
+                network.send(node, TO_GATEWAY, payload, PORT, reliable=False)
+                return
+            gateway = self._nearest(gateways, node, hops[node])
+            if kind == "down":
+                network.send(gateway, node, payload, PORT, reliable=False)
+            else:
+                network.echo(gateway, node, lambda answer: self._answered(probe, answer))
+        except MeshError:
+            pass  # its queue is full, for example: the probe is lost
+
+    def _nearest(self, gateways: list[int], node: int, hops: int) -> int:
+        if len(gateways) == 1:
+            return gateways[0]
+        graph = physical_graph(self._network)
+        return next(g for g in gateways if graph.hops_from([g]).get(node) == hops)
+
+    def _answered(self, probe: ProbeFate, answer: EchoAnswer) -> None:
+        probe.hops = answer.hops
+        self._note(probe, answer.round_trip_s)
+
+    def _note(self, probe: ProbeFate, delay_s: float) -> None:
+        if delay_s <= self._probes.within_s:
+            probe.delay_s = delay_s

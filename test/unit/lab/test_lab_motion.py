@@ -1,0 +1,179 @@
+"""Moving drones in an experiment: the motion, the messages that measure it, and the metrics."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.graph import Graph
+from drone_mesh.lab.link_watch import LinkWatch
+from drone_mesh.lab.metrics import measure_all
+from drone_mesh.lab.network_sample import NetworkSample
+from drone_mesh.lab.record import RunRecord
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.simulation import Simulation
+from drone_mesh.lab.streams import Streams
+
+
+def simulation(repetition: int = 0, **scenario: Any) -> Simulation:
+    content = {
+        "layout": {"kind": "uniform", "drones": 12, "mean_degree": 6},
+        "mobility": {"kind": "random_waypoint", "speed_m_s": 0.5},
+        "probes": {"per_s": 1.0, "from_s": 5.0},
+        "duration_s": 40,
+        **scenario,
+    }
+    return Simulation(Scenario.model_validate(content), Streams(1, repetition))
+
+
+def run(**scenario: Any) -> RunRecord:
+    return simulation(**scenario).run()
+
+
+def places(record: RunRecord) -> list[tuple[float, float, float]]:
+    return [record.end.places[node] for node in sorted(record.end.places)]
+
+
+def test_routers_move_and_the_gateway_stands() -> None:
+    record = run()
+    moved = {n for n, place in record.end.places.items() if place != record.start.places[n]}
+    assert moved == set(range(1, 12))
+
+
+def test_the_same_seed_gives_the_same_motion_in_every_cell() -> None:
+    one = run(probes={"per_s": 0.0})
+    other = run(routing="flooding", radio={"kind": "shared", "rate": "1M"})
+    assert places(one) == places(other) != places(simulation(1).run())
+
+
+def test_gateways_move_if_they_may_and_a_share_of_the_drones_stands() -> None:
+    record = run(
+        mobility={"kind": "random_waypoint", "gateways": True, "share": 0.5},
+        probes={"per_s": 0.0},
+    )
+    moved = {n for n, place in record.end.places.items() if place != record.start.places[n]}
+    assert len(moved) == 6
+
+
+def test_drones_can_begin_at_the_places_of_the_layout() -> None:
+    begins = {"kind": "random_waypoint", "steady": False}
+    moving = simulation(mobility=begins).network
+    standing = simulation(mobility={"kind": "none"}).network
+    assert [moving.location(n) for n in range(12)] == [standing.location(n) for n in range(12)]
+
+
+def test_told_drones_get_their_legs_as_orders() -> None:
+    record = run(
+        mobility={"kind": "random_waypoint", "told": True, "steady": False},
+        layout={"kind": "grid", "drones": 9, "spacing_m": 3},
+        duration_s=60,
+    )
+    assert {order.node for order in record.orders} >= set(range(1, 9))
+    values = measure_all(record)
+    assert values["order_delivery"] > 0.5
+    assert {leg.node for leg in record.legs} <= set(range(1, 9))
+
+
+def test_a_mesh_at_rest_delivers_every_probe_and_its_links_live() -> None:
+    values = measure_all(run(mobility={"kind": "none"}))
+    assert values["pdr_up"] == values["pdr_down"] == values["pdr_echo"] == 1.0
+    assert values["reachable"] == 1.0
+    assert values["served"] > 0.99
+    assert values["link_changes"] == 0.0
+    assert math.isnan(values["link_life_s"])
+    assert 0.0 < values["delay_ms"] < 100.0
+    assert values["detours"] >= 0.0
+
+
+def test_probes_of_cut_off_drones_do_not_count() -> None:
+    """Drones 2 to 4 lose their only relay; the others still get every message."""
+    layout = {"kind": "line", "drones": 5, "spacing_m": 6}
+    values = run(
+        layout=layout,
+        mobility={"kind": "none"},
+        repair="stay",
+        faults=[{"at_s": 2, "kill": {"ids": [2]}}],
+        probes={"per_s": 2.0, "from_s": 3.0},
+    )
+    assert {probe.node for probe in values.probes} == {1}
+    assert measure_all(values)["reachable"] == pytest.approx(1 / 3)
+
+
+def test_a_message_that_comes_too_late_is_lost() -> None:
+    in_time = run(mobility={"kind": "none"}, radio={"delay_s": 0.3})
+    late = run(
+        mobility={"kind": "none"},
+        radio={"delay_s": 0.3},
+        probes={"per_s": 1.0, "from_s": 5.0, "within_s": 0.2},
+    )
+    assert measure_all(in_time)["pdr_up"] > 0.9
+    assert measure_all(late)["pdr_up"] == 0.0
+
+
+def test_frames_are_counted_by_what_they_carry() -> None:
+    shared = {"kind": "shared", "rate": "250k"}
+    quiet = measure_all(run(radio=shared, probes={"per_s": 0.0}))
+    busy = measure_all(run(radio=shared, probes={"per_s": 5.0, "from_s": 5.0}))
+    assert quiet["frame_rate"] == quiet["control_frame_rate"] > 0.1
+    assert busy["frame_rate"] > busy["control_frame_rate"] + 1.0
+    assert math.isnan(measure_all(run())["frame_rate"])
+
+
+def test_links_that_come_and_go_are_counted_per_drone_and_minute() -> None:
+    watch = LinkWatch(from_s=10.0)
+    routers = frozenset({1, 2})
+
+    def look(now_s: float, near: dict[int, list[int]], served: set[int]) -> None:
+        sample = NetworkSample(now_s, routers, frozenset(served))
+        watch.look(sample, Graph(near), [0])
+
+    look(5.0, {0: [1, 2], 1: [0], 2: [0]}, {1, 2})  # before it begins
+    look(10.0, {0: [1], 1: [0, 2], 2: [1]}, {1, 2})
+    look(20.0, {0: [1], 1: [0], 2: []}, {1})
+    look(30.0, {0: [1, 2], 1: [0], 2: [0]}, {1})
+    assert (watch.appeared, watch.disappeared, watch.link_s) == (1, 1, 30.0)
+    assert (watch.drone_s, watch.router_s, watch.reachable_s) == (60.0, 40.0, 30.0)
+    assert watch.served_s == 20.0
+
+
+def test_positions_can_be_unknown_to_the_mesh() -> None:
+    blind = simulation(positions={"known": False}, repair="stay")
+    blind.run()
+    assert blind.network.nodes[3].component.get_connected_to_gateway() in (True, False)
+    noisy = simulation(positions={"sigma_m": 0.5})
+    assert noisy.network.location(0) == noisy.network.nodes[0].drone.get_location()
+
+
+def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:
+    (tmp_path / "flight.csv").write_text("t,id,x,y,z\n0,2,1,0,0\n10,2,4,0,0\n", encoding="utf-8")
+    file = tmp_path / "motion.yaml"
+    file.write_text(
+        "name: motion\nbase:\n  layout: {kind: line, drones: 3}\n  duration_s: 12\n"
+        "  mobility: {kind: trace, path: flight.csv}\n",
+        encoding="utf-8",
+    )
+    (cell,) = load_experiment(file).cells
+    record = Simulation(cell.scenario, Streams(1, 0)).run()
+    assert record.end.places[2] == pytest.approx((4.0, 0.0, 0.0))
+    (tmp_path / "flight.csv").write_text("t,id\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"mobility\.path: trace .*flight\.csv"):
+        load_experiment(file)
+
+
+@pytest.mark.parametrize(
+    ("mobility", "words"),
+    [
+        ({"kind": "trace"}, "needs path"),
+        ({"kind": "patrol", "area": [0.0, 0.0, 0.0, 5.0]}, "above 0"),
+        ({"kind": "random_waypoint", "speed_m_s": [2.0, 1.0]}, "lower first"),
+        ({"kind": "hover"}, "random_waypoint"),
+    ],
+)
+def test_motion_that_cannot_be_is_refused(mobility: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Scenario.model_validate({"mobility": mobility})
