@@ -33,6 +33,7 @@ from drone_mesh.drone.location import Location
 _HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
 _LOCATION = int(MessageType.LOCATION)
+_MOVE_TO_LOCATION = int(MessageType.MOVE_TO_LOCATION)
 
 
 class MeshnetworkComponent(MeshNode, IMeshNetwork):
@@ -132,6 +133,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self.complaints.add("a neighbour has another origin", f"node {creator}", now_s)
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node with another or an unknown origin", payload)
+            if kind == _MOVE_TO_LOCATION and forward == me:
+                order = messages.GoToLocationMessage.from_payload(payload)
+                self._orders.on_foreign_order(order, messages.order_number(payload), from_)
             return
         if forward != me and forward != BROADCAST:
             if kind == _HEARTBEAT:

@@ -30,6 +30,17 @@ class IDroneEngine(abc.ABC):
         """Whether the drone can fly to a goal now. Override `why_not_fly` instead."""
         return not self.why_not_fly()
 
+    def why_not_repair(self) -> str:
+        """Why the drone cannot fly for a repair now, with `step_back_to`; empty if it can.
+
+        An engine overrides this if somebody may forbid repairs and still allow ordered flights.
+        """
+        return self.why_not_fly()
+
+    def why_ended(self) -> str:
+        """Why the last flight ended before its goal; empty if it did not, or if not known."""
+        return ""
+
     def is_flying(self) -> bool | None:
         """Whether a flight to a goal is under way; None: derive it from the reported positions."""
         return None

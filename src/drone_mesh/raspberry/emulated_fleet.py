@@ -12,7 +12,6 @@ from drone_mesh.drone.engines import GROUND, MAVLINK, FlightOptions, create_engi
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
-from drone_mesh.drone.mavlink.limits import Permissions
 from drone_mesh.errors import ConfigurationError, LocationUnknown
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:  # pymavlink takes a second to load on a Raspberry Pi
     from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 
 DEMONSTRATION_ORIGIN = Origin(52.0907, 5.1214, 3.0)  # Utrecht; only without --origin
-ALL_PERMISSIONS = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)
 _KINDS = (GROUND, "mavlink", "px4")
 
 _log = logging.getLogger(__name__)
@@ -42,7 +40,7 @@ def add_fleet_options(parser: argparse.ArgumentParser) -> None:
         choices=_KINDS,
         default=GROUND,
         help="with --emulated: mavlink (ArduPilot) or px4 gives each node a simulated vehicle, "
-        "which flies as ordered (default: %(default)s)",
+        "which flies as ordered, as far as --may-... allows (default: %(default)s)",
     )
     group.add_argument(
         "--ground-station",
@@ -78,9 +76,7 @@ class EmulatedFleet:
         from drone_mesh.drone.mavlink_vehicle.server import VehicleServer, parse_ground_station
 
         origin = flight.origin or DEMONSTRATION_ORIGIN
-        self._flight = dataclasses.replace(
-            flight, origin=origin, permissions=ALL_PERMISSIONS
-        )  # simulated drones have no pilot
+        self._flight = dataclasses.replace(flight, origin=origin)
         homes = [Origin(*origin.to_earth(air.place(node_id))) for node_id in range(air.nodes)]
         stations = [parse_ground_station(text) for text in fleet.ground_stations]
         self._server = VehicleServer(PX4 if fleet.drones == "px4" else ARDUPILOT, homes, stations)

@@ -56,6 +56,14 @@ def add_flight_options(parser: argparse.ArgumentParser) -> None:
         ("--may-change-mode", "switch a drone that holds its position to GUIDED or OFFBOARD"),
     ):
         group.add_argument(name, action="store_true", help=f"allow the program to {text}")
+    group.add_argument(
+        "--orders-may-take-back",
+        type=float,
+        metavar="SECONDS",
+        help="allow an order to end the LOITER or HOLD that somebody else has chosen, this long "
+        "after he did; a repair never does (default: no order does; the pilot chooses GUIDED or "
+        "OFFBOARD to give the drone back)",
+    )
 
 
 def flight_options(parsed: argparse.Namespace) -> FlightOptions:
@@ -74,7 +82,12 @@ def flight_options(parsed: argparse.Namespace) -> FlightOptions:
             layer_m=parsed.layers,
             hover_m=parsed.hover,
         ),
-        permissions=Permissions(parsed.may_arm, parsed.may_take_off, parsed.may_change_mode),
+        permissions=Permissions(
+            parsed.may_arm,
+            parsed.may_take_off,
+            parsed.may_change_mode,
+            parsed.orders_may_take_back,
+        ),
     )
 
 

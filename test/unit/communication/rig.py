@@ -79,9 +79,17 @@ class RigEngine(IDroneEngine):
         self.place = Location(0.0, 0.0, 0.0)
         self.goals = []
         self.grounded = ""  # why it does not fly
+        self.kept_by_pilot = ""  # why it does not fly for a repair
+        self.ended = ""  # why its last flight ended early
 
     def why_not_fly(self):
         return self.grounded
+
+    def why_not_repair(self):
+        return self.grounded or self.kept_by_pilot
+
+    def why_ended(self):
+        return self.ended
 
     def set_goal(self, latitude, longitude, height):
         self.goals.append(Location(latitude, longitude, height))

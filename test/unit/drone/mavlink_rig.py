@@ -62,11 +62,14 @@ class Rig:
         self.vehicle = MavlinkVehicle(autopilot, ORIGIN, self.up.send)
         self.pilot = MavlinkPilot(node_id, ORIGIN, limits, permissions, self.down.send)
         self.heights: list[float] = []
+        self.shown_mode: int | None = None  # in heartbeats, in place of the vehicle's own
 
     def step(self) -> None:
         self.now_s += STEP_S
         self.vehicle.tick(self.now_s)
         for message in self.up.take():
+            if self.shown_mode is not None and message.get_type() == "HEARTBEAT":
+                message.custom_mode = self.shown_mode
             self.pilot.on_message(message, self.now_s)
         self.pilot.tick(self.now_s)
         for message in self.down.take():
@@ -94,6 +97,10 @@ class Rig:
 
     def goal(self, latitude: float, longitude: float, height: float, lands: bool = False) -> None:
         self.pilot.set_goal(Location(latitude, longitude, height), lands, self.now_s)
+
+    def repair(self, latitude: float, longitude: float, height: float) -> None:
+        goal = Location(latitude, longitude, height)
+        self.pilot.set_goal(goal, False, self.now_s, for_repair=True)
 
     def reach(self, phase: Phase, within_s: float = 120.0) -> None:
         self.run_until(phase.value, lambda: self.status().phase is phase, within_s)

@@ -9,6 +9,7 @@ from scenarios import line
 
 from drone_mesh.communication.frames import CommonFrame
 from drone_mesh.communication.messages import IntroduceMessage, frame_digest, with_frame_digest
+from drone_mesh.communication.order_record import OrderState
 from drone_mesh.communication.packet_types import TYPES_WITH_PLACES
 from drone_mesh.inprocess.drone import InProcessDrone
 
@@ -50,6 +51,17 @@ def test_places_never_cross_the_border_between_two_frames(two_frames, caplog):
     network.run_for(300.0)
     assert network.nodes[2].drone.get_location().longitude == 12.0
     assert network.nodes[3].drone.get_location().longitude == pytest.approx(18.0, abs=6.1)
+
+
+def test_an_order_across_the_border_is_refused_and_the_gateway_is_told_why(two_frames):
+    network = line(2, spacing=6.0)
+    network.run_for(60.0)
+    assert network.order(2, 1.0, 1.0)
+    network.run_for(5.0)
+    (order,) = network.nodes[0].component.get_orders()
+    assert order.state is OrderState.REFUSED
+    assert order.reason == "node 1, which passed the order on, has another --origin"
+    assert network.nodes[2].drone.path is None
 
 
 def test_a_mesh_with_one_origin_is_repaired_as_usual(monkeypatch):

@@ -24,6 +24,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import ARDUPILOT, OUR_SYSTEM_ID, PX4, Autopilot
 from drone_mesh.drone.mavlink.limits import FlightLimits
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot
+from drone_mesh.drone.mavlink_vehicle.modes import Mode
 from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 from drone_mesh.errors import LocationUnknown
 from drone_mesh.inprocess.emulated_mesh import EmulatedMesh, EmulatedNode
@@ -49,7 +50,7 @@ class VirtualEngine(IDroneEngine):
         self._up = Wire(1, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self.vehicle = MavlinkVehicle(kind, Origin(*ORIGIN.to_earth(home)), self._up.send)
         self.pilot = MavlinkPilot(node_id, ORIGIN, LIMITS, ALL, self._down.send)
-        self._goals: list[tuple[Location, bool]] = []
+        self._goals: list[tuple[Location, bool, bool]] = []  # lands there; for a repair
         self._status = self.pilot.status(mesh.now_s())
         self._step(None)
 
@@ -59,7 +60,8 @@ class VirtualEngine(IDroneEngine):
         for message in self._up.take():
             self.pilot.on_message(message, now_s)
         while self._goals:
-            self.pilot.set_goal(*self._goals.pop(0), now_s)
+            goal, lands, for_repair = self._goals.pop(0)
+            self.pilot.set_goal(goal, lands, now_s, for_repair)
         self.pilot.tick(now_s)
         for message in self._down.take():
             self.vehicle.on_message(message, now_s)
@@ -69,12 +71,15 @@ class VirtualEngine(IDroneEngine):
             node.chip.position = self._status.location.to_vector()
         self._mesh.clock.call_at(round((now_s + STEP_S) * NS_PER_S), self._step, None)
 
+    def commands(self) -> list[int]:
+        return [m.command for m in self._down.sent if m.get_type() == "COMMAND_LONG"]
+
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
-        self._goals.append((Location(latitude, longitude, height), height <= 0.0))
+        self._goals.append((Location(latitude, longitude, height), height <= 0.0, False))
 
     def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
         hover_m = LIMITS.layer_height_m(self._node_id)
-        self._goals.append((Location(latitude, longitude, hover_m), False))
+        self._goals.append((Location(latitude, longitude, hover_m), False, True))
 
     def get_location(self) -> Location:
         if self._status.location is None:
@@ -83,6 +88,12 @@ class VirtualEngine(IDroneEngine):
 
     def why_not_fly(self) -> str:
         return self._status.why_not_fly
+
+    def why_not_repair(self) -> str:
+        return self._status.why_not_repair
+
+    def why_ended(self) -> str:
+        return self._status.ended
 
     def is_flying(self) -> bool:
         return bool(self._goals) or self._status.is_flying
@@ -144,5 +155,33 @@ def test_layout_202_without_node_1_is_repaired_by_drones_that_really_fly(kind: A
             height_m = LIMITS.layer_height_m(node_id)
             assert mesh.engines[node_id].get_location().height == pytest.approx(height_m, abs=1.0)
             assert mesh.engines[node_id].vehicle.body.armed
+    finally:
+        mesh.stop()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [ARDUPILOT, PX4], ids=lambda a: a.name)
+def test_a_drone_whose_pilot_chose_to_hover_is_not_flown_by_a_repair(kind: Autopilot) -> None:
+    mesh = FlyingMesh(kind, seed=4)
+    for node_id, east_m in ((0, 0.0), (1, 6.0), (2, 8.0)):
+        mesh.add(node_id, Location(0.0, east_m, 0.0))
+    try:
+        assert mesh.run_until(mesh.all_connected, within_s=60.0)
+        mesh.run_for(30.0)
+        gateway, two = mesh.nodes[0].component, mesh.engines[2]
+        assert gateway.send_goal_request_to_drone(2, 0.0, 30.0, 3, mesh.now_s())
+        assert mesh.run_until(lambda: two.get_location().longitude > 9.0, within_s=60.0)
+        two.vehicle.choose_mode(Mode.HOLD)  # in LOITER or HOLD, the pilot flies
+        mesh.run_for(30.0)
+        (order,) = gateway.get_orders()
+        hold = kind.mode_name(kind.hold_mode)
+        assert order.reason.startswith(f"{hold} was chosen: the pilot flies; ")
+        place, commands = two.get_location(), len(two.commands())
+        mesh.power(0, False)  # the gateway falls silent
+        mesh.run_for(150.0)
+        assert not mesh.nodes[2].component.get_connected_to_gateway()
+        assert two.vehicle.mode is Mode.HOLD
+        assert two.get_location().distance_m(place) < 0.5
+        assert len(two.commands()) == commands
     finally:
         mesh.stop()

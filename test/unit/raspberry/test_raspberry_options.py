@@ -119,7 +119,7 @@ def test_each_option_reaches_what_it_is_for():
         "ChildTableTree "
         "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
         "--max-distance 200 --speed 3 --min-battery 25 --cruise-height 8 --layers 1.5 --hover 12 "
-        "--may-arm --may-take-off --may-change-mode"
+        "--may-arm --may-take-off --may-change-mode --orders-may-take-back 60"
     )
     assert parse_router(line.split(), {}) == Options(
         node_id=253,
@@ -140,7 +140,7 @@ def test_each_option_reaches_what_it_is_for():
             "mavlink:/dev/serial0,921600",
             Origin(52.0907, 5.1214, 3.0),
             FlightLimits(40.0, 200.0, 3.0, 25.0, 8.0, 1.5, 12.0),
-            Permissions(may_arm=True, may_take_off=True, may_change_mode=True),
+            Permissions(True, True, True, orders_may_take_back_s=60.0),
         ),
         fleet=FleetOptions(),
         air=AirOptions(),

@@ -86,6 +86,14 @@ class OrderIntake:
             self._parts.report(MeshEventKind.FLIGHT_ORDERED, gateway, f"to {goal.in_words()}")
             self._took_off()
 
+    def on_foreign_order(self, order: GoToLocationMessage, number: int, passed_by: int) -> None:
+        """An order from a neighbour whose places may refer to another frame: not flown."""
+        foreign = _KnownOrder(order.creator, number, order.location, OrderOutcome.REFUSED)
+        reason = f"node {passed_by}, which passed the order on, has another --origin"
+        if number and self._find(order.creator, number) is None:
+            self._remember(foreign)
+        self._reply(foreign, OrderOutcome.REFUSED, reason)
+
     def on_query(self, gateway: int, number: int) -> None:
         """A gateway queries the state of an order."""
         known = self._find(gateway, number)
@@ -100,16 +108,17 @@ class OrderIntake:
         orders = self._under_way()
         if not orders:
             return
-        here = self._parts.pilot.location()
+        pilot = self._parts.pilot
+        here = pilot.location()
+        why = pilot.why_ended() or pilot.why_not_fly() or pilot.flight_end
         for order in orders:
             if here is None:
-                self._reply(order, OrderOutcome.GIVEN_UP, "its place is not known")
+                self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; its place is not known")
                 continue
             off_m = here.distance_m(order.goal)
             if off_m <= ARRIVED_WITHIN_M:
                 self._reply(order, OrderOutcome.ARRIVED)
             else:
-                why = self._parts.pilot.why_not_fly() or self._parts.pilot.flight_end
                 self._reply(order, OrderOutcome.GIVEN_UP, f"{why}; {off_m:.1f} m from the goal")
 
     def on_due(self) -> None:

@@ -125,7 +125,7 @@ class IRepairActions(abc.ABC):
 
     @abc.abstractmethod
     def why_not_fly(self) -> str:
-        """Why the drone cannot fly; empty if it can."""
+        """Why the drone cannot fly for a repair; empty if it can."""
 
     @abc.abstractmethod
     def was_at(self, step: Step) -> bool:

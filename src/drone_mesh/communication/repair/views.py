@@ -107,7 +107,7 @@ class RepairViews(IRepairActions):
         return self._parts.pilot.location()
 
     def why_not_fly(self) -> str:  # noqa: D102
-        return self._parts.pilot.why_not_fly()
+        return self._parts.pilot.why_not_repair()
 
     def was_at(self, step: Step) -> bool:  # noqa: D102
         radius_m = self.clearance_m * (2 * PITCH if step.home else 1.0)

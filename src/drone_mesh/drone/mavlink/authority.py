@@ -1,7 +1,8 @@
 """Authority: who may fly the drone, this program or the human pilot, and why.
 
 The human pilot always has priority. This program flies only while the autopilot is in the mode
-meant for it.
+meant for it. It leaves a mode that somebody else chose only for an order, and only if the operator
+permits that; a repair never does.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from drone_mesh.drone.mavlink.autopilots import Autopilot
 from drone_mesh.drone.mavlink.flight_area import FlightArea
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.drone.mavlink.mode_choice import Chooser, ModeChoice
 from drone_mesh.drone.mavlink.pilot_status import Phase
 from drone_mesh.drone.mavlink.telemetry import Telemetry
 
@@ -23,11 +25,11 @@ class Authority:
         limits: FlightLimits,
         permissions: Permissions,
     ) -> None:
+        self.choice = ModeChoice(telemetry)
         self._telemetry = telemetry
         self._area = area
         self._limits = limits
         self._permissions = permissions
-        self.we_landed = False  # the autopilot is in its landing mode because we ordered it
 
     def trouble(self, now_s: float) -> str:
         """Why no flight is possible now, under any control; empty if one is."""
@@ -57,8 +59,11 @@ class Authority:
             return "the pilot moved the sticks"
         return ""
 
-    def why_not(self, now_s: float, phase: Phase) -> str:
-        """Why a goal would be refused now; empty if it would not."""
+    def why_not(self, now_s: float, phase: Phase, for_repair: bool = False) -> str:
+        """Why a goal would be refused now; empty if it would not.
+
+        `for_repair`: the goal of a repair, not of an order.
+        """
         trouble = self.trouble(now_s)
         if trouble:
             return trouble
@@ -68,27 +73,39 @@ class Authority:
         on_ground = telemetry.on_ground(now_s)
         if phase is Phase.LANDING:
             return "landing, as ordered"
-        if telemetry.mode != autopilot.own_mode:
-            name = autopilot.mode_name(telemetry.mode)
-            own = autopilot.mode_name(autopilot.own_mode)
-            if not self._may_leave(telemetry.mode, autopilot, bool(on_ground)):
-                hold = autopilot.mode_name(autopilot.hold_mode)
-                return f"in {name}, flown by its pilot: this needs {own} (or {hold})"
-            if not may.may_change_mode:
-                return f"in {name}: the pilot has to choose {own}, or --may-change-mode"
+        mode = self._why_not_leave(now_s, autopilot, bool(on_ground), for_repair)
+        if mode:
+            return mode
         if not telemetry.armed and not may.may_arm:
             return "not armed: the pilot has to arm, or --may-arm"
         if on_ground and not may.may_take_off:
             return "on the ground: the pilot has to take off, or --may-take-off"
         return ""
 
-    def _may_leave(self, mode: int, autopilot: Autopilot, on_ground: bool) -> bool:
-        if mode == autopilot.hold_mode:
-            return True
-        return self.we_landed and mode == autopilot.land_mode and on_ground
+    def _why_not_leave(
+        self, now_s: float, autopilot: Autopilot, on_ground: bool, for_repair: bool
+    ) -> str:
+        """Why this program must not change the mode for a flight; empty if it may, or need not."""
+        mode, choice, may = self._telemetry.mode, self.choice, self._permissions
+        if mode == autopilot.own_mode:
+            return ""
+        name, own = autopilot.mode_name(mode), autopilot.mode_name(autopilot.own_mode)
+        landed = mode == autopilot.land_mode and choice.by is Chooser.ENGINE and on_ground
+        if not landed:
+            pause_s = None if for_repair else may.orders_may_take_back_s
+            is_taken = choice.by is Chooser.OTHERS and pause_s is None
+            if mode != autopilot.hold_mode or is_taken:
+                return f"in {name}, flown by its pilot: this needs {own}"
+            if choice.by is Chooser.OTHERS and pause_s is not None:
+                rest_s = choice.since_s + pause_s - now_s
+                if rest_s > 0.0:
+                    return f"in {name}, flown by its pilot: not yet, for {rest_s:.0f} s"
+        if not may.may_change_mode:
+            return f"in {name}: the pilot has to choose {own}, or --may-change-mode"
+        return ""
 
-    def why_let_go(self, now_s: float, phase: Phase) -> str:
-        """Why the current flight must end; empty if it continues."""
+    def why_let_go(self, now_s: float, phase: Phase, since_s: float, for_repair: bool) -> str:
+        """Why the current flight must end, in this phase since `since_s`; empty: it continues."""
         telemetry = self._telemetry
         trouble = self.trouble(now_s)
         autopilot = telemetry.autopilot
@@ -99,10 +116,10 @@ class Authority:
             if phase in (Phase.TAKING_OFF, Phase.FLYING) and not telemetry.armed:
                 return "disarmed"
             return ""
-        if phase is Phase.CHANGING_MODE and self._may_leave(
-            mode, autopilot, bool(telemetry.on_ground(now_s))
-        ):
-            return ""
+        if phase is Phase.CHANGING_MODE and not self.choice.was_made_after(since_s):
+            on_ground = bool(telemetry.on_ground(now_s))
+            if not self._why_not_leave(now_s, autopilot, on_ground, for_repair):
+                return ""
         if phase is Phase.LANDING and mode == autopilot.land_mode:
             return ""
         return f"{autopilot.mode_name(mode)} was chosen: the pilot flies"

@@ -73,7 +73,9 @@ class Commander:
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate_hz)
                 )
 
-    def command(self, command: int, parameters: tuple[float, ...], now_s: float) -> str:
+    def command(
+        self, command: int, parameters: tuple[float, ...], now_s: float, tries: int = COMMAND_TRIES
+    ) -> str:
         """Send this command repeatedly until the caller sees its effect and stops calling.
 
         Returns why it will not be carried out, once that is known, otherwise an empty string. A
@@ -83,7 +85,7 @@ class Commander:
             self._command = (command, parameters)
             self._tries, self._refusal, self._try_due_s = 0, "", now_s
         if not self._refusal and now_s >= self._try_due_s:
-            if self._tries == COMMAND_TRIES:
+            if self._tries >= tries:
                 self._refusal = "the autopilot did not carry it out"
             else:
                 self._tries += 1

@@ -43,7 +43,7 @@ class MavlinkEngine(IDroneEngine):
         self._limits = limits
         self._link = MavlinkLink(address)
         self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send)
-        self._goals: deque[tuple[Location, bool]] = deque()  # and whether it lands there
+        self._goals: deque[tuple[Location, bool, bool]] = deque()  # lands there; for a repair
         self._latest = (PilotStatus(), time.monotonic())
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"mavlink {node_id}", daemon=True)
@@ -51,7 +51,8 @@ class MavlinkEngine(IDroneEngine):
 
     def set_goal(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there, and land if the height is 0. Raises GoalRefused with the reason."""
-        self._take(Location(latitude, longitude, height), lands=height <= 0.0)
+        why_not = self.status().why_not_fly
+        self._take(Location(latitude, longitude, height), height <= 0.0, False, why_not)
 
     def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there and hover: at --hover, or else at the drone's current height."""
@@ -65,7 +66,7 @@ class MavlinkEngine(IDroneEngine):
                 if here is not None and in_air
                 else self._limits.layer_height_m(self._node_id)
             )
-        self._take(Location(latitude, longitude, hover_m), lands=False)
+        self._take(Location(latitude, longitude, hover_m), False, True, status.why_not_repair)
 
     def get_location(self) -> Location:
         """The drone's position. Raises LocationUnknown with the reason."""
@@ -77,6 +78,14 @@ class MavlinkEngine(IDroneEngine):
     def why_not_fly(self) -> str:
         """Why it cannot fly to a goal now; empty if it can."""
         return self.status().why_not_fly
+
+    def why_not_repair(self) -> str:
+        """Why it cannot fly for a repair: also if anybody else chose the mode that it is in."""
+        return self.status().why_not_repair
+
+    def why_ended(self) -> str:
+        """Why its last flight ended before its goal."""
+        return self.status().ended
 
     def is_flying(self) -> bool:
         """Whether a flight to a goal is under way."""
@@ -95,7 +104,9 @@ class MavlinkEngine(IDroneEngine):
         status, taken_s = self._latest
         if time.monotonic() - taken_s > STALE_S:
             silent = "the engine does not answer"
-            return PilotStatus(location_trouble=silent, why_not_fly=silent)
+            return PilotStatus(
+                location_trouble=silent, why_not_fly=silent, why_not_repair=silent, ended=silent
+            )
         return status
 
     def close(self) -> None:
@@ -103,13 +114,14 @@ class MavlinkEngine(IDroneEngine):
         self._ended.set()
         self._thread.join()
 
-    def _take(self, goal: Location, lands: bool) -> None:
-        status = self.status()
-        if status.why_not_fly:
-            raise GoalRefused(f"the drone cannot fly: {status.why_not_fly}")
-        assert status.home is not None  # otherwise there was a reason
-        self._limits.check(goal, status.home)
-        self._goals.append((goal, lands))
+    def _take(self, goal: Location, lands: bool, for_repair: bool, why_not: str) -> None:
+        if why_not:
+            raise GoalRefused(f"the drone cannot fly: {why_not}")
+        home = self.status().home
+        if home is None:  # the status has become stale since
+            raise GoalRefused("the drone cannot fly: its home is not known")
+        self._limits.check(goal, home)
+        self._goals.append((goal, lands, for_repair))
 
     def _run(self) -> None:
         tick_due_s = 0.0
@@ -127,9 +139,9 @@ class MavlinkEngine(IDroneEngine):
 
     def _tick(self, now_s: float) -> None:
         while self._goals:
-            goal, lands = self._goals[0]
+            goal, lands, for_repair = self._goals[0]
             try:
-                self._pilot.set_goal(goal, lands, now_s)
+                self._pilot.set_goal(goal, lands, now_s, for_repair)
             except GoalRefused as error:
                 _log.warning("node %d: the goal is refused: %s", self._node_id, error)
             self._pilot.tick(now_s)

@@ -73,3 +73,18 @@ class Permissions:
     may_arm: bool = False
     may_take_off: bool = False
     may_change_mode: bool = False  # from holding a position to following this program
+    orders_may_take_back_s: float | None = None
+    """How long after somebody else chose to hold the position an order may end that; None: never.
+
+    A repair never may.
+    """
+
+    def __post_init__(self) -> None:
+        """Raise ConfigurationError for values out of range."""
+        pause_s = self.orders_may_take_back_s
+        if pause_s is None:
+            return
+        if not 0.0 <= pause_s < math.inf:
+            raise ConfigurationError(f"--orders-may-take-back {pause_s:g} is not a time in seconds")
+        if not self.may_change_mode:
+            raise ConfigurationError("--orders-may-take-back needs --may-change-mode")

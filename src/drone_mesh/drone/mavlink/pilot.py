@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.authority import Authority
-from drone_mesh.drone.mavlink.commander import Commander, ParameterCheck
+from drone_mesh.drone.mavlink.commander import COMMAND_TRIES, Commander, ParameterCheck
 from drone_mesh.drone.mavlink.flight_area import FlightArea
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot_status import UNDER_WAY, Phase, PilotStatus
@@ -28,6 +28,7 @@ TARGETS_BEFORE_MODE_S = 1.0  # PX4 needs targets for a second before it enters O
 TAKE_OFF_M = 3.0  # our choice: above home, before the route begins
 TAKEN_OFF_WITHIN_M = 1.0  # our choice
 TAKE_OFF_WITHIN_S = 20.0  # our choice; if it is armed but still on the ground then, it gives up
+_MODE_CHANGED = (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)
 
 _log = logging.getLogger(__name__)
 
@@ -55,6 +56,8 @@ class MavlinkPilot:
         self._phase_since_s = -math.inf
         self._goal: Location | None = None
         self._lands = False
+        self._for_repair = False
+        self._ended = ""  # why the last flight ended before its goal
         self._route: Route | None = None
         self._hold: Location | None = None
         self._target_due_s = -math.inf
@@ -64,22 +67,29 @@ class MavlinkPilot:
         """Process a message from the link."""
         if not self._telemetry.on_message(message, now_s):
             return
-        if message.get_type() == "COMMAND_ACK":
+        if message.get_type() == "HEARTBEAT":
+            self._authority.choice.on_heartbeat(now_s)
+        elif message.get_type() == "COMMAND_ACK":
             self._commander.on_ack(message)
+            self._on_ack(message)
         elif message.get_type() == "PARAM_VALUE":
             self._parameters.on_value(message)
 
-    def set_goal(self, goal: Location, lands: bool, now_s: float) -> None:
-        """Fly there. Raises GoalRefused for a position outside the limits, or if it cannot fly."""
+    def set_goal(self, goal: Location, lands: bool, now_s: float, for_repair: bool = False) -> None:
+        """Fly there. Raises GoalRefused for a position outside the limits, or if it cannot fly.
+
+        `for_repair`: to repair the mesh, not by an order.
+        """
         if (goal, lands) == (self._goal, self._lands):
             return
-        reason = self._authority.why_not(now_s, self._phase)
+        reason = self._authority.why_not(now_s, self._phase, for_repair)
         if reason:
             raise GoalRefused(f"the drone cannot fly: {reason}")
         home = self._area.home()
         assert home is not None  # otherwise there was a reason
         self._limits.check(goal, home)
-        self._goal, self._lands = goal, lands
+        self._goal, self._lands, self._for_repair = goal, lands, for_repair
+        self._ended = ""
         _log.info(
             "node %d: the drone flies to latitude %g m, longitude %g m, height %g m%s",
             self._node_id,
@@ -99,10 +109,13 @@ class MavlinkPilot:
         self._commander.tick(now_s)
         self._parameters.tick(now_s)
         if self._phase is not Phase.IDLE:
-            reason = self._authority.why_let_go(now_s, self._phase)
+            reason = self._why_let_go(now_s)
             if reason:
                 self._let_go(reason, now_s)
         self._act(passed_s, now_s)
+
+    def _why_let_go(self, now_s: float) -> str:
+        return self._authority.why_let_go(now_s, self._phase, self._phase_since_s, self._for_repair)
 
     def status(self, now_s: float) -> PilotStatus:
         """The current status."""
@@ -115,6 +128,8 @@ class MavlinkPilot:
             location_trouble=trouble,
             home=self._area.home(),
             why_not_fly=self._authority.why_not(now_s, self._phase),
+            why_not_repair=self._authority.why_not(now_s, self._phase, for_repair=True),
+            ended=self._ended,
             autopilot=autopilot.name if autopilot else "",
             mode=autopilot.mode_name(telemetry.mode) if autopilot else "",
             armed=telemetry.armed,
@@ -129,6 +144,7 @@ class MavlinkPilot:
         telemetry = self._telemetry
         was, self._goal, self._route = self._phase, None, None
         self._commander.no_command()
+        self._authority.choice.withdraw()
         here = self._area.here(now_s)
         autopilot = telemetry.autopilot
         ours = autopilot is not None and telemetry.mode == autopilot.own_mode
@@ -140,7 +156,14 @@ class MavlinkPilot:
             self._hold = None
             self._enter(Phase.IDLE, now_s)
         if was in UNDER_WAY:
+            self._ended = reason
             _log.warning("node %d: the flight ends: %s", self._node_id, reason)
+
+    def _on_ack(self, message: Message) -> None:
+        autopilot = self._telemetry.autopilot
+        done = (message.command, message.result) == _MODE_CHANGED
+        if done and self._phase is Phase.CHANGING_MODE and autopilot is not None:
+            self._authority.choice.accepted(autopilot.own_mode)
 
     # The flight ------------------------------------------------------------------------------
 
@@ -183,7 +206,6 @@ class MavlinkPilot:
         autopilot = telemetry.autopilot
         assert autopilot is not None  # otherwise it has let go
         if telemetry.mode == autopilot.own_mode:
-            self._authority.we_landed = False
             self._enter(Phase.ARMING, now_s)
             return
         if autopilot.wants_targets_beforehand:
@@ -197,6 +219,8 @@ class MavlinkPilot:
                 *autopilot.mode_parameters(autopilot.own_mode),
             ),
             now_s,
+            # In the air a repetition could undo what the pilot has chosen since.
+            tries=COMMAND_TRIES if telemetry.on_ground(now_s) else 1,
         )
 
     def _arm(self, now_s: float) -> None:
@@ -268,11 +292,17 @@ class MavlinkPilot:
             return
         autopilot = telemetry.autopilot
         if autopilot is not None and telemetry.mode != autopilot.land_mode:
-            self._authority.we_landed = True
+            self._authority.choice.command(autopilot.land_mode)
             self._command(mavlink.MAV_CMD_NAV_LAND, (), now_s)
 
-    def _command(self, command: int, parameters: tuple[float, ...], now_s: float) -> None:
-        refusal = self._commander.command(command, parameters, now_s)
+    def _command(
+        self,
+        command: int,
+        parameters: tuple[float, ...],
+        now_s: float,
+        tries: int = COMMAND_TRIES,
+    ) -> None:
+        refusal = self._commander.command(command, parameters, now_s, tries)
         if refusal:
             self._let_go(f"{self._phase.value}: {refusal}", now_s)
 

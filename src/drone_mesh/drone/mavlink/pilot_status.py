@@ -32,6 +32,8 @@ class PilotStatus:
     location_trouble: str = "no heartbeat from an ArduPilot or PX4 autopilot yet"
     home: Location | None = None
     why_not_fly: str = "no heartbeat from an ArduPilot or PX4 autopilot yet"
+    why_not_repair: str = "no heartbeat from an ArduPilot or PX4 autopilot yet"
+    ended: str = ""  # why the last flight ended before its goal; empty: it did not
     autopilot: str = ""
     mode: str = ""
     armed: bool = False

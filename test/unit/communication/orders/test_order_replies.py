@@ -96,6 +96,27 @@ def test_a_drone_that_does_not_set_out_says_so():
     assert said == "the drone did not set out; 20.0 m from the goal"
 
 
+def test_a_flight_that_the_engine_ended_is_given_up_in_the_engine_s_own_words():
+    rig = drone_rig()
+    rig.hear(f"00 00 06 01 01 {TO_Y_2} 07 00")
+    rig.forget()
+    rig.engine.ended = "LOITER was chosen: the pilot flies"
+    rig.engine.grounded = "in LOITER, flown by its pilot until he chooses GUIDED"
+    fly_to(rig, Location(-1.0, 0.0, 0.0))
+    words = "".join(text for _, _, text in replies(rig))
+    assert words == "LOITER was chosen: the pilot flies; 3.0 m from the goal"
+
+
+def test_a_flight_that_ends_at_an_unknown_place_is_given_up_with_the_engine_s_reason():
+    rig = drone_rig()
+    rig.hear(f"00 00 06 01 01 {TO_Y_2} 07 00")
+    rig.forget()
+    rig.engine.ended, rig.engine.place = "the GPS has no 3D fix", None
+    rig.wait(11.0)
+    words = "".join(text for _, _, text in replies(rig))
+    assert words == "the GPS has no 3D fix; its place is not known"
+
+
 def test_a_refusal_carries_its_reason_in_as_many_packets_as_it_needs():
     rig = drone_rig()
     rig.engine.grounded = "it stands on the ground"

@@ -446,6 +446,14 @@ def test_after_one_step_back_the_next_one_is_to_the_gateway():
     assert rig.engine.goals[:2] == [NEIGHBOUR_PLACE, BESIDE_GATEWAY]
 
 
+def test_a_drone_that_its_pilot_keeps_from_repairs_stays_and_says_why():
+    rig = lone_rig()
+    rig.engine.kept_by_pilot = "in LOITER, flown by its pilot"
+    rig.wait_until(200.0)
+    assert rig.engine.goals == []
+    assert rig.mesh.get_repair_status().reason == "cannot fly: in LOITER, flown by its pilot"
+
+
 def test_a_router_that_knows_no_place_at_all_stays():
     rig = Rig()
     rig.wait_until(200.0)

@@ -1,0 +1,364 @@
+"""Who may leave a mode: every mode of every autopilot, and every way into it.
+
+An aircraft that anybody but the engine put into a mode belongs to its pilot until he gives it back
+by choosing GUIDED or OFFBOARD. A repair never takes it; an order only with --orders-may-take-back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Callable
+
+import pytest
+from mavlink_rig import ALL, ARDUPILOT, Rig
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot, px4_mode
+from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
+from drone_mesh.drone.mavlink.pilot_status import Phase
+from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_number
+from drone_mesh.errors import ConfigurationError, GoalRefused
+
+BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)
+TAKE_BACK = replace(ALL, orders_may_take_back_s=0.0)
+
+# Who may leave the mode, once somebody chose it: "engine" flies in it, "order" leaves it with
+# --orders-may-take-back, "pilot" alone leaves it. Nothing but the pilot leaves any other mode.
+ENGINE, ORDER, PILOT = "engine", "order", "pilot"
+
+COPTER_MODES = {
+    "STABILIZE": (0, PILOT),
+    "ACRO": (1, PILOT),
+    "ALT_HOLD": (2, PILOT),
+    "AUTO": (3, PILOT),
+    "GUIDED": (4, ENGINE),
+    "LOITER": (5, ORDER),
+    "RTL": (6, PILOT),
+    "CIRCLE": (7, PILOT),
+    "LAND": (9, PILOT),
+    "DRIFT": (11, PILOT),
+    "SPORT": (13, PILOT),
+    "FLIP": (14, PILOT),
+    "AUTOTUNE": (15, PILOT),
+    "POSHOLD": (16, PILOT),
+    "BRAKE": (17, PILOT),
+    "THROW": (18, PILOT),
+    "AVOID_ADSB": (19, PILOT),
+    "GUIDED_NOGPS": (20, PILOT),
+    "SMART_RTL": (21, PILOT),
+    "FLOWHOLD": (22, PILOT),
+    "FOLLOW": (23, PILOT),
+    "ZIGZAG": (24, PILOT),
+    "SYSTEMID": (25, PILOT),
+    "AUTOROTATE": (26, PILOT),
+    "AUTO_RTL": (27, PILOT),
+    "TURTLE": (28, PILOT),
+    "a mode of a later release": (99, PILOT),
+}
+PX4_MODES = {  # px4_custom_mode.h
+    "MANUAL": (px4_mode(1), PILOT),
+    "ALTCTL": (px4_mode(2), PILOT),
+    "POSCTL": (px4_mode(3), PILOT),
+    "ORBIT": (px4_mode(3, 1), PILOT),
+    "SLOW": (px4_mode(3, 2), PILOT),
+    "AUTO.READY": (px4_mode(4, 1), PILOT),
+    "AUTO.TAKEOFF": (px4_mode(4, 2), PILOT),
+    "HOLD": (px4_mode(4, 3), ORDER),
+    "AUTO.MISSION": (px4_mode(4, 4), PILOT),
+    "AUTO.RTL": (px4_mode(4, 5), PILOT),
+    "AUTO.LAND": (px4_mode(4, 6), PILOT),
+    "AUTO.FOLLOW_TARGET": (px4_mode(4, 8), PILOT),
+    "AUTO.PRECLAND": (px4_mode(4, 9), PILOT),
+    "AUTO.VTOL_TAKEOFF": (px4_mode(4, 10), PILOT),
+    "EXTERNAL1": (px4_mode(4, 11), PILOT),
+    "ACRO": (px4_mode(5), PILOT),
+    "OFFBOARD": (px4_mode(6), ENGINE),
+    "STABILIZED": (px4_mode(7), PILOT),
+    "RATTITUDE": (px4_mode(8), PILOT),
+    "SIMPLE": (px4_mode(9), PILOT),
+    "TERMINATION": (px4_mode(10), PILOT),
+}
+EVERY_MODE = pytest.mark.parametrize(
+    ("autopilot", "mode", "who"),
+    [
+        pytest.param(autopilot, *row, id=f"{autopilot.name} {name}")
+        for autopilot, table in ((ARDUPILOT, COPTER_MODES), (PX4, PX4_MODES))
+        for name, row in table.items()
+    ],
+)
+
+
+def in_flight(autopilot: Autopilot, permissions: Permissions = ALL) -> Rig:
+    """The pilot gave it to the mesh in the air, and it flies as ordered."""
+    rig = Rig(autopilot, permissions)
+    rig.vehicle.lift(8.0)
+    rig.ready()
+    rig.vehicle.choose_mode(Mode.FOLLOW)
+    rig.run_until("it can fly", lambda: not rig.status().why_not_fly, within_s=3.0)
+    rig.goal(100.0, 0.0, 8.0)
+    rig.run_until("it is on its way", lambda: rig.place.latitude > 10.0)
+    return rig
+
+
+def refuses(rig: Rig, ask: Callable[[float, float, float], None]) -> bool:
+    try:
+        ask(50.0, 20.0, 8.0)
+    except GoalRefused:
+        return True
+    return False
+
+
+def test_the_tables_have_every_mode_of_the_dialect() -> None:
+    known = {n for n, e in mavlink.enums["COPTER_MODE"].items() if "END" not in e.name}
+    assert known <= {number for number, _ in COPTER_MODES.values()}
+    assert set(PX4.mode_names) <= {number for number, _ in PX4_MODES.values()}
+
+
+@EVERY_MODE
+@pytest.mark.parametrize("permissions", [ALL, TAKE_BACK], ids=["default", "take back"])
+def test_a_mode_that_somebody_chose_in_flight_is_left_by_nobody_else(
+    autopilot: Autopilot, mode: int, who: str, permissions: Permissions
+) -> None:
+    rig = in_flight(autopilot, permissions)
+    rig.shown_mode = mode
+    rig.run(3.0)
+    assert (rig.status().phase is Phase.FLYING) is (who == ENGINE)
+    order_goes = who == ENGINE or (who == ORDER and permissions is TAKE_BACK)
+    assert refuses(rig, rig.repair) is (who != ENGINE)
+    assert (rig.status().why_not_repair == "") is (who == ENGINE)
+    rig.run(20.0)  # waiting does not help
+    assert refuses(rig, rig.repair) is (who != ENGINE)
+    assert rig.commands() == []
+    assert (rig.status().why_not_fly == "") is order_goes
+    assert refuses(rig, rig.goal) is not order_goes
+
+
+@EVERY_MODE
+def test_a_mode_that_was_found_in_the_air_counts_as_chosen(
+    autopilot: Autopilot, mode: int, who: str
+) -> None:
+    rig = Rig(autopilot)
+    rig.vehicle.lift(8.0)
+    rig.shown_mode = mode
+    rig.ready()
+    assert refuses(rig, rig.repair) is (who != ENGINE)
+    assert refuses(rig, rig.goal) is (who != ENGINE)
+
+
+@EVERY_MODE
+def test_from_the_ground_only_a_drone_that_nobody_has_touched_is_taken(
+    autopilot: Autopilot, mode: int, who: str
+) -> None:
+    rig = Rig(autopilot)
+    rig.shown_mode = mode
+    rig.ready()
+    assert (rig.status().why_not_repair == "") is (who != PILOT)
+    assert (rig.status().why_not_fly == "") is (who != PILOT)
+    rig.vehicle.arm()  # the pilot does
+    rig.run(1.5)
+    assert (rig.status().why_not_repair == "") is (who == ENGINE)
+    assert (rig.status().why_not_fly == "") is (who == ENGINE)
+
+
+@pytest.mark.parametrize(
+    "mode", [n for n, e in mavlink.enums["PLANE_MODE"].items() if "END" not in e.name]
+)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        mavlink.MAV_TYPE_FIXED_WING,
+        mavlink.MAV_TYPE_VTOL_TILTROTOR,
+        mavlink.MAV_TYPE_VTOL_QUADROTOR,
+    ],
+)
+def test_a_plane_is_flown_in_no_mode_at_all(kind: int, mode: int) -> None:
+    rig = Rig()
+    rig.vehicle.faults.silent = True
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    for _ in range(5):
+        rig.up.send(
+            mavlink.MAVLink_heartbeat_message(
+                kind, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, armed, mode, 4, 3
+            )
+        )
+        rig.run(1.0)
+    assert rig.status().why_not_repair == "the vehicle is not a multirotor with ArduPilot or PX4"
+    assert refuses(rig, rig.repair)
+    assert refuses(rig, rig.goal)
+    assert {m.get_type() for m in rig.down.sent} == {"HEARTBEAT"}
+
+
+# The ways in ---------------------------------------------------------------------------------
+
+
+def _rc(rig: Rig) -> None:
+    rig.vehicle.choose_mode(Mode.HOLD)
+
+
+def _gcs(rig: Rig) -> None:
+    codec, station = mavlink.MAVLink(None), mavlink.MAVLink(None, 254, 190)
+    autopilot = rig.vehicle.autopilot
+    hold = mode_number(autopilot, Mode.HOLD)
+    command = mavlink.MAVLink_command_long_message(
+        1, 1, mavlink.MAV_CMD_DO_SET_MODE, 0, 1.0, *autopilot.mode_parameters(hold), 0, 0, 0, 0
+    )
+    (heard,) = codec.parse_buffer(command.pack(station))
+    rig.vehicle.on_message(heard, rig.now_s)
+
+
+def _failsafe(rig: Rig) -> None:
+    rig.vehicle._fail_to(Mode.HOLD)  # as PX4 does by default, and ArduPilot with FS_OPTIONS
+
+
+def _node_hung(rig: Rig) -> None:
+    rig.down.broken = True
+    rig.run(10.0)
+    rig.down.broken = False
+
+
+def _fence(rig: Rig) -> None:
+    rig.vehicle.faults.fence_breached = True
+    rig.run(2.0)
+    rig.vehicle.faults.fence_breached = False
+
+
+def _battery(rig: Rig) -> None:
+    rig.vehicle.body.battery_percent = 14.0
+    rig.run(2.0)
+    rig.vehicle.body.battery_percent = 90.0
+
+
+def _ekf(rig: Rig) -> None:
+    rig.vehicle.faults.estimate_good = False
+    rig.run(2.0)
+    rig.vehicle.faults.estimate_good = True
+
+
+@BOTH
+@pytest.mark.parametrize("way_in", [_rc, _gcs, _failsafe, _node_hung, _fence, _battery, _ekf])
+def test_whoever_chose_the_mode_the_aircraft_stays_his_until_it_is_given_back(
+    autopilot: Autopilot, way_in: Callable[[Rig], None]
+) -> None:
+    rig = in_flight(autopilot)
+    way_in(rig)
+    rig.run(3.0)
+    rig.vehicle.in_failsafe = False  # the reason is gone, the mode remains
+    assert rig.vehicle.mode is not Mode.FOLLOW
+    assert not rig.status().is_flying
+    assert rig.status().ended
+    for _ in range(4):
+        rig.run(10.0)
+        assert refuses(rig, rig.repair)
+        assert refuses(rig, rig.goal)
+    assert rig.commands() == []
+    rig.vehicle.lift(8.0)
+    rig.run(3.0)  # PX4 accepts OFFBOARD only while targets arrive
+    rig.vehicle.choose_mode(Mode.FOLLOW)  # the pilot gives it back
+    rig.run_until("it can fly", lambda: not rig.status().why_not_repair, within_s=3.0)
+    rig.repair(50.0, 20.0, 8.0)
+    rig.run_until("it flies", lambda: rig.status().phase is Phase.FLYING)
+
+
+@BOTH
+def test_an_order_takes_a_hovering_drone_back_after_the_time_that_the_operator_set(
+    autopilot: Autopilot,
+) -> None:
+    rig = in_flight(autopilot, replace(ALL, orders_may_take_back_s=60.0))
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.run(5.0)
+    with pytest.raises(GoalRefused, match="flown by its pilot: not yet, for 5[5-9] s"):
+        rig.goal(50.0, 0.0, 8.0)
+    rig.run(56.0)
+    assert "flown by its pilot: this needs" in rig.status().why_not_repair
+    rig.goal(50.0, 0.0, 8.0)
+    rig.reach(Phase.HOLDING)
+    assert rig.status().why_not_repair == ""  # the order gave it back to the mesh
+
+
+@BOTH
+def test_a_drone_that_was_ordered_to_land_may_repair_and_one_that_its_pilot_landed_may_not(
+    autopilot: Autopilot,
+) -> None:
+    rig = in_flight(autopilot)
+    rig.goal(30.0, 0.0, 0.0, lands=True)
+    rig.run_until("it has landed", lambda: rig.status().phase is Phase.IDLE)
+    rig.run(2.0)
+    assert rig.status().why_not_repair == ""
+    rig.repair(0.0, 0.0, 6.0)
+    rig.reach(Phase.HOLDING)
+    rig.vehicle.choose_mode(Mode.LAND)
+    rig.run_until("it has landed", lambda: not rig.vehicle.body.armed)
+    rig.run(2.0)
+    assert "flown by its pilot" in rig.status().why_not_repair
+    assert "flown by its pilot" in rig.status().why_not_fly
+
+
+@BOTH
+def test_a_failsafe_during_an_ordered_landing_makes_it_the_autopilot_s_landing(
+    autopilot: Autopilot,
+) -> None:
+    rig = in_flight(autopilot)
+    rig.goal(30.0, 0.0, 0.0, lands=True)
+    rig.reach(Phase.LANDING)
+    rig.run(3.0)
+    rig.vehicle.in_failsafe = True
+    rig.run(2.0)
+    rig.vehicle.in_failsafe = False
+    rig.run_until("it has landed", lambda: not rig.vehicle.body.armed)
+    rig.run(2.0)
+    assert "flown by its pilot" in rig.status().why_not_repair
+
+
+@BOTH
+def test_the_pilot_who_chooses_again_while_the_mode_changes_is_not_overruled(
+    autopilot: Autopilot,
+) -> None:
+    rig = in_flight(autopilot, TAKE_BACK)
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.run(3.0)
+    rig.goal(50.0, 0.0, 8.0)
+    rig.run_until("it follows", lambda: rig.vehicle.mode is Mode.FOLLOW, within_s=5.0)
+    rig.vehicle.choose_mode(Mode.HOLD)  # before a heartbeat told of the change
+    rig.run(30.0)
+    assert rig.vehicle.mode is Mode.HOLD
+    assert rig.commands() == [mavlink.MAV_CMD_DO_SET_MODE]
+    assert not rig.status().is_flying
+    assert rig.status().ended
+
+
+@BOTH
+def test_a_lost_acknowledgement_does_not_repeat_the_change_of_mode_in_the_air(
+    autopilot: Autopilot,
+) -> None:
+    rig = in_flight(autopilot, TAKE_BACK)
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.run(3.0)
+    rig.goal(50.0, 0.0, 8.0)
+    rig.run_until("it was ordered", lambda: bool(rig.commands()), within_s=5.0)
+    rig.vehicle.choose_mode(Mode.HOLD)
+    rig.up.take()  # the acknowledgement is lost
+    rig.run(30.0)
+    assert rig.commands() == [mavlink.MAV_CMD_DO_SET_MODE]
+    assert rig.vehicle.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize(
+    ("permissions", "why"),
+    [
+        ({"may_change_mode": True, "orders_may_take_back_s": -1.0}, "is not a time"),
+        ({"may_change_mode": True, "orders_may_take_back_s": float("nan")}, "is not a time"),
+        ({"orders_may_take_back_s": 60.0}, "needs --may-change-mode"),
+    ],
+)
+def test_a_permission_that_makes_no_sense_is_refused(permissions, why: str) -> None:
+    with pytest.raises(ConfigurationError, match=f"--orders-may-take-back.* {why}"):
+        Permissions(**permissions)
+
+
+def test_every_reason_of_the_pilot_fits_into_a_reply_of_the_drone() -> None:
+    longest = max(ARDUPILOT.mode_names.values(), key=len)
+    rig = Rig(limits=FlightLimits())
+    rig.shown_mode = next(n for n, name in ARDUPILOT.mode_names.items() if name == longest)
+    reason = f"drone 100 cannot fly: {rig.ready().status().why_not_fly}"
+    assert longest in reason
+    assert len(reason) <= 80  # communication/text_parts.py: 8 parts of 10 bytes
