@@ -31,10 +31,11 @@ class Wire:
         self.waiting: list[Message] = []
         self.sent: list[Message] = []
         self.broken = False
+        self.loses: Callable[[], bool] = lambda: False  # asked for each message
 
     def send(self, message: Message) -> None:
         data = message.pack(self._sender)
-        if self.broken:
+        if self.broken or self.loses():
             return
         for arrived in self._receiver.parse_buffer(data) or ():
             self.sent.append(arrived)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import Any, Callable
+from typing import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import EarthPlace
 from drone_mesh.drone.mavlink.autopilots import Requirement
+from drone_mesh.drone.mavlink.command import Command
 from drone_mesh.drone.mavlink.telemetry import STREAMS_HZ, Message, Telemetry
 
 HEARTBEAT_PERIOD_S = 1.0  # required by MAVLink
 ASK_STREAMS_PERIOD_S = 5.0  # our choice
-COMMAND_PERIOD_S = 1.0  # our choice: an autopilot answers within tens of milliseconds
-COMMAND_TRIES = 3  # our choice
+CARRIED_OUT_WITHIN_S = 8.0  # our choice: reports come every second, and some get lost
+MOST_SERIOUS = mavlink.MAV_SEVERITY_WARNING  # of texts that are reasons; greater is less serious
 PARAMETER_PERIOD_S = 0.5  # our choice
 PARAMETER_TRIES = 6  # our choice, for all names of a requirement together
 
@@ -42,10 +43,7 @@ class Commander:
         self._send = send
         self._heartbeat_due_s = -math.inf
         self._streams_due_s = -math.inf
-        self._command: tuple[int, tuple[float, ...]] | None = None
-        self._tries = 0
-        self._try_due_s = math.inf
-        self._refusal = ""
+        self._current: Command | None = None
 
     def tick(self, now_s: float) -> None:
         """Send whatever is periodically due."""
@@ -74,36 +72,45 @@ class Commander:
                 )
 
     def command(
-        self, command: int, parameters: tuple[float, ...], now_s: float, tries: int = COMMAND_TRIES
+        self,
+        command: int,
+        parameters: tuple[float, ...],
+        now_s: float,
+        within_s: float = CARRIED_OUT_WITHIN_S,
+        once: bool = False,
     ) -> str:
-        """Send this command repeatedly until the caller sees its effect and stops calling.
+        """Send this command until it is acknowledged; the caller stops calling at its effect.
 
-        Returns why it will not be carried out, once that is known, otherwise an empty string. A
-        different command starts over.
+        Returns why it is not carried out, as soon as that is known, otherwise an empty string.
+        `within_s` is the time for its effect; `once`: it is repeated only if the autopilot says
+        that it has not carried it out. A different command starts over.
         """
-        if self._command != (command, parameters):
-            self._command = (command, parameters)
-            self._tries, self._refusal, self._try_due_s = 0, "", now_s
-        if not self._refusal and now_s >= self._try_due_s:
-            if self._tries >= tries:
-                self._refusal = "the autopilot did not carry it out"
-            else:
-                self._tries += 1
-                self._try_due_s = now_s + COMMAND_PERIOD_S
-                self._send_command(command, parameters)
-        return self._refusal
+        current = self._current
+        if current is None or (current.number, current.parameters) != (command, parameters):
+            self._current = current = Command(command, parameters, now_s, within_s, once)
+        if current.is_due(now_s):
+            current.sent_at(now_s)
+            self._send_command(command, parameters, confirmation=current.tries - 1)
+        return current.refusal(now_s)
 
     def no_command(self) -> None:
         """Forget the current command."""
-        self._command = None
+        self._current = None
 
-    def on_ack(self, message: Message) -> None:
+    def words(self) -> str:
+        """What the autopilot said about the current command; empty: nothing."""
+        return "" if self._current is None else self._current.words
+
+    def on_ack(self, message: Message, now_s: float) -> None:
         """COMMAND_ACK."""
-        if self._command is None or message.command != self._command[0]:
-            return
-        done = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
-        if message.result not in done and message.result != mavlink.MAV_RESULT_TEMPORARILY_REJECTED:
-            self._refusal = f"the autopilot refused: {result_name(message.result)}"
+        current = self._current
+        if current is not None and message.command == current.number:
+            current.acknowledged(message.result, now_s)
+
+    def on_text(self, message: Message) -> None:
+        """STATUSTEXT: perhaps why the autopilot refuses the current command."""
+        if self._current is not None and message.severity <= MOST_SERIOUS:
+            self._current.words = str(message.text)
 
     def target(self, place: EarthPlace) -> None:
         """Send the position to fly to now."""
@@ -131,20 +138,16 @@ class Commander:
             )
         )
 
-    def _send_command(self, command: int, parameters: tuple[float, ...]) -> None:
+    def _send_command(
+        self, command: int, parameters: tuple[float, ...], confirmation: int = 0
+    ) -> None:
         telemetry = self._telemetry
         padded = (*parameters, *(0.0,) * (7 - len(parameters)))
         self._send(
             mavlink.MAVLink_command_long_message(
-                telemetry.system_id, telemetry.component_id, command, 0, *padded
+                telemetry.system_id, telemetry.component_id, command, confirmation, *padded
             )
         )
-
-
-def result_name(result: int) -> str:
-    """The name of a MAV_RESULT."""
-    entry: Any = mavlink.enums["MAV_RESULT"].get(result)
-    return str(entry.name)[len("MAV_RESULT_") :].lower() if entry else f"result {result}"
 
 
 class ParameterCheck:

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.authority import Authority
-from drone_mesh.drone.mavlink.commander import COMMAND_TRIES, Commander, ParameterCheck
+from drone_mesh.drone.mavlink.commander import CARRIED_OUT_WITHIN_S, Commander, ParameterCheck
 from drone_mesh.drone.mavlink.flight_area import FlightArea
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.pilot_status import UNDER_WAY, Phase, PilotStatus
@@ -27,7 +27,7 @@ TARGET_PERIOD_S = 0.2  # 5 Hz: PX4 needs at least 2 Hz
 TARGETS_BEFORE_MODE_S = 1.0  # PX4 needs targets for a second before it enters OFFBOARD
 TAKE_OFF_M = 3.0  # our choice: above home, before the route begins
 TAKEN_OFF_WITHIN_M = 1.0  # our choice
-TAKE_OFF_WITHIN_S = 20.0  # our choice; if it is armed but still on the ground then, it gives up
+TAKE_OFF_WITHIN_S = 40.0  # our choice: the motors spool up first, and a climb may be slow
 _MODE_CHANGED = (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)
 
 _log = logging.getLogger(__name__)
@@ -70,8 +70,10 @@ class MavlinkPilot:
         if message.get_type() == "HEARTBEAT":
             self._authority.choice.on_heartbeat(now_s)
         elif message.get_type() == "COMMAND_ACK":
-            self._commander.on_ack(message)
+            self._commander.on_ack(message, now_s)
             self._on_ack(message)
+        elif message.get_type() == "STATUSTEXT":
+            self._commander.on_text(message)
         elif message.get_type() == "PARAM_VALUE":
             self._parameters.on_value(message)
 
@@ -220,7 +222,7 @@ class MavlinkPilot:
             ),
             now_s,
             # In the air a repetition could undo what the pilot has chosen since.
-            tries=COMMAND_TRIES if telemetry.on_ground(now_s) else 1,
+            once=not telemetry.on_ground(now_s),
         )
 
     def _arm(self, now_s: float) -> None:
@@ -245,12 +247,13 @@ class MavlinkPilot:
         if here.height >= height_m - TAKEN_OFF_WITHIN_M and not telemetry.on_ground(now_s):
             self._fly(now_s)
         elif now_s - self._phase_since_s > TAKE_OFF_WITHIN_S:
-            self._let_go("the drone did not take off", now_s)
+            words = self._commander.words() or "it did not reach the height of a take-off"
+            self._let_go(f"{self._phase.value}: {words}", now_s)
         elif not autopilot.takes_off_by_command:
             self._send_target(here._replace(height=height_m), now_s)
         elif telemetry.on_ground(now_s):
             take_off = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m - home.height)
-            self._command(mavlink.MAV_CMD_NAV_TAKEOFF, take_off, now_s)
+            self._command(mavlink.MAV_CMD_NAV_TAKEOFF, take_off, now_s, TAKE_OFF_WITHIN_S)
 
     def _fly(self, now_s: float) -> None:
         here, home = self._area.here(now_s), self._area.home()
@@ -300,9 +303,10 @@ class MavlinkPilot:
         command: int,
         parameters: tuple[float, ...],
         now_s: float,
-        tries: int = COMMAND_TRIES,
+        within_s: float = CARRIED_OUT_WITHIN_S,
+        once: bool = False,
     ) -> None:
-        refusal = self._commander.command(command, parameters, now_s, tries)
+        refusal = self._commander.command(command, parameters, now_s, within_s, once)
         if refusal:
             self._let_go(f"{self._phase.value}: {refusal}", now_s)
 

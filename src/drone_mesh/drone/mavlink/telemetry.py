@@ -41,16 +41,19 @@ MULTIROTORS = frozenset(
     )
 )  # mode numbers of other vehicles have other meanings
 
+HEARTBEAT_HZ = 2.0  # our choice: on a line that loses one in twenty, 3 s without any are rare
+
 STREAMS_HZ = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: HEARTBEAT_HZ,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0,
-    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: 2.0,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: 4.0,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
     mavlink.MAVLINK_MSG_ID_RC_CHANNELS: 2.0,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     mavlink.MAVLINK_MSG_ID_FENCE_STATUS: 1.0,
-    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 2.0,  # ArduPilot
-    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,  # PX4
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 4.0,  # ArduPilot
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 4.0,  # PX4
 }  # requested from the autopilot
 
 
@@ -166,7 +169,9 @@ class Telemetry:
         return now_s - self._sticks_moved_s <= STICKS_REST_S
 
     def streams_missing(self, now_s: float) -> bool:
-        """Whether a report that a flight needs is missing."""
+        """Whether a report that a flight needs is missing, or comes too seldom."""
+        if now_s - self.heartbeat_s > 1.5 / HEARTBEAT_HZ:
+            return True
         times = (self._fix_s, self._estimate_s, self._place_s, self._battery_s, self._landed_s)
         return self.home is None or any(now_s - then > FRESH_S for then in times)
 

@@ -15,5 +15,6 @@ class VehicleFaults:
     positions_stop: bool = False
     fence_breached: bool = False
     refuses_to_arm: bool = False
+    spool_up_s: float = 0.0  # from the acknowledgement of a take-off to the first movement
     battery_known: bool = True
     stick_us: int = 1500  # of the roll stick

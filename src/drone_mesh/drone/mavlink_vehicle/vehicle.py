@@ -63,6 +63,7 @@ class MavlinkVehicle:
         self._target: Location | None = None
         self._target_s = -math.inf
         self._stands_since_s = math.inf
+        self._lifts_s = -math.inf  # when the motors have spooled up
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
         self._reports = Reports(self)
         inquiries = Inquiries(self._reports, self.parameters, self._send, lambda: self.now_s)
@@ -135,6 +136,8 @@ class MavlinkVehicle:
             target, speed_m_s = self._way_home(here)
         elif self.mode in (Mode.PILOT, Mode.HOLD) and self._target is None:
             target = here
+        if self.now_s < self._lifts_s:
+            target = here
         arrived = body.move(target, passed_s, speed_m_s)
         if self.mode is Mode.TAKE_OFF and arrived:
             self._enter(Mode.HOLD)
@@ -191,11 +194,10 @@ class MavlinkVehicle:
             return
         self._enter(mode)
         self.in_failsafe = mode is not Mode.HOLD
-        self._send(
-            mavlink.MAVLink_statustext_message(
-                mavlink.MAV_SEVERITY_CRITICAL, f"failsafe: {mode.value}".encode()
-            )
-        )
+        self._say(mavlink.MAV_SEVERITY_CRITICAL, f"failsafe: {mode.value}")
+
+    def _say(self, severity: int, text: str) -> None:
+        self._send(mavlink.MAVLink_statustext_message(severity, text.encode()))
 
     # Messages --------------------------------------------------------------------------------
 
@@ -266,6 +268,7 @@ class MavlinkVehicle:
                 return int(DENIED)
             self.body.armed = False
         elif self.faults.refuses_to_arm or self.faults.fix_type < mavlink.GPS_FIX_TYPE_3D_FIX:
+            self._say(mavlink.MAV_SEVERITY_CRITICAL, "PreArm: not ready")
             return int(DENIED)
         else:
             self.arm()
@@ -301,6 +304,7 @@ class MavlinkVehicle:
         if not 0.0 < height_m < MOST_DISTANCE_M:
             return int(DENIED)
         self._target = self.body.place._replace(height=height_m)
+        self._lifts_s = self.now_s + self.faults.spool_up_s
         return int(ACCEPTED)
 
     def _obey_reposition(self, message: Message) -> int:
