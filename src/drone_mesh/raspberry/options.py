@@ -43,6 +43,7 @@ from drone_mesh.raspberry.mqtt_options import MqttOptions, add_mqtt_options, mqt
 from drone_mesh.raspberry.wiring_options import add_wiring_options
 
 MOST_EMULATED = 17  # our choice: as in the field case, and what one machine can emulate
+CHECK_DRONE = "check-drone"  # the last argument of raspberry_router
 LOG_LEVELS = ("debug", "info", "warning", "error")
 
 _BROADCASTS = {mode.value: mode for mode in BroadcastMode}
@@ -90,7 +91,9 @@ def parse_router(
 ) -> Options:
     """The options of raspberry_router; invalid ones end the program with a message."""
     parser = _parser(
-        "raspberry_router", "A router of the drone mesh: forwards packets over its radio."
+        "raspberry_router",
+        "A router of the drone mesh: forwards packets over its radio. With check-drone as the last "
+        "argument it prints the parameters of the autopilot that make a flight safe, and ends.",
     )
     node = parser.add_mutually_exclusive_group(required=True)
     node.add_argument(

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-from drone_mesh.raspberry.options import parse_router
+import sys
+
+from drone_mesh.errors import MeshError
+from drone_mesh.raspberry.drone_check import check_drone
+from drone_mesh.raspberry.options import CHECK_DRONE, parse_router
 from drone_mesh.raspberry.program import run
 
 
 def main() -> int:
-    """Run until Ctrl-C or SIGTERM; the exit status."""
-    return run("raspberry_router", parse_router)
+    """Run until Ctrl-C or SIGTERM, or check the drone; the exit status."""
+    if sys.argv[-1] != CHECK_DRONE:
+        return run("raspberry_router", parse_router)
+    try:
+        return check_drone(parse_router(sys.argv[1:-1]))
+    except MeshError as error:
+        print(f"raspberry_router: {error}", file=sys.stderr)
+        return 1

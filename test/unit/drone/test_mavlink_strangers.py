@@ -238,34 +238,3 @@ def test_mavsdk_as_the_vehicle_is_read_and_not_flown_without_an_estimator(
         engine.close()
         relay.socket.close()
     assert "SET_POSITION_TARGET_GLOBAL_INT" not in relay.from_engine
-
-
-# ArduPilot's own simulator -------------------------------------------------------------------
-
-
-@pytest.mark.skipif(
-    "ARDUCOPTER" not in os.environ, reason="ARDUCOPTER=/path/to/arducopter flies it"
-)
-def test_ardupilots_simulator_is_flown(tmp_path: Path) -> None:
-    home = "52.0907,5.1214,3,0"
-    simulator = subprocess.Popen(
-        [os.environ["ARDUCOPTER"], "--model", "+", "--home", home, "--speedup", "5", "-w"],
-        cwd=tmp_path,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-    )
-    permissions = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)
-    try:
-        wait_for("it listens", lambda: not socket.socket().connect_ex(("127.0.0.1", 5760)))
-        engine = MavlinkEngine(1, "tcp:127.0.0.1:5760", ORIGIN, FlightLimits(), permissions)
-        try:
-            wait_for("it reports its mode", lambda: bool(engine.status().mode))
-            wait_for("it can fly", engine.can_fly)
-            engine.set_goal(10.0, 0.0, 5)
-            wait_for("it has arrived", lambda: not engine.is_flying())
-            assert engine.get_location().distance_m(Location(10.0, 0.0, 5.0)) < 1.5
-        finally:
-            engine.close()
-    finally:
-        simulator.kill()
-        simulator.wait()

@@ -16,6 +16,7 @@ class Requirement:
     names: tuple[str, ...]  # in different releases, newest first; one of them exists
     holds: Callable[[float], bool]
     wanted: str  # as text
+    for_example: float  # a value that holds
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class Autopilot:
     land_mode: int
     takes_off_by_command: bool  # otherwise by a target above the ground
     wants_targets_beforehand: bool  # it enters `own_mode` only while targets arrive
+    estimate_message: int  # its report on the quality of its position estimate
     integers_as_bytes: bool  # integer parameters are sent as their bytes in place of the float
     requirements: tuple[Requirement, ...] = field(repr=False)
 
@@ -78,19 +80,21 @@ ARDUPILOT = Autopilot(
     land_mode=mavlink.COPTER_MODE_LAND,
     takes_off_by_command=True,
     wants_targets_beforehand=False,
+    estimate_message=mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
     integers_as_bytes=False,
     requirements=(
-        Requirement(("FS_GCS_ENABLE",), _is_on, "not 0: it goes home or lands without this node"),
+        Requirement(("FS_GCS_ENABLE",), _is_on, "not 0: home, or landing, without this node", 1),
         Requirement(
             ("MAV_GCS_SYSID", "SYSID_MYGCS"),
             lambda value: value == OUR_SYSTEM_ID,
             f"{OUR_SYSTEM_ID}: the node's own system id",
+            OUR_SYSTEM_ID,
         ),
-        Requirement(("FS_THR_ENABLE",), _is_on, "not 0: it acts when the pilot's radio is lost"),
-        Requirement(("FS_EKF_ACTION",), _is_on, "not 0: it acts when the position is lost"),
-        Requirement(("BATT_FS_LOW_ACT",), _is_on, "not 0: it acts on a low battery"),
-        Requirement(("FENCE_ENABLE",), _is_on, "1: a fence"),
-        Requirement(("FENCE_ACTION",), _is_on, "not 0: it acts at the fence"),
+        Requirement(("FS_THR_ENABLE",), _is_on, "not 0: it acts when the pilot's radio is lost", 1),
+        Requirement(("FS_EKF_ACTION",), _is_on, "not 0: it acts when the position is lost", 1),
+        Requirement(("BATT_FS_LOW_ACT",), _is_on, "not 0: it acts on a low battery", 2),
+        Requirement(("FENCE_ENABLE",), _is_on, "1: a fence", 1),
+        Requirement(("FENCE_ACTION",), _is_on, "not 0: it acts at the fence", 1),
     ),
 )
 
@@ -115,19 +119,21 @@ PX4 = Autopilot(
     land_mode=px4_mode(4, 6),
     takes_off_by_command=False,
     wants_targets_beforehand=True,
+    estimate_message=mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
     integers_as_bytes=True,
     requirements=(
         Requirement(
             ("COM_OBL_RC_ACT",),
             lambda value: value in (3, 4, 5),
             "3, 4 or 5: it goes home, lands or holds without this node",
+            4,
         ),
-        Requirement(("COM_OF_LOSS_T",), lambda value: value <= 5.0, "at most 5 s"),
-        Requirement(("NAV_RCL_ACT",), _is_on, "not 0: it acts when the pilot's radio is lost"),
-        Requirement(("COM_LOW_BAT_ACT",), _is_on, "not 0: it acts on a low battery"),
-        Requirement(("GF_ACTION",), _is_on, "not 0: it acts at the fence"),
-        Requirement(("GF_MAX_HOR_DIST",), _is_on, "not 0: a fence around home"),
-        Requirement(("GF_MAX_VER_DIST",), _is_on, "not 0: a ceiling"),
+        Requirement(("COM_OF_LOSS_T",), lambda value: value <= 5.0, "at most 5 s", 1),
+        Requirement(("NAV_RCL_ACT",), _is_on, "not 0: it acts when the pilot's radio is lost", 2),
+        Requirement(("COM_LOW_BAT_ACT",), _is_on, "not 0: it acts on a low battery", 2),
+        Requirement(("GF_ACTION",), _is_on, "not 0: it acts at the fence", 2),
+        Requirement(("GF_MAX_HOR_DIST",), _is_on, "not 0: a fence around home", 500),
+        Requirement(("GF_MAX_VER_DIST",), _is_on, "not 0: a ceiling", 100),
     ),
 )
 

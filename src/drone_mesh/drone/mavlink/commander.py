@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from typing import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import EarthPlace
-from drone_mesh.drone.mavlink.autopilots import Requirement
 from drone_mesh.drone.mavlink.command import Command
-from drone_mesh.drone.mavlink.telemetry import STREAMS_HZ, Message, Telemetry
+from drone_mesh.drone.mavlink.telemetry import ESTIMATE_HZ, STREAMS_HZ, Message, Telemetry
 
 HEARTBEAT_PERIOD_S = 1.0  # required by MAVLink
 ASK_STREAMS_PERIOD_S = 5.0  # our choice
 CARRIED_OUT_WITHIN_S = 8.0  # our choice: reports come every second, and some get lost
 MOST_SERIOUS = mavlink.MAV_SEVERITY_WARNING  # of texts that are reasons; greater is less serious
-PARAMETER_PERIOD_S = 0.5  # our choice
-PARAMETER_TRIES = 6  # our choice, for all names of a requirement together
 
 POSITION_ONLY = (
     mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE
@@ -30,8 +26,6 @@ POSITION_ONLY = (
     | mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
     | mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 )
-
-_log = logging.getLogger(__name__)
 
 
 class Commander:
@@ -66,7 +60,8 @@ class Commander:
             and telemetry.streams_missing(now_s)
         ):
             self._streams_due_s = now_s + ASK_STREAMS_PERIOD_S
-            for message_id, rate_hz in STREAMS_HZ.items():
+            estimate = {telemetry.autopilot.estimate_message: ESTIMATE_HZ}
+            for message_id, rate_hz in {**STREAMS_HZ, **estimate}.items():
                 self._send_command(
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate_hz)
                 )
@@ -148,58 +143,3 @@ class Commander:
                 telemetry.system_id, telemetry.component_id, command, confirmation, *padded
             )
         )
-
-
-class ParameterCheck:
-    """Reads the parameters that make a flight safe, and reports those with unsafe values."""
-
-    def __init__(self, commander: Commander, telemetry: Telemetry) -> None:
-        self._commander = commander
-        self._telemetry = telemetry
-        self._open: list[Requirement] | None = None  # None: not begun
-        self._due_s = -math.inf
-        self._asked = 0
-        self.complaints: tuple[str, ...] = ()
-
-    @property
-    def is_done(self) -> bool:
-        """Whether every parameter was read or given up."""
-        return self._open is not None and not self._open
-
-    def tick(self, now_s: float) -> None:
-        """Request the next one."""
-        autopilot = self._telemetry.autopilot
-        if autopilot is None:
-            return
-        if self._open is None:
-            self._open = list(autopilot.requirements)
-        if not self._open or now_s < self._due_s:
-            return
-        requirement = self._open[0]
-        if self._asked == PARAMETER_TRIES:
-            self._close(f"{requirement.names[-1]} could not be read (wanted: {requirement.wanted})")
-            return
-        self._commander.read_parameter(requirement.names[self._asked % len(requirement.names)])
-        self._asked += 1
-        self._due_s = now_s + PARAMETER_PERIOD_S
-
-    def on_value(self, message: Message) -> None:
-        """PARAM_VALUE."""
-        autopilot = self._telemetry.autopilot
-        if not self._open or autopilot is None or message.param_id not in self._open[0].names:
-            return
-        value = autopilot.parameter_value(message.param_value, message.param_type)
-        requirement = self._open[0]
-        self._close(
-            ""
-            if requirement.holds(value)
-            else f"{message.param_id} is {value:g} (wanted: {requirement.wanted})"
-        )
-
-    def _close(self, complaint: str) -> None:
-        assert self._open
-        self._open.pop(0)
-        self._asked, self._due_s = 0, -math.inf
-        if complaint:
-            self.complaints += (complaint,)
-            _log.warning("autopilot: %s; see docs/flying.md", complaint)

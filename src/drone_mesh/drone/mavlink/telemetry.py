@@ -52,9 +52,8 @@ STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_RC_CHANNELS: 2.0,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     mavlink.MAVLINK_MSG_ID_FENCE_STATUS: 1.0,
-    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 4.0,  # ArduPilot
-    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 4.0,  # PX4
-}  # requested from the autopilot
+}  # requested from the autopilot, besides the quality of its estimate
+ESTIMATE_HZ = 4.0
 
 
 class Telemetry:

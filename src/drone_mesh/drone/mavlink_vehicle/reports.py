@@ -50,16 +50,11 @@ class Reports:
         self._vehicle = vehicle
         is_px4 = vehicle.autopilot is PX4
         estimate = self._estimator if is_px4 else self._ekf
-        estimate_id = (
-            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
-            if is_px4
-            else mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT
-        )
         self._makers: dict[int, Callable[[], Message]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._position,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps,
-            estimate_id: estimate,
+            vehicle.autopilot.estimate_message: estimate,
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._status,
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._landed,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,

@@ -1,0 +1,83 @@
+"""scripts/autopilots: several of ArduPilot's simulated copters, ready for the nodes of a mesh."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import tempfile
+from pathlib import Path
+from typing import Sequence
+
+from drone_mesh.arguments import whole
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.errors import MeshError
+from drone_mesh.nrf24.settings import DataRate
+from drone_mesh.raspberry.arducopter import ArduCopter, program_from_environment
+from drone_mesh.raspberry.emulated_air import column_place
+from drone_mesh.raspberry.emulated_fleet import DEMONSTRATION_ORIGIN
+from drone_mesh.raspberry.pilot_side import PilotSide
+from drone_mesh.stopping import StopRequest
+
+MOST_COPTERS = 16  # our choice
+POLL_S = 0.5
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run them until Ctrl-C; the exit status is 1 if they do not start."""
+    parser = argparse.ArgumentParser(
+        "scripts/autopilots",
+        description="Starts ArduPilot's simulated copters for the nodes 1..N, in GUIDED and ready "
+        "to arm, where emulated nodes stand on the map. Node N's copter has system id N, its "
+        "engine's port is 5750 + 10 N and its pilot's port 5752 + 10 N.",
+        epilog="Environment: ARDUCOPTER, the program; ARDUCOPTER_PARAMETERS, the file copter.parm, "
+        "if it is not beside the source of that program.",
+    )
+    parser.add_argument("copters", type=whole(1, MOST_COPTERS), help=f"1..{MOST_COPTERS}")
+    parser.add_argument("--origin", default="", metavar="LAT,LON,ALT", help="as for the nodes")
+    parser.add_argument("--speedup", type=float, default=1.0, help="default: %(default)g")
+    parsed = parser.parse_args(arguments)
+    try:
+        origin = Origin.parse(parsed.origin) if parsed.origin else DEMONSTRATION_ORIGIN
+        _run(parsed.copters, origin, parsed.speedup)
+    except MeshError as error:
+        print(f"scripts/autopilots: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _run(copters: int, origin: Origin, speedup: float) -> None:
+    program = program_from_environment()
+    as_text = f"{origin.latitude_deg:g},{origin.longitude_deg:g},{origin.altitude_m:g}"
+    with contextlib.ExitStack() as stack:
+        request = stack.enter_context(StopRequest())
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="autopilots-")))
+        fleet = []
+        for node_id in range(1, copters + 1):
+            place = origin.to_earth(column_place(node_id, DataRate.KBPS_250))
+            own = folder / str(node_id)
+            own.mkdir()
+            copter = ArduCopter(program, own, node_id - 1, Origin(*place), speedup)
+            stack.callback(copter.close)
+            fleet.append(copter)
+        pilots = []
+        for copter in fleet:
+            pilot = PilotSide(copter.pilot_address, copter.system_id)
+            stack.callback(pilot.close)
+            pilots.append(pilot)
+        for copter, pilot in zip(fleet, pilots):
+            pilot.make_ready()
+            print(
+                f"raspberry_router --id {copter.system_id} --emulated-air 9100 "
+                f"--drone mavlink:{copter.address} --origin {as_text} "
+                "--may-arm --may-take-off --may-change-mode",
+                flush=True,
+            )
+        print(f"{copters} copters are ready; their pilots' ports stay open", flush=True)
+        while not request.wait(POLL_S):
+            for pilot in pilots:
+                pilot.read(0.0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,128 @@
+"""What only a real autopilot has: failures in flight. Prints the rows of the table in flying.md.
+
+After each no order and no repair flies the copter, until the reason has gone and, where the
+autopilot or the pilot has chosen a mode, until the pilot gives it back.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Callable, Mapping
+
+import pytest
+from copter_rig import CopterRig
+
+from drone_mesh.errors import GoalRefused
+
+WATCH_S = 12.0  # of the wall, five times as many of the copter
+SPEEDUP = 5.0
+
+
+@dataclass(frozen=True)
+class Failure:
+    """How it comes about, and what the flight does then."""
+
+    what: str
+    happens: Mapping[str, float]  # simulator's parameters
+    mode: str  # that the copter chooses; empty: it stays in GUIDED
+    ends: bool = True  # the flight
+    words: str = ""  # a part of what the engine says
+    before: Mapping[str, float] = field(default_factory=dict)  # set before the flight
+    gone: Mapping[str, float] = field(default_factory=dict)  # ends it again
+
+
+FAILURES = (
+    Failure("GPS lost", {"SIM_GPS_DISABLE": 1}, "LAND", gone={"SIM_GPS_DISABLE": 0}),
+    Failure(
+        "GPS glitch of 1.1 km",
+        {"SIM_GPS_GLITCH_X": 0.01},
+        "LAND",
+        gone={"SIM_GPS_GLITCH_X": 0},
+    ),
+    Failure(
+        "all compasses fail",
+        {"SIM_MAG1_FAIL": 1, "SIM_MAG2_FAIL": 1, "SIM_MAG3_FAIL": 1},
+        "",
+        ends=False,
+    ),
+    Failure("battery at failsafe voltage", {"SIM_BATT_VOLTAGE": 10.0}, "RTL"),
+    Failure("the pilot's radio lost", {"SIM_RC_FAIL": 1}, "RTL", gone={"SIM_RC_FAIL": 0}),
+    Failure("wind of 10 m/s with gusts", {"SIM_WIND_SPD": 10, "SIM_WIND_TURB": 5}, "", ends=False),
+    Failure("fence reached", {}, "RTL", before={"FENCE_RADIUS": 30}),
+    Failure("a motor stops", {"SIM_ENGINE_MUL": 0}, ""),
+)
+
+
+def refusal(ask: Callable[[float, float, float], None]) -> str:
+    """Why the engine does not fly there now; empty: it would have flown."""
+    try:
+        ask(30.0, 10.0, 7.0)
+    except GoalRefused as error:
+        return str(error)[len("the drone cannot fly: ") :]
+    return ""
+
+
+@pytest.mark.parametrize("failure", FAILURES, ids=lambda failure: failure.what)
+def test_a_failure_in_flight_ends_it_and_nobody_takes_the_copter(
+    program: tuple[Path, Path], tmp_path: Path, failure: Failure
+) -> None:
+    with CopterRig(program, tmp_path, speedup=SPEEDUP) as rig:
+        for name, value in failure.before.items():
+            rig.pilot.set(name, value)
+        rig.set_out(150.0, 0.0, 7.0)
+        for name, value in failure.happens.items():
+            rig.pilot.set(name, value)
+        if not failure.ends:
+            rig.pilot.until("at the goal", lambda: not rig.engine.is_flying(), 150.0)
+            row(failure, rig, "flew on", "", "")
+            assert rig.engine.why_ended() == ""
+            assert rig.pilot.mode == "GUIDED"
+            return
+        rig.pilot.until("ended", lambda: not rig.engine.is_flying(), 60.0)
+        rig.pilot.until(
+            f"in {failure.mode}", lambda: rig.pilot.mode == (failure.mode or "GUIDED"), 60.0
+        )
+        words = rig.engine.why_ended()
+        assert words
+        asked = nobody_flies_it(rig)
+        assert rig.pilot.mode == (failure.mode or "GUIDED")
+        did = failure.mode or ("disarmed" if not rig.pilot.armed else "stayed in GUIDED")
+        for name, value in failure.gone.items():
+            rig.pilot.set(name, value)
+        if failure.gone:  # the reason has gone; the autopilot's mode stays the pilot's
+            asked = nobody_flies_it(rig)
+        row(failure, rig, did, words, asked)
+
+
+def nobody_flies_it(rig: CopterRig) -> str:
+    """Orders and repairs are refused all the time; returns the last reason."""
+    asked, end_s = "", time.monotonic() + WATCH_S
+    while time.monotonic() < end_s:
+        rig.pilot.read()
+        for ask in (rig.engine.set_goal, rig.engine.step_back_to):
+            asked = refusal(ask)
+            assert asked
+    return asked
+
+
+def test_when_the_node_is_killed_the_copter_goes_home_and_the_next_node_leaves_it_alone(
+    program: tuple[Path, Path], tmp_path: Path
+) -> None:
+    with CopterRig(program, tmp_path, speedup=SPEEDUP) as rig:
+        rig.set_out(150.0, 0.0, 7.0)
+        rig.engine.close()
+        rig.pilot.until("in RTL", lambda: rig.pilot.mode == "RTL", 60.0)
+        rig.start_engine()
+        rig.pilot.until("heard", lambda: bool(rig.engine.status().mode), 30.0)
+        rig.pilot.until("known", lambda: "RTL" in rig.engine.why_not_fly(), 30.0)
+        asked = nobody_flies_it(rig)
+        assert rig.pilot.mode == "RTL"
+        row(Failure("the node is killed", {}, "RTL"), rig, "RTL", "", asked)
+
+
+def row(failure: Failure, rig: CopterRig, did: str, words: str, asked: str) -> None:
+    """A row of the table in docs/flying.md."""
+    said = [t for t in rig.pilot.texts if any(k in t for k in ("ailsafe", "Crash", "EKF", "each"))]
+    print(f"| {failure.what} | {did} | `{words}` | `{asked}` |   <!-- {said[-2:]} -->")
