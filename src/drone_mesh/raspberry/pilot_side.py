@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Callable
+from typing import Callable, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -39,6 +39,7 @@ class PilotSide:
         self._codec = mavlink.MAVLink(None, SYSTEM_ID, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         self._codec.robust_parsing = True
         self._latest: dict[str, Message] = {}
+        self._mission: list[Message] = []
         self._line = _open(address, within_s)
         self.until("a heartbeat", lambda: "HEARTBEAT" in self._latest, within_s)
         for message_id, rate_hz in REPORTS_HZ.items():
@@ -143,6 +144,23 @@ class PilotSide:
         self.until("ready to arm", lambda: self.may_arm, within_s)
         self.choose("GUIDED", within_s)
 
+    def upload(self, way: Sequence[EarthPlace], within_s: float = 20.0) -> None:
+        """A mission along these places, for AUTO. Raises PilotSideError."""
+        items = [way[0], *way]  # the first is home and not flown to
+        self._latest.pop("MISSION_ACK", None)
+        self._mission = [
+            mavlink.MAVLink_mission_item_int_message(
+                *(self._system_id, 1, number, mavlink.MAV_FRAME_GLOBAL_INT),
+                *(mavlink.MAV_CMD_NAV_WAYPOINT, 0, 1, 0.0, 0.0, 0.0, 0.0),
+                *(round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)),
+                place.altitude_m,
+            )
+            for number, place in enumerate(items)
+        ]
+        count = mavlink.MAVLink_mission_count_message(self._system_id, 1, len(items))
+        self._send(count)
+        self.until("taking the mission", lambda: "MISSION_ACK" in self._latest, within_s)
+
     def close(self) -> None:
         """Close the connection."""
         self._line.close()
@@ -156,6 +174,9 @@ class PilotSide:
         self._latest[kind] = message
         if kind == "STATUSTEXT":
             self.texts = [*self.texts[1 - MOST_TEXTS :], str(message.text)]
+        elif kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+            if message.seq < len(self._mission):
+                self._send(self._mission[message.seq])
         elif kind == "PARAM_VALUE":
             self.parameters[message.param_id] = float(message.param_value)
 
