@@ -16,6 +16,8 @@ from copter_rig import CopterRig
 
 from drone_mesh.errors import GoalRefused
 
+pytestmark = pytest.mark.timeout(1800)  # flights last
+
 WATCH_S = 12.0  # of the wall, five times as many of the copter
 SPEEDUP = 5.0
 

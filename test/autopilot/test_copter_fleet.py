@@ -28,6 +28,8 @@ from drone_mesh.drone.location import Location
 from drone_mesh.raspberry.arducopter import SAFE, ArduCopter
 from drone_mesh.raspberry.pilot_side import PilotSide
 
+pytestmark = pytest.mark.timeout(1800)  # flights last
+
 RUNS = int(os.environ.get("AUTOPILOT_RUNS", "1"))
 NEAREST_M = 5.0
 HEARD_S = 12.0  # two check periods

@@ -12,6 +12,8 @@ from copter_rig import FLIGHT_S, CopterRig
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.errors import GoalRefused
 
+pytestmark = pytest.mark.timeout(1800)  # flights last
+
 FLIGHTS = int(os.environ.get("AUTOPILOT_FLIGHTS", "2"))  # of each kind
 
 

@@ -10,14 +10,14 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
-from drone_mesh.drone.mavlink.command import Command
+from drone_mesh.drone.mavlink.pending_command import PendingCommand
 from drone_mesh.drone.mavlink.pilot_status import Phase
 
 BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 
 
-def sent(command: Command, from_s: float, to_s: float) -> list[float]:
+def sent(command: PendingCommand, from_s: float, to_s: float) -> list[float]:
     """When it is sent, if it is asked ten times a second."""
     times = []
     for tenth in range(round(from_s * 10), round(to_s * 10)):
@@ -28,7 +28,7 @@ def sent(command: Command, from_s: float, to_s: float) -> list[float]:
 
 
 def test_without_an_answer_it_is_repeated_every_second_until_its_time_is_over() -> None:
-    command = Command(ARM, (1.0,), 0.0, within_s=4.0, once=False)
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=4.0, once=False)
     assert sent(command, 0.0, 3.9) == [0.0, 1.0, 2.0, 3.0]
     assert command.refusal(3.9) == ""
     assert command.refusal(4.0) == "the autopilot did not answer within 4 s"
@@ -36,13 +36,13 @@ def test_without_an_answer_it_is_repeated_every_second_until_its_time_is_over() 
 
 
 def test_silence_is_no_reason_to_repeat_what_must_be_done_once() -> None:
-    command = Command(ARM, (1.0,), 0.0, within_s=4.0, once=True)
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=4.0, once=True)
     assert sent(command, 0.0, 4.0) == [0.0]
 
 
 @pytest.mark.parametrize("result", [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS])
 def test_once_it_is_accepted_only_its_effect_is_waited_for(result: int) -> None:
-    command = Command(ARM, (1.0,), 0.0, within_s=20.0, once=False)
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=20.0, once=False)
     assert sent(command, 0.0, 0.5) == [0.0]
     command.acknowledged(result, 0.5)
     assert sent(command, 0.5, 19.9) == []
@@ -52,7 +52,7 @@ def test_once_it_is_accepted_only_its_effect_is_waited_for(result: int) -> None:
 
 @pytest.mark.parametrize("once", [False, True])
 def test_a_command_that_is_put_off_is_sent_again_a_second_later(once: bool) -> None:
-    command = Command(ARM, (1.0,), 0.0, within_s=20.0, once=once)
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=20.0, once=once)
     assert sent(command, 0.0, 0.5) == [0.0]
     command.acknowledged(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, 0.5)
     assert sent(command, 0.5, 2.0) == [1.0]
@@ -61,7 +61,7 @@ def test_a_command_that_is_put_off_is_sent_again_a_second_later(once: bool) -> N
 
 
 def test_it_is_given_up_in_the_autopilot_s_own_words_even_if_they_come_after_the_refusal() -> None:
-    command = Command(ARM, (1.0,), 0.0, within_s=20.0, once=False)
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=20.0, once=False)
     assert sent(command, 0.0, 0.5) == [0.0]
     command.acknowledged(mavlink.MAV_RESULT_FAILED, 0.5)
     command.words = "PreArm: Need 3D Fix"
@@ -70,14 +70,14 @@ def test_it_is_given_up_in_the_autopilot_s_own_words_even_if_they_come_after_the
 
 
 def test_without_words_the_result_is_the_reason() -> None:
-    command = Command(ARM, (1.0,), 0.0, within_s=20.0, once=False)
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=20.0, once=False)
     assert sent(command, 0.0, 0.5) == [0.0]
     command.acknowledged(mavlink.MAV_RESULT_DENIED, 0.5)
     assert command.refusal(2.0) == "the autopilot refused: denied"
 
 
 def test_a_repetition_that_is_refused_does_not_undo_what_was_accepted() -> None:
-    command = Command(ARM, (1.0,), 0.0, within_s=20.0, once=False)
+    command = PendingCommand(ARM, (1.0,), 0.0, within_s=20.0, once=False)
     assert sent(command, 0.0, 1.5) == [0.0, 1.0]
     command.acknowledged(mavlink.MAV_RESULT_ACCEPTED, 1.5)
     command.acknowledged(mavlink.MAV_RESULT_FAILED, 1.6)

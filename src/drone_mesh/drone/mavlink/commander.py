@@ -8,7 +8,7 @@ from typing import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from drone_mesh.drone.geodesy import EarthPlace
-from drone_mesh.drone.mavlink.command import Command
+from drone_mesh.drone.mavlink.pending_command import PendingCommand
 from drone_mesh.drone.mavlink.telemetry import ESTIMATE_HZ, STREAMS_HZ, Message, Telemetry
 
 HEARTBEAT_PERIOD_S = 1.0  # required by MAVLink
@@ -37,7 +37,7 @@ class Commander:
         self._send = send
         self._heartbeat_due_s = -math.inf
         self._streams_due_s = -math.inf
-        self._current: Command | None = None
+        self._current: PendingCommand | None = None
 
     def tick(self, now_s: float) -> None:
         """Send whatever is periodically due."""
@@ -82,7 +82,7 @@ class Commander:
         """
         current = self._current
         if current is None or (current.number, current.parameters) != (command, parameters):
-            self._current = current = Command(command, parameters, now_s, within_s, once)
+            self._current = current = PendingCommand(command, parameters, now_s, within_s, once)
         if current.is_due(now_s):
             current.sent_at(now_s)
             self._send_command(command, parameters, confirmation=current.tries - 1)

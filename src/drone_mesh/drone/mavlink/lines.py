@@ -1,4 +1,4 @@
-"""Bytes to and from an autopilot: serial and TCP by pyserial, UDP by a socket."""
+"""Bytes to and from an autopilot: serial by pyserial, TCP and UDP by a socket."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from drone_mesh.errors import ConfigurationError
 
 DEFAULT_BAUD = 57600  # of telemetry ports, of both autopilots
 MOST_BYTES = 4096  # of one reading
+CONNECTED_WITHIN_S = 5.0  # our choice; also the time for sending
 
 
 class Line(Protocol):
@@ -31,11 +32,11 @@ class Line(Protocol):
 
 
 class SerialLine:
-    """A serial port, or a TCP connection through pyserial."""
+    """A serial port."""
 
-    def __init__(self, url: str, baud: int) -> None:
-        """`url` is a device, or socket://HOST:PORT. Raises OSError."""
-        self._port = serial.serial_for_url(url, baudrate=baud)
+    def __init__(self, device: str, baud: int) -> None:
+        """Raises OSError."""
+        self._port = serial.serial_for_url(device, baudrate=baud)
 
     def receive(self, timeout_s: float) -> bytes:
         self._port.timeout = timeout_s
@@ -51,6 +52,32 @@ class SerialLine:
 
     def close(self) -> None:
         self._port.close()
+
+
+class TcpLine:
+    """A TCP connection to a listening autopilot."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Raises OSError."""
+        self._socket = socket.create_connection((host, port), CONNECTED_WITHIN_S)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def receive(self, timeout_s: float) -> bytes:
+        if not select.select([self._socket], [], [], timeout_s)[0]:
+            return b""
+        data = self._socket.recv(MOST_BYTES)
+        if not data:
+            raise ConnectionResetError("the other side has closed the connection")
+        return data
+
+    def send(self, data: bytes) -> None:
+        self._socket.sendall(data)
+
+    def forget_peer(self) -> None:
+        """Does nothing: there is only one peer."""
+
+    def close(self) -> None:
+        self._socket.close()
 
 
 class UdpLine:
@@ -126,5 +153,5 @@ def open_line(address: str) -> Line:
     if kind == "serial":
         return SerialLine(place, number)
     if kind == "tcp":
-        return SerialLine(f"socket://{place}:{number}", DEFAULT_BAUD)
+        return TcpLine(place, number)
     return UdpLine(place, number, listens=kind == "udpin")

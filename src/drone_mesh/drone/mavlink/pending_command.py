@@ -1,4 +1,4 @@
-"""Command: one command to an autopilot, from its first try to its effect or its refusal."""
+"""PendingCommand: one command to an autopilot, from its first try to its effect or its refusal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TAKEN = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
 LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
-class Command:
+class PendingCommand:
     """What was sent and what came back; the caller sends, and sees the effect."""
 
     def __init__(
