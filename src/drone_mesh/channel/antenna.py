@@ -66,7 +66,7 @@ class PacketAntenna(IWirelessCommunication):
         self._receiving: Task | None = None
         self._ending = False  # the receiving thread must end
         self._info: IMeshDebugInfo | None = None
-        self._powered = False
+        self.powered = False  # read it from any thread
         self._silent = False  # set by any thread
         self._seen: dict[int, tuple[bytes, float]] = {}  # node -> its last payload, and when
         self._duplicates = 0
@@ -92,7 +92,7 @@ class PacketAntenna(IWirelessCommunication):
             return
         self._radio.begin()
         self._mesh = mesh
-        self._powered = True
+        self.powered = True
         self._ending = False
         self._receiving = self._runtime.start(self._receive, f"radio {self._radio.node_id}")
         self._sender.start()
@@ -101,7 +101,7 @@ class PacketAntenna(IWirelessCommunication):
         receiving, self._receiving = self._receiving, None
         if receiving is None:
             return
-        self._powered = False
+        self.powered = False
         self._ending = True
         self._sender.stop()
         receiving.join()
@@ -114,14 +114,14 @@ class PacketAntenna(IWirelessCommunication):
         Raises what the radio raises if it is switched on and does not work.
         """
         mesh = self._mesh
-        if mesh is None or on == self._powered:
+        if mesh is None or on == self.powered:
             return
         if on:
             self._radio.begin()
         else:
             self._sender.clear()
             self._radio.power_down()
-        self._powered = on
+        self.powered = on
         self._submit(lambda now_s: mesh.on_antenna_power(on, now_s))
 
     def fall_silent(self) -> None:
@@ -134,7 +134,7 @@ class PacketAntenna(IWirelessCommunication):
 
     def send_message_to(self, payload: bytes) -> bool:
         """Queue a packet for the node in byte 3. False: invalid, no power, or too many wait."""
-        if self._silent or not self._powered or len(payload) != PAYLOAD_BYTES:
+        if self._silent or not self.powered or len(payload) != PAYLOAD_BYTES:
             return False
         to = receiver(payload)
         if to > MAX_NODE_ID or to == self._radio.node_id:
@@ -143,7 +143,7 @@ class PacketAntenna(IWirelessCommunication):
 
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all; each receiver's antenna puts its own id into byte 3."""
-        if self._powered and not self._silent and len(payload) == PAYLOAD_BYTES:
+        if self.powered and not self._silent and len(payload) == PAYLOAD_BYTES:
             packet = readdressed(payload, BROADCAST)
             self._sender.offer(ALL_NODES, packet, priority(payload))
 
@@ -155,7 +155,7 @@ class PacketAntenna(IWirelessCommunication):
         self._info = info if on else None
 
     def on(self) -> bool:
-        return self._powered
+        return self.powered
 
     def statistics(self) -> RadioStatistics:
         """Counters of the radio, and the duplicates that were seen."""
@@ -168,14 +168,14 @@ class PacketAntenna(IWirelessCommunication):
     def _delivered(self, node: int, tries: int) -> None:
         self._quality.packet(node, tries, delivered=True)
         mesh = self._mesh
-        if mesh is not None and self._powered and not self._silent:
+        if mesh is not None and self.powered and not self._silent:
             self._submit(lambda now_s: mesh.on_delivered(node, tries, now_s))
 
     def _given_up(self, payload: bytes, tries: int) -> None:
         if receiver(payload) <= MAX_NODE_ID:
             self._quality.packet(receiver(payload), tries, delivered=False)
         mesh = self._mesh
-        if mesh is not None and self._powered and not self._silent:
+        if mesh is not None and self.powered and not self._silent:
             self._submit(lambda now_s: mesh.on_undelivered(payload, tries, now_s))
 
     def _show(self, info: IMeshDebugInfo) -> None:
@@ -206,7 +206,7 @@ class PacketAntenna(IWirelessCommunication):
 
     def _hand_on(self, received: Received) -> None:
         mesh, payload = self._mesh, received.payload
-        if mesh is None or not self._powered:
+        if mesh is None or not self.powered:
             return
         self._note(payload)
         train = place_in_train(payload, self._radio.node_id)

@@ -6,16 +6,17 @@ import math
 import random
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.inprocess.chip_air import ChipAir
 from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.radio import InProcessAir
-from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.shared_antenna import SharedChannel
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 
 
 def create_air(
     radio: str,
-    clock: VirtualClock,
     rng: random.Random,
     max_distance_m: float,
     loss: float,
@@ -23,19 +24,22 @@ def create_air(
     jitter_s: float,
     rate: str,
     links: LinkModel | None,
-) -> InProcessAir | SharedAir:
-    """The air for a radio, "disc" or "shared"; the other arguments as for Network.
+) -> IInProcessAir:
+    """The air for a radio, "disc", "shared" or "chips"; the other arguments as for Network.
 
     Raises ConfigurationError.
     """
     _check_numbers(max_distance_m, loss, delay_s, jitter_s)
-    if radio == "shared":
-        settings = RadioSettings(data_rate=data_rate(rate))
-        return SharedAir(clock, links or IdealDisc(max_distance_m), settings, max_distance_m)
     if radio == "disc":
         own_rng = random.Random(rng.random())
-        return InProcessAir(clock, own_rng, max_distance_m, loss, delay_s, jitter_s)
-    raise ConfigurationError(f"invalid radio {radio!r}: use disc or shared")
+        return InProcessAir(VirtualClock(), own_rng, max_distance_m, loss, delay_s, jitter_s)
+    settings = RadioSettings(data_rate=data_rate(rate))
+    links = links or IdealDisc(max_distance_m)
+    if radio == "shared":
+        return SharedChannel(VirtualClock(), links, settings, max_distance_m)
+    if radio == "chips":
+        return ChipAir(links, settings, max_distance_m, random.Random(rng.random()))
+    raise ConfigurationError(f"invalid radio {radio!r}: use disc, shared or chips")
 
 
 def _check_numbers(max_distance_m: float, loss: float, delay_s: float, jitter_s: float) -> None:

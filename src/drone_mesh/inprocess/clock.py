@@ -6,7 +6,7 @@ import heapq
 import itertools
 import math
 from collections import deque
-from typing import Any, Callable, Tuple
+from typing import Any, Callable, Protocol, Tuple
 
 Event = Tuple[float, float, Callable[[Any], None], Any]
 """Time, sequence number among events of the same time, function, argument."""
@@ -14,6 +14,19 @@ Event = Tuple[float, float, Callable[[Any], None], Any]
 
 def _never(_argument: Any) -> None:
     """The function of an event that never comes."""
+
+
+class Clock(Protocol):
+    """The time of a network, and the events planned in it."""
+
+    @property
+    def now_s(self) -> float: ...
+
+    def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
+        """Call `function(argument)` at `at_s`, or at once if that is in the past."""
+
+    def run_until(self, until_s: float) -> None:
+        """Process all events up to and including `until_s`."""
 
 
 class VirtualClock:

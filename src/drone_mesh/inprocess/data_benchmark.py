@@ -16,9 +16,8 @@ from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES, count_of
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.communication.messages import BODY_BYTES
-from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.inprocess.network import Network
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
-from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import Hop, IdealDisc
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
@@ -104,39 +103,33 @@ def measure(case: DataCase, messages: int, seed: int) -> Throughput:
 
     With several flows the messages come from the last nodes of the line in turn.
     """
-    settings = RadioSettings(data_rate=DATA_RATES[case.rate])
     rng = random.Random(f"{seed} loss")
-    mesh = EmulatedMesh(
-        CooperativeClock(), LossyDisc(MAX_DISTANCE_M, case.loss, rng), seed, settings=settings
-    )
+    links = LossyDisc(MAX_DISTANCE_M, case.loss, rng)
+    mesh = Network(seed, radio="chips", rate=case.rate, links=links)
     try:
-        return _measured(mesh, case, messages, settings)
+        return _measured(mesh, case, messages)
     finally:
         mesh.stop()
 
 
-def _measured(
-    mesh: EmulatedMesh, case: DataCase, messages: int, settings: RadioSettings
-) -> Throughput:
-    mesh.add_gateway(0, (0.0, 0.0, 0.0))
+def _measured(mesh: Network, case: DataCase, messages: int) -> Throughput:
+    mesh.add_gateway(0, 0.0, 0.0)
     for node in range(1, case.hops + 1):
-        mesh.add_router(node, (SPACING_M * node, 0.0, 0.0))
+        mesh.add_router(node, SPACING_M * node, 0.0)
     ends = [case.hops]
     for flow in range(1, case.flows):  # beside the last node, as far from the gateway
         ends.append(case.hops + flow)
-        mesh.add_router(ends[-1], (SPACING_M * case.hops, 0.1 * flow, 0.0))
+        mesh.add_router(ends[-1], SPACING_M * case.hops, 0.1 * flow)
     mesh.run_until(mesh.all_connected, CONNECT_WITHIN_S)
     mesh.run_for(3.0)
     received: list[ReceivedMessage] = []
     tickets: list[Ticket] = []
     mesh.nodes[0].component.data.on_received(received.append)
-    started_s = mesh.now_s()
+    started_s, payload = mesh.now_s(), bytes(MAX_MESSAGE_BYTES)
     for number, end in enumerate(ends):
         share = messages // len(ends) + (number < messages % len(ends))
-        _hand_in(mesh, end, share, case.reliable, tickets)
-    mesh.run_until(
-        lambda: len(tickets) == messages and all(ticket.final for ticket in tickets), END_WITHIN_S
-    )
+        tickets += [mesh.send(end, 0, payload, reliable=case.reliable) for _ in range(share)]
+    mesh.run_until(lambda: all(ticket.final for ticket in tickets), END_WITHIN_S)
     if not case.reliable:  # wait for the last packets
         mesh.run_for(5.0)
     took_s = (received[-1].received_s if received else mesh.now_s()) - started_s
@@ -146,21 +139,9 @@ def _measured(
     return Throughput(
         len(received) * MAX_MESSAGE_BYTES * 8 / took_s / 1e3,
         delivered,
-        bound_kbit_s(settings, case.hops),
+        bound_kbit_s(RadioSettings(data_rate=DATA_RATES[case.rate]), case.hops),
         mesh.all_connected(),
     )
-
-
-def _hand_in(
-    mesh: EmulatedMesh, node: int, count: int, reliable: bool, tickets: list[Ticket]
-) -> None:
-    data, payload = mesh.nodes[node].component.data, bytes(MAX_MESSAGE_BYTES)
-
-    def hand_in(now_s: float) -> None:
-        for _ in range(count):
-            tickets.append(data.send(0, payload, now_s, reliable=reliable))
-
-    mesh.nodes[node].submit(hand_in)
 
 
 def cases() -> list[DataCase]:

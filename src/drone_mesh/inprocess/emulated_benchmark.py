@@ -6,16 +6,20 @@ import argparse
 import random
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.drone.fleet import MAX_DRONES
-from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
-from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
+from drone_mesh.inprocess.chip_air import ChipAir
+from drone_mesh.inprocess.network import Network
+from drone_mesh.inprocess.wall_mesh import WallMesh
+from drone_mesh.nrf24.emulator.air import Air
+from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.emulator.measured import measured_curve
 from drone_mesh.nrf24.emulator.trace import FrameTrace
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
+from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 
 PROGRESS_S = 5.0  # of wall time
@@ -81,30 +85,53 @@ def _links(name: str, rng: random.Random, bits_per_s: int) -> LinkModel:
     return IdealDisc(MAX_DISTANCE_M)
 
 
-def _grid(mesh: EmulatedMesh, nodes: int, spacing_m: float) -> None:
+def _places(nodes: int, spacing_m: float) -> list[tuple[float, float]]:
+    """x, y of the gateway 0 and of the routers 1, 2, ..."""
     columns = max(1, round((nodes - 1) ** 0.5))
-    mesh.add_gateway(0, (-1.0, 0.0, 0.1))
-    for index in range(nodes - 1):
-        row, column = divmod(index, columns)
-        mesh.add_router(index + 1, (spacing_m * column, spacing_m * row, 0.05))
+    grid = (divmod(index, columns) for index in range(nodes - 1))
+    return [(-1.0, 0.0), *((spacing_m * column, spacing_m * row) for row, column in grid)]
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """The mesh under test, in virtual or real time."""
+
+    mesh: Network | WallMesh
+    air: Air
+    antennas: list[NRF24HighLevelInterface]
+    chips: list[EmulatedChip]
+
+
+def _bench(arguments: argparse.Namespace) -> _Bench:
+    settings = RadioSettings(data_rate=DATA_RATES[arguments.rate])
+    rng = random.Random(f"{arguments.seed} links")
+    links = _links(arguments.links, rng, settings.data_rate.value)
+    places = _places(arguments.nodes, arguments.spacing)
+    if arguments.wall:
+        wall = WallMesh(links, settings, arguments.seed)
+        for node, (x, y) in enumerate(places):
+            wall.add(node, x, y, gateway=node == 0)
+        return _Bench(wall, wall.air, wall.antennas, wall.chips)
+    network = Network(arguments.seed, radio="chips", rate=arguments.rate, links=links)
+    for node, (x, y) in enumerate(places):
+        (network.add_router if node else network.add_gateway)(node, x, y)
+    assert isinstance(network.air, ChipAir)
+    antennas = list(network.air.antennas.values())
+    return _Bench(network, network.air.air, list(antennas), [one.chip for one in antennas])
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run it and print the result."""
     arguments = _arguments(argv)
-    clock = WallClock() if arguments.wall else CooperativeClock()
-    settings = RadioSettings(data_rate=DATA_RATES[arguments.rate])
-    rng = random.Random(f"{arguments.seed} links")
-    links = _links(arguments.links, rng, settings.data_rate.value)
-    mesh = EmulatedMesh(clock, links, arguments.seed, settings=settings)
+    started, cpu_started = time.perf_counter(), time.process_time()
+    bench = _bench(arguments)
+    mesh = bench.mesh
     trace = FrameTrace()
     if arguments.trace:
-        mesh.air.observe(trace.see)
-    started, cpu_started = time.perf_counter(), time.process_time()
+        bench.air.observe(trace.see)
     begin_s = mesh.now_s()
     connected_s = None
     shown = started
-    _grid(mesh, arguments.nodes, arguments.spacing)
     try:
         while mesh.now_s() - begin_s < arguments.seconds:
             mesh.run_for(0.1)
@@ -117,12 +144,10 @@ def main(argv: list[str] | None = None) -> int:
         print("interrupted", file=sys.stderr)
     simulated_s = mesh.now_s() - begin_s
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
-    _report(mesh, simulated_s, wall_s, cpu_s, connected_s)
-    if isinstance(clock, WallClock):
-        print(f"events were late by at most   {clock.latest_ns / 1e6:.1f} ms")
+    _report(bench, simulated_s, wall_s, cpu_s, connected_s)
+    if isinstance(mesh, WallMesh):
+        print(f"events were late by at most   {mesh.clock.latest_ns / 1e6:.1f} ms")
     mesh.stop()
-    if isinstance(clock, WallClock):
-        clock.close()
     if arguments.trace:
         try:
             written = trace.write(arguments.trace)
@@ -134,15 +159,15 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _report(
-    mesh: EmulatedMesh, simulated_s: float, wall_s: float, cpu_s: float, connected_s: float | None
+    bench: _Bench, simulated_s: float, wall_s: float, cpu_s: float, connected_s: float | None
 ) -> None:
-    radios = [node.antenna.statistics() for node in mesh.nodes.values()]
+    radios = [antenna.statistics() for antenna in bench.antennas]
     sent = sum(radio.sent for radio in radios)
     lost = sum(radio.lost for radio in radios)
     packets = sent + sum(radio.broadcasts for radio in radios)
-    misuses = sum(len(node.chip.warnings) for node in mesh.nodes.values())
+    misuses = sum(len(chip.warnings) for chip in bench.chips)
     when = "never" if connected_s is None else f"{connected_s:.1f} s"
-    print(f"nodes                         {len(mesh.nodes)}")
+    print(f"nodes                         {len(bench.chips)}")
     print(f"all connected after           {when}")
     print(f"simulated                     {simulated_s:.1f} s")
     print(f"took                          {wall_s:.2f} s, {cpu_s:.2f} s of one core")
@@ -150,9 +175,9 @@ def _report(
     print(f"simulated s per core s        {simulated_s / max(cpu_s, 1e-9):.1f}")
     print(f"packets (sent and broadcast)  {packets}, {packets / simulated_s:.1f} per s")
     print(f"of these sent and lost        {lost} of {sent}")
-    print(f"frames, collisions            {mesh.air.frames}, {mesh.air.collisions}")
+    print(f"frames, collisions            {bench.air.frames}, {bench.air.collisions}")
     print(f"cost per packet               {cpu_s / max(packets, 1) * 1e6:.0f} us")
-    print(f"cost per frame                {cpu_s / max(mesh.air.frames, 1) * 1e6:.0f} us")
+    print(f"cost per frame                {cpu_s / max(bench.air.frames, 1) * 1e6:.0f} us")
     print(f"misuse of chips               {misuses}")
 
 

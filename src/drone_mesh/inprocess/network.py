@@ -36,13 +36,12 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.airs import create_air
-from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.node import InProcessNode, NoInternet
 from drone_mesh.inprocess.oracle import Oracle
 from drone_mesh.inprocess.pilots import Pilots
 from drone_mesh.inprocess.positions import PositionErrors, PositionReceiver
-from drone_mesh.inprocess.radio import HOP_DELAY_S, InProcessAntenna
-from drone_mesh.inprocess.shared_antenna import SharedAntenna
+from drone_mesh.inprocess.radio import HOP_DELAY_S
 from drone_mesh.inprocess.shortest_path import SHORTEST_PATH, LinkMap, ShortestPath
 from drone_mesh.inprocess.status import event_records, mesh_status
 from drone_mesh.mobility import Track
@@ -72,7 +71,7 @@ class Network:
         loss: float = 0.0,
         delay_s: float = HOP_DELAY_S,
         jitter_s: float = 0.0,
-        radio: str = "disc",
+        radio: str | IInProcessAir = "disc",
         rate: str = DEFAULT_RATE,
         links: LinkModel | None = None,
         repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
@@ -86,9 +85,10 @@ class Network:
         `repair` is the name of a repair strategy, as in a launch file, or "oracle"; or a function
         that creates one.
 
-        `radio`: "disc", on which packets never meet, or "shared", the channel of nRF24L01+ radios
-        at `rate` (250k, 1M or 2M) with the space between them as `links` says (default: an ideal
-        disc). `loss`, `delay_s` and `jitter_s` are for the disc. Raises ConfigurationError.
+        `radio`: "disc", on which packets never meet; "shared", a fast model of nRF24L01+ radios on
+        one channel; "chips", the driver on emulated chips; or an air of your own. For "shared" and
+        "chips": `rate` (250k, 1M or 2M) and `links`, the space between the radios (default: an
+        ideal disc); for the disc: `loss`, `delay_s` and `jitter_s`. Raises ConfigurationError.
 
         `key`: the key of the mesh, for every node, or a function that returns the keys of each
         node. None: no seals, of that node or of all.
@@ -103,10 +103,14 @@ class Network:
         self._repair_options = repair_options
         self._key = key
         self._positions = positions or PositionErrors()
-        self.clock = VirtualClock()
-        self.air = create_air(
-            radio, self.clock, self._rng, max_distance_m, loss, delay_s, jitter_s, rate, links
-        )
+        self.air: IInProcessAir
+        if isinstance(radio, str):
+            self.air = create_air(
+                radio, self._rng, max_distance_m, loss, delay_s, jitter_s, rate, links
+            )
+        else:
+            self.air = radio
+        self.clock = self.air.clock
         self._link_map = LinkMap(self.clock, self.links)
         self.nodes: dict[int, InProcessNode] = {}
         self.events: list[MeshEvent] = []
@@ -158,14 +162,14 @@ class Network:
             raise ValueError(f"node {node_id} already exists")
         radio_rng = random.Random(f"{self._seed} radio {node_id}")
         place = Location.from_vector((x, y, 0.0))
-        node = InProcessNode(self.clock, self.air, node_id, place, radio_rng, gateway, why_not_fly)
+        node = InProcessNode(self.air, node_id, place, radio_rng, gateway, why_not_fly)
         self._install(node, node_id)
         self.nodes[node_id] = node
-        self.clock.call_at(start_s, InProcessNode.start, node)
+        self.clock.call_at(start_s, self.air.run, node.start)
 
     def _install(self, node: InProcessNode, node_id: int) -> None:
         """The mesh software of one node."""
-        antenna: InProcessAntenna | SharedAntenna | SealedAntenna = node.antenna
+        antenna: IWirelessCommunication = node.antenna
         keys = self._key(node_id) if callable(self._key) else self._key
         if keys is not None:
             antenna = self._sealed(node.antenna, node_id, keys)
@@ -217,6 +221,9 @@ class Network:
 
     def restart(self, node_id: int) -> None:
         """Restart the mesh software of a node, which loses its state."""
+        self.air.run(functools.partial(self._restart, node_id))
+
+    def _restart(self, node_id: int) -> None:
         node = self.nodes[node_id]
         node.component.stop()
         self._install(node, node_id)
@@ -226,11 +233,9 @@ class Network:
         """Switch a node's antenna. Raises TypeError: the text "false" would switch it on."""
         if not isinstance(on, bool):
             raise TypeError(f"invalid on {on!r}: must be True or False")
-        node = self.nodes[node_id]
-        if node.antenna.powered != on:
-            node.antenna.switch_power(on)
-            node.component.on_antenna_power(on, self.clock.now_s)
-            node.plan()
+        antenna = self.nodes[node_id].antenna
+        if antenna.powered != on:
+            antenna.switch_power(on)
 
     def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> bool:
         """Order a drone to (x, y, height) metres through a gateway; like IGatewayCommands.
@@ -265,6 +270,12 @@ class Network:
     def inject(self, node_id: int, payload: bytes) -> None:
         """Deliver a packet without a sender to a node, even if its antenna has no power."""
         self.nodes[node_id].hear(payload)
+
+    def stop(self) -> None:
+        """Stop all nodes: necessary on chips, whose drivers otherwise wait for ever."""
+        for node in self.nodes.values():
+            self.air.run(node.component.stop)
+        self.air.stop()
 
     def run_for(self, seconds: float) -> None:
         """Let simulated time pass."""
@@ -301,9 +312,10 @@ class Network:
         return self.nodes[node_id].component.get_connected_to_gateway()
 
     def all_connected(self, among: Iterable[int] | None = None) -> bool:
-        """Whether each of these nodes (default: all that have power) is connected."""
+        """Whether each of these nodes (default: all that have power, at least one) is connected."""
         if among is None:
             among = [n for n, node in self.nodes.items() if node.antenna.powered]
+            return bool(among) and all(map(self.connected, among))
         return all(map(self.connected, among))
 
     def links(self, node_id: int) -> list[int]:

@@ -11,11 +11,8 @@ from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection, IMeshNetwork
 from drone_mesh.drone.location import Location
-from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.drone import InProcessDrone
-from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna
-from drone_mesh.inprocess.shared_air import SharedAir
-from drone_mesh.inprocess.shared_antenna import SharedAntenna
+from drone_mesh.inprocess.interfaces import IInProcessAir
 
 
 class NoInternet(IInternetConnection):
@@ -29,12 +26,11 @@ class NoInternet(IInternetConnection):
 
 
 class InProcessNode:
-    """One drone of the network with its mesh software, driven by the virtual clock."""
+    """One drone of the network with its mesh software, driven by the clock of its air."""
 
     def __init__(
         self,
-        clock: VirtualClock,
-        air: InProcessAir | SharedAir,
+        air: IInProcessAir,
         node_id: int,
         start: Location,
         rng: random.Random,
@@ -42,16 +38,13 @@ class InProcessNode:
         why_not_fly: str = "",
     ) -> None:
         """`rng` is the antenna's."""
+        self.node_id = node_id
         self.is_gateway = is_gateway
-        self._clock = clock
+        self._clock = air.clock
         self.drone = InProcessDrone(
-            clock, start, functools.partial(air.flight, node_id), why_not_fly
+            air.clock, start, functools.partial(air.flight, node_id), why_not_fly
         )
-        self.antenna: InProcessAntenna | SharedAntenna
-        if isinstance(air, SharedAir):
-            self.antenna = SharedAntenna(air, node_id, self.drone, self.submit, rng)
-        else:
-            self.antenna = InProcessAntenna(air, node_id, self.drone, self.hear)
+        self.antenna = air.antenna(self, rng)
         self.component: MeshnetworkComponent
         self.deadlines: Deadlines  # of the component
         self.receiver: IMeshNetwork  # receives the packets: the component or its sealed antenna

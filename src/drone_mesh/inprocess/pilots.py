@@ -7,10 +7,9 @@ from typing import Iterable, Mapping
 import numpy as np
 
 from drone_mesh.drone.location import Location
-from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.clock import Clock
 from drone_mesh.inprocess.drone import InProcessDrone
-from drone_mesh.inprocess.radio import InProcessAir
-from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.mobility import Segment, Track
 
 STEP_S = 0.1  # our choice: positions at 10 Hz, as a GPS receiver gives them
@@ -25,8 +24,8 @@ class Pilots:
 
     def __init__(
         self,
-        clock: VirtualClock,
-        air: InProcessAir | SharedAir,
+        clock: Clock,
+        air: IInProcessAir,
         drones: Mapping[int, InProcessDrone],
         tracks: Mapping[int, Track],
     ) -> None:

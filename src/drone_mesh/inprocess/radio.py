@@ -9,15 +9,11 @@ from typing import Callable, Iterable, Mapping
 import numpy as np
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.interfaces import (
-    IMeshDebugInfo,
-    IMeshNetwork,
-    IWirelessCommunication,
-)
+from drone_mesh.communication.interfaces import IMeshDebugInfo, IMeshNetwork
 from drone_mesh.communication.messages import copies_for, hop
-from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAntenna
 
 HOP_DELAY_S = 0.002  # an acknowledged packet takes 1.9 ms on the air (nRF24L01+, 250 kbit/s)
 
@@ -29,8 +25,10 @@ def _ignore(_payload: bytes) -> None:
     """A packet reached an antenna without power, or one that was stopped."""
 
 
-class InProcessAir:
+class InProcessAir(IInProcessAir):
     """Which nodes hear each other, and which packets are lost, delayed or cut off."""
+
+    clock: VirtualClock
 
     def __init__(
         self,
@@ -45,7 +43,7 @@ class InProcessAir:
 
         A packet arrives after `delay_s` and a random part of `jitter_s`.
         """
-        self._clock = clock
+        self.clock = clock
         self._rng = rng
         self.max_distance_m = max_distance_m
         self.loss = loss
@@ -74,6 +72,10 @@ class InProcessAir:
     def delivered(self) -> int:
         """The number of packets so far that a node receives or has received."""
         return self._delivered + len(self._under_way)
+
+    def antenna(self, host: Host, rng: random.Random) -> InProcessAntenna:
+        """A new antenna for that node."""
+        return InProcessAntenna(self, host)
 
     def expect(self, node_id: int) -> None:
         """A node with this id has an antenna, which may start later."""
@@ -212,7 +214,7 @@ class InProcessAir:
             return False
         if self.loss and self._rng.random() < self.loss:
             return False
-        now_s = self._clock.now_s
+        now_s = self.clock.now_s
         if now_s != self._left_s:
             self._next_to_leave(now_s)
         self._under_way.append((other, payload))
@@ -225,10 +227,10 @@ class InProcessAir:
         at_s = now_s + self._delay_s
         if self._jitter_s:
             at_s += self._rng.random() * self._jitter_s
-            self._clock.call_at(at_s, self._arrive, self._under_way)
+            self.clock.call_at(at_s, self._arrive, self._under_way)
         else:
             self._left_s = now_s
-            self._clock.call_in_line(at_s, self._arrive, self._under_way)
+            self.clock.call_in_line(at_s, self._arrive, self._under_way)
 
     def _arrive(self, packets: list[tuple[InProcessAntenna, bytes]]) -> None:
         self._left_s = -math.inf  # without a delay, the answers leave at this time, too
@@ -237,30 +239,28 @@ class InProcessAir:
             take(payload)
 
 
-class InProcessAntenna(IWirelessCommunication):
+class InProcessAntenna(IInProcessAntenna):
     """One node's radio."""
 
-    def __init__(
-        self, air: InProcessAir, node_id: int, drone: IDroneEngine, deliver: Deliver
-    ) -> None:
-        self.node_id = node_id
-        self.drone = drone
+    def __init__(self, air: InProcessAir, host: Host) -> None:
+        self.node_id = host.node_id
+        self.drone = host.drone
         self.powered = True
         self._air = air
-        self._deliver = deliver
-        self._started = False
+        self._host = host
+        self._mesh: IMeshNetwork | None = None
         self.take: Deliver = _ignore  # called with each packet that arrives
-        air.expect(node_id)
+        air.expect(host.node_id)
 
     def start_antenna(self, mesh: IMeshNetwork) -> None:
         """Become reachable."""
-        self._started = True
+        self._mesh = mesh
         self._listen()
         self._air.add(self)
 
     def stop_antenna(self) -> None:
         """Become unreachable."""
-        self._started = False
+        self._mesh = None
         self._listen()
         self._air.remove(self)
 
@@ -276,14 +276,13 @@ class InProcessAntenna(IWirelessCommunication):
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Does nothing: the owner of the network can read its nodes."""
 
-    def on(self) -> bool:
-        """Whether it has power."""
-        return self.powered
-
     def switch_power(self, on: bool) -> None:
         """Power on or off."""
         self.powered = on
         self._listen()
+        mesh = self._mesh
+        if mesh is not None:
+            self._host.submit(lambda now_s: mesh.on_antenna_power(on, now_s))
 
     def _listen(self) -> None:
-        self.take = self._deliver if self.powered and self._started else _ignore
+        self.take = self._host.hear if self.powered and self._mesh is not None else _ignore

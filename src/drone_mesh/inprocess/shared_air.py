@@ -17,6 +17,7 @@ from typing import Iterable
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
@@ -65,8 +66,10 @@ class SharedRadio(abc.ABC):
         """A frame for this radio has arrived undamaged."""
 
 
-class SharedAir:
+class SharedAir(IInProcessAir):
     """All radios on one channel, and the frames between them."""
+
+    clock: VirtualClock
 
     def __init__(
         self,
@@ -82,7 +85,7 @@ class SharedAir:
         self.max_distance_m = max_distance_m
         self.frames = 0  # frames sent so far
         self.collisions = 0  # receptions that another frame destroyed
-        self.delivered = 0  # payloads that reached a mesh component
+        self.payloads = 0  # that reached a mesh component
         self.airtime_s = 0.0  # of all frames together
         self._bits_per_s = settings.data_rate.value
         self._carrier_mhz = 2400 + settings.channel
@@ -124,6 +127,10 @@ class SharedAir:
         if node not in self._radios:
             return {}
         return {radio.node_id: radio for radio in self._in_reach(node)}
+
+    @property
+    def delivered(self) -> int:
+        return self.payloads
 
     # Frames ----------------------------------------------------------------------------------
 

@@ -5,22 +5,16 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import replace
-from typing import Callable
 
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.channel.trains import place_in_train
-from drone_mesh.communication.interfaces import (
-    MAX_NODE_ID,
-    IMeshDebugInfo,
-    IMeshNetwork,
-    IWirelessCommunication,
-)
+from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo, IMeshNetwork
 from drone_mesh.communication.medium import ChannelUse, Medium
 from drone_mesh.communication.messages import priority, readdressed, receiver
-from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.interfaces import Host, IInProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
 from drone_mesh.nrf24.airtime import NS_PER_S, SETTLING_NS, ard_s
 from drone_mesh.nrf24.pace import access_rules, medium_of
@@ -34,28 +28,18 @@ FINISH_S = 20e-6  # from TX_DS or MAX_RT to CE high again
 LOAD_S = 50e-6  # from TX_DS to the rise of CE for the next packet of a train
 READ_S = 80e-6  # from the end of a frame until its payload is in the driver
 
-Submit = Callable[[Callable[[float], None]], None]
-"""Runs a function with now_s in the component of the node, and schedules its next call."""
 
-
-class SharedAntenna(IWirelessCommunication, SharedRadio):
+class SharedAntenna(IInProcessAntenna, SharedRadio):
     """One node's radio."""
 
-    def __init__(
-        self,
-        air: SharedAir,
-        node_id: int,
-        drone: IDroneEngine,
-        submit: Submit,
-        rng: random.Random,
-    ) -> None:
-        self.node_id = node_id
-        self.drone = drone
+    def __init__(self, air: SharedAir, host: Host, rng: random.Random) -> None:
+        self.node_id = host.node_id
+        self.drone = host.drone
         self.listening_since_s: float | None = None
         self.access = MediumAccess(access_rules(air.settings), rng)
         self._air = air
         self._clock: VirtualClock = air.clock
-        self._submit = submit
+        self._submit = host.submit
         self._settings = air.settings
         self._tx_delay_s = TX_DELAY_S[air.settings.data_rate]
         self._medium = medium_of(air.settings)
@@ -118,19 +102,18 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Does nothing: the owner of the network can read its nodes."""
 
-    def on(self) -> bool:
-        """Whether it has power."""
-        return self.powered
-
     def statistics(self) -> RadioStatistics:
         """The current counters."""
         return replace(self._radio, **self.access.figures())
 
     def switch_power(self, on: bool) -> None:
-        """Power on or off; waiting packets are dropped."""
+        """Power on or off, and inform the mesh software; waiting packets are dropped."""
         self.powered = on
         self.access.clear()
         self.listening_since_s = self._clock.now_s if on and self._trying is None else None
+        mesh = self._mesh
+        if mesh is not None:
+            self._submit(lambda now_s: mesh.on_antenna_power(on, now_s))
 
     # Sending ---------------------------------------------------------------------------------
 
@@ -260,5 +243,13 @@ class SharedAntenna(IWirelessCommunication, SharedRadio):
         train = place_in_train(packet.payload, self.node_id)
         self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
-        self._air.delivered += 1
+        self._air.payloads += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))
+
+
+class SharedChannel(SharedAir):
+    """The air of a network on the fast model."""
+
+    def antenna(self, host: Host, rng: random.Random) -> SharedAntenna:
+        """A new antenna for that node."""
+        return SharedAntenna(self, host, rng)

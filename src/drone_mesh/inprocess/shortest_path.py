@@ -6,7 +6,7 @@ from typing import Callable, Iterable
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.inprocess.clock import VirtualClock
+from drone_mesh.inprocess.clock import Clock
 
 SHORTEST_PATH = "shortest_path"
 RECOMPUTE_EVERY_S = 0.1  # our choice: period for recomputing links, which change when drones fly
@@ -15,7 +15,7 @@ RECOMPUTE_EVERY_S = 0.1  # our choice: period for recomputing links, which chang
 class LinkMap:
     """The next hops of all shortest paths over the current links of a network."""
 
-    def __init__(self, clock: VirtualClock, links: Callable[[int], Iterable[int]]) -> None:
+    def __init__(self, clock: Clock, links: Callable[[int], Iterable[int]]) -> None:
         """`links` returns the nodes that a node can send to now; links must be symmetric."""
         self._clock = clock
         self._links = links

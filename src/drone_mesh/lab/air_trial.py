@@ -6,18 +6,17 @@ import math
 import random
 import time
 from dataclasses import dataclass, replace
-from typing import Iterable, Protocol
+from typing import Iterable
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.observer import MeshEvent, MeshEventKind
 from drone_mesh.drone.location import Location
-from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
+from drone_mesh.inprocess.chip_air import ChipAir, ChipAntenna
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
-from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
-from drone_mesh.nrf24.settings import DEFAULT_RATE, RadioSettings, data_rate
+from drone_mesh.nrf24.settings import DEFAULT_RATE, data_rate
 
 CHIPS, MODEL, DISC = "chips", "model", "disc"
 SAMPLE_S = 0.1  # sampling period of the nodes' connections
@@ -46,21 +45,6 @@ class AirTrial:
         return tuple((self.spacing_m * column, self.spacing_m * row) for row, column in grid)
 
 
-class AirMesh(Protocol):
-    """The common functions of both kinds of mesh."""
-
-    events: list[MeshEvent]
-
-    def now_s(self) -> float: ...
-    def run_for(self, seconds: float) -> None: ...
-    def all_connected(self) -> bool: ...
-    def connected(self, node_id: int) -> bool: ...
-    def power(self, node_id: int, on: bool) -> None: ...
-    def place(self, node_id: int) -> Location: ...
-    def order(self, node_id: int, x: float, y: float) -> object: ...
-    def stop(self) -> None: ...
-
-
 @dataclass(frozen=True)
 class TrialFigures:
     """The result of one trial."""
@@ -77,81 +61,17 @@ class TrialFigures:
     warnings: int  # misuse of chips
 
 
-class ChipMesh:
-    """The mesh on emulated chips."""
-
-    def __init__(self, trial: AirTrial) -> None:
-        settings = RadioSettings(data_rate=data_rate(trial.rate))
-        self.mesh = EmulatedMesh(CooperativeClock(), _links(trial), trial.seed, settings=settings)
-        self.mesh.add_gateway(GATEWAY, (-1.0, 0.0, 0.0))
-        for index, (x, y) in enumerate(trial.router_places()):
-            self.mesh.add_router(index + 1, (x, y, 0.0))
-        self.events = self.mesh.events
-        self.now_s, self.run_for = self.mesh.now_s, self.mesh.run_for
-        self.all_connected, self.connected = self.mesh.all_connected, self.mesh.connected
-        self.power, self.order, self.stop = self.mesh.power, self.mesh.order, self.mesh.stop
-
-    def place(self, node_id: int) -> Location:
-        """The position of a drone."""
-        return self.mesh.nodes[node_id].drone.get_location()
-
-    def figures(self) -> dict[str, float]:
-        """Figures of the air and of all radios."""
-        air, nodes = self.mesh.air, self.mesh.nodes.values()
-        radios = [node.antenna.statistics() for node in nodes]
-        return _totals(
-            air.frames,
-            air.collisions,
-            air.airtime_s,
-            [(radio.acknowledged, radio.lost, radio.tries) for radio in radios],
-            sum(len(node.chip.warnings) for node in nodes),
-        )
-
-
-class ModelMesh:
-    """The mesh on the fast model."""
-
-    def __init__(self, trial: AirTrial, shared: bool = True) -> None:
-        """Not `shared`: the ideal disc, which has no figures for its air."""
-        if shared:
-            self.network = Network(
-                seed=trial.seed, radio="shared", rate=trial.rate, links=_links(trial)
-            )
-        else:
-            self.network = Network(seed=trial.seed, loss=trial.loss)
-        self.network.add_gateway(GATEWAY, -1.0, 0.0)
-        for index, (x, y) in enumerate(trial.router_places()):
-            self.network.add_router(index + 1, x, y)
-        self.events = self.network.events
-        self.now_s, self.run_for = self.network.now_s, self.network.run_for
-        self.all_connected, self.connected = self.network.all_connected, self.network.connected
-        self.power, self.order, self.place = (
-            self.network.power,
-            self.network.order,
-            self.network.location,
-        )
-
-    def stop(self) -> None:
-        """Does nothing."""
-
-    def figures(self) -> dict[str, float]:
-        """Figures of the air and of all radios."""
-        air = self.network.air
-        assert isinstance(air, SharedAir)
-        antennas = [node.antenna for node in self.network.nodes.values()]
-        radios = [one.statistics() for one in antennas if isinstance(one, SharedAntenna)]
-        return _totals(
-            air.frames,
-            air.collisions,
-            air.airtime_s,
-            [(radio.acknowledged, radio.lost, radio.tries) for radio in radios],
-            0,
-        )
-
-
-def make_mesh(trial: AirTrial, kind: str) -> ChipMesh | ModelMesh:
+def make_mesh(trial: AirTrial, kind: str) -> Network:
     """The mesh of a trial on CHIPS, the MODEL or the DISC; all nodes start together."""
-    return ChipMesh(trial) if kind == CHIPS else ModelMesh(trial, shared=kind == MODEL)
+    if kind == DISC:
+        network = Network(seed=trial.seed, loss=trial.loss)
+    else:
+        radio = "chips" if kind == CHIPS else "shared"
+        network = Network(seed=trial.seed, radio=radio, rate=trial.rate, links=_links(trial))
+    network.add_gateway(GATEWAY, -1.0, 0.0)
+    for index, (x, y) in enumerate(trial.router_places()):
+        network.add_router(index + 1, x, y)
+    return network
 
 
 def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> TrialFigures:
@@ -162,24 +82,26 @@ def watch(trial: AirTrial, kind: str, within_s: float, after_s: float) -> TrialF
     share = 0.0
     if connected_s < math.inf:
         share = share_connected(mesh, range(1, trial.nodes), after_s)
-    figures = mesh.figures()
-    simulated_s = mesh.now_s()
+    air, simulated_s = mesh.air, mesh.now_s()
+    assert isinstance(air, (SharedAir, ChipAir))
+    antennas = [node.antenna for node in mesh.nodes.values()]
+    radios = [a.statistics() for a in antennas if isinstance(a, (SharedAntenna, ChipAntenna))]
     mesh.stop()
     return TrialFigures(
         connected_s,
         share,
-        int(figures["frames"]),
-        figures["collided"],
-        figures["airtime_s"] / simulated_s,
-        int(figures["lost"]),
-        figures["tries"],
+        air.frames,
+        air.collisions / max(air.frames, 1),
+        air.airtime_s / simulated_s,
+        sum(radio.lost for radio in radios),
+        1 + sum(radio.tries for radio in radios) / max(sum(r.acknowledged for r in radios), 1),
         simulated_s,
         time.process_time() - cpu_s,
-        int(figures["warnings"]),
+        len(air.warnings()) if isinstance(air, ChipAir) else 0,
     )
 
 
-def connect(mesh: AirMesh, within_s: float) -> float:
+def connect(mesh: Network, within_s: float) -> float:
     """Time until all were connected; infinity if longer than `within_s`."""
     until_s = mesh.now_s() + within_s
     while not mesh.all_connected():
@@ -189,7 +111,7 @@ def connect(mesh: AirMesh, within_s: float) -> float:
     return mesh.now_s()
 
 
-def share_connected(mesh: AirMesh, nodes: Iterable[int], seconds: float) -> float:
+def share_connected(mesh: Network, nodes: Iterable[int], seconds: float) -> float:
     """Share of node-seconds that these nodes are connected."""
     nodes = list(nodes)
     samples = round(seconds / SAMPLE_S)
@@ -225,7 +147,7 @@ def kill(
         mesh.power(node, False)
     died_s = mesh.now_s()
     alive = [node for node in range(trial.nodes) if node not in dead]
-    reachable = with_a_path({node: mesh.place(node) for node in alive})
+    reachable = with_a_path({node: mesh.location(node) for node in alive})
     watched = [node for node in alive if node != GATEWAY] if repair else reachable
     last_s = 0.0
     while mesh.now_s() < died_s + seconds:
@@ -274,7 +196,7 @@ def give_orders(trial: AirTrial, kind: str, count: int, flight_m: float) -> Orde
     connect(mesh, 120.0)
     mesh.run_for(SETTLE_S)
     rng = random.Random(f"{trial.seed} orders")
-    homes = {node: mesh.place(node) for node in range(1, trial.nodes)}
+    homes = {node: mesh.location(node) for node in range(1, trial.nodes)}
     sent: list[tuple[float, int]] = []
     for _ in range(count):
         lately = {node for _, node in sent[-10:]}  # the drone's id identifies the order
@@ -332,21 +254,3 @@ def _links(trial: AirTrial) -> LinkModel:
         rng = random.Random(f"{trial.seed} loss")
         return ScriptedLoss(links, lambda _hop: rng.random() < trial.loss)
     return links
-
-
-def _totals(
-    frames: int,
-    collisions: int,
-    airtime_s: float,
-    packets: list[tuple[int, int, int]],
-    warnings: int,
-) -> dict[str, float]:
-    acknowledged, lost, tries = (sum(column) for column in zip(*packets))
-    return {
-        "frames": frames,
-        "collided": collisions / max(frames, 1),
-        "airtime_s": airtime_s,
-        "lost": lost,
-        "tries": 1 + tries / max(acknowledged, 1),
-        "warnings": warnings,
-    }

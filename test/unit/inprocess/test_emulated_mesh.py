@@ -1,31 +1,32 @@
-"""The real mesh core on real drivers on emulated chips."""
+"""The real mesh core on real drivers on emulated chips: Network(radio="chips")."""
 
 from __future__ import annotations
 
 import random
 import threading
+import time
 from collections import Counter
 
 import pytest
 
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.emulated_mesh import EmulatedMesh
-from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
+from drone_mesh.inprocess.wall_mesh import WallMesh
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
-from drone_mesh.nrf24.emulator.wall_clock import WallClock
+from drone_mesh.nrf24.settings import RadioSettings
 
 # casus.yaml, layout 101: three rows of two behind a gateway
-GATEWAY = (-1.0, 0.0, 0.1)
+GATEWAY = (-1.0, 0.0)
 LAYOUT_101 = {1: (-3, 4), 2: (3, 4), 3: (-3, 10), 4: (3, 10), 5: (-3, 16), 6: (3, 16)}
 # The chip hears further than 9 m, as it does in reality: at this scale the same links exist.
 METRES_OF_THE_FIELD = 10.0
 
 
-def layout_101(links: LinkModel, scale: float = 1.0, seed: int = 1) -> EmulatedMesh:
-    mesh = EmulatedMesh(CooperativeClock(), links, seed)
-    mesh.add_gateway(0, (GATEWAY[0] * scale, GATEWAY[1] * scale, GATEWAY[2]))
+def layout_101(links: LinkModel, scale: float = 1.0, seed: int = 1) -> Network:
+    mesh = Network(seed, radio="chips", links=links)
+    mesh.add_gateway(0, GATEWAY[0] * scale, GATEWAY[1] * scale)
     for node, (x_m, y_m) in LAYOUT_101.items():
-        mesh.add_router(node, (x_m * scale, y_m * scale, 0.05))
+        mesh.add_router(node, x_m * scale, y_m * scale)
     return mesh
 
 
@@ -57,24 +58,57 @@ def test_layout_101_connects_with_the_hops_of_2019_and_detours_when_router_3_is_
         within_s=120.0,
     ), f"node 5 found no way round node 3; hops {hops(mesh)}"
     assert mesh.run_until(mesh.all_connected, within_s=60.0), hops(mesh)
+    assert mesh.air.warnings() == []
     for node in mesh.nodes.values():
-        assert node.chip.warnings == []
         statistics = node.antenna.statistics()
         assert statistics.sent == statistics.acknowledged + statistics.lost
 
 
 def test_a_mesh_in_the_time_of_the_wall_ends_all_its_threads_when_it_stops():
     before = set(threading.enumerate())
-    clock = WallClock()
-    mesh = EmulatedMesh(clock, IdealDisc(9.0))
-    mesh.add_gateway(0, GATEWAY)
-    mesh.add_router(1, (-3.0, 4.0, 0.05))
+    mesh = WallMesh(IdealDisc(9.0), RadioSettings(), seed=1)
+    mesh.add(0, -1.0, 0.0, gateway=True)
+    mesh.add(1, -3.0, 4.0, gateway=False)
     names = {thread.name for thread in threading.enumerate()}
-    assert {"mesh 0", "mesh 1"} <= names
-    mesh.run_until(lambda: mesh.nodes[0].antenna.on() and mesh.nodes[1].antenna.on(), 20.0)
+    assert "mesh" in names
+    wait_until(mesh.all_connected)
     mesh.stop()
-    clock.close()
     assert set(threading.enumerate()) <= before
+
+
+def wait_until(condition, within_s=60.0):
+    end_s = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < end_s
+        time.sleep(0.05)
+
+
+def test_a_drone_takes_its_chip_along_and_a_restarted_node_comes_back():
+    mesh = Network(3, radio="chips")
+    mesh.add_fleet(gateways=1, routers=9, gridsize=3, spacing=6.0)
+    assert mesh.run_until(mesh.all_connected, within_s=30.0)
+    before = mesh.links(9)
+    assert mesh.order(9, 12.0, 18.0)
+    mesh.run_for(1.0)
+    assert mesh.nodes[9].drone.path is not None
+    assert mesh.run_until(lambda: mesh.nodes[9].drone.path is None, within_s=30.0)
+    assert mesh.nodes[9].antenna.chip.position == mesh.location(9).to_vector() == (12.0, 18.0, 0.0)
+    assert mesh.links(9) != before
+    mesh.restart(2)
+    mesh.run_for(1.0)
+    assert mesh.run_until(mesh.all_connected, within_s=30.0)
+    assert mesh.air.warnings() == []
+    mesh.stop()
+
+
+def test_a_mesh_with_a_key_works_on_chips():
+    mesh = Network(3, radio="chips", key=MeshKey(bytes(range(16))))
+    mesh.add_fleet(gateways=1, routers=4, gridsize=2, spacing=6.0)
+    assert mesh.run_until(mesh.all_connected, within_s=60.0)
+    mesh.power(3, False)
+    mesh.run_for(1.0)
+    assert not mesh.nodes[3].antenna.on()
+    mesh.stop()
 
 
 def test_the_same_seed_gives_the_same_mesh():
@@ -89,12 +123,8 @@ def test_the_same_seed_gives_the_same_mesh():
 
 
 def grid(nodes, seed=1):
-    mesh = EmulatedMesh(CooperativeClock(), IdealDisc(9.0), seed)
-    columns = round((nodes - 1) ** 0.5)
-    mesh.add_gateway(0, GATEWAY)
-    for index in range(nodes - 1):
-        row, column = divmod(index, columns)
-        mesh.add_router(index + 1, (6.0 * column, 6.0 * row, 0.05))
+    mesh = Network(seed, radio="chips")
+    mesh.add_fleet(1, nodes - 1, round((nodes - 1) ** 0.5), 6.0)
     return mesh
 
 
@@ -108,7 +138,7 @@ def test_26_nodes_on_one_channel_connect_and_stay_connected():
         connected += sum(mesh.hops(node) != 255 for node in mesh.nodes if node)
     assert connected / seconds / 25 >= 0.998
     assert mesh.air.collisions < 0.4 * mesh.air.frames
-    assert [node.chip.warnings for node in mesh.nodes.values() if node.chip.warnings] == []
+    assert mesh.air.warnings() == []
     mesh.stop()
 
 

@@ -1,13 +1,16 @@
 """The in-process air: what it remembers about links is what the places say."""
 
 import random
+from types import SimpleNamespace
 
 import pytest
 
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna
+from drone_mesh.inprocess.radio import InProcessAir
+
+MESH = object()  # what arrives goes to the host
 
 
 class Stone(IDroneEngine):
@@ -33,11 +36,13 @@ class Field:
         self.heard = []
 
     def put(self, node, x, y=0.0):
-        antenna = InProcessAntenna(
-            self.air, node, Stone(Location(y, x, 0.0)), lambda p: self.heard.append((node, p))
+        host = SimpleNamespace(
+            node_id=node,
+            drone=Stone(Location(y, x, 0.0)),
+            hear=lambda payload: self.heard.append((node, payload)),
         )
-        self.antennas[node] = antenna
-        antenna.start_antenna(None)
+        self.antennas[node] = self.air.antenna(host, random.Random(node))
+        self.antennas[node].start_antenna(MESH)
 
     def send(self, from_, to):
         payload = bytes((from_, from_, 2, to, to)).ljust(32, b"\0")
@@ -74,7 +79,7 @@ def test_links_are_those_of_the_places_after_a_drone_comes_flies_or_is_cut_off()
             field.antennas[node].stop_antenna()
         elif what == "start" and node in gone:
             gone.discard(node)
-            field.antennas[node].start_antenna(None)
+            field.antennas[node].start_antenna(MESH)
         for moving in flying:
             field.antennas[moving].drone.set_goal(rng.uniform(0, 30), rng.uniform(0, 30), 0.0)
         for one in range(30):

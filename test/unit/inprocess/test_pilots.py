@@ -43,7 +43,7 @@ def links(network):
     return {(a, b) for a in network.nodes for b in network.links(a) if a < b}
 
 
-@pytest.mark.parametrize("radio", ["disc", "shared"])
+@pytest.mark.parametrize("radio", ["disc", "shared", "chips"])
 def test_links_follow_the_drones(radio):
     network = fleet(radio)
     tracks, _pilots = fly(network, speed_m_s=(1.0, 1.0))

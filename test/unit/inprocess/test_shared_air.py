@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from types import SimpleNamespace
 
 import pytest
 from scenarios import events, flown, layout
@@ -13,8 +14,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.clock import VirtualClock
-from drone_mesh.inprocess.shared_air import SharedAir
-from drone_mesh.inprocess.shared_antenna import SharedAntenna
+from drone_mesh.inprocess.shared_antenna import SharedChannel
 from drone_mesh.nrf24.emulator.links import IdealDisc, LogDistance, ScriptedLoss
 from drone_mesh.nrf24.settings import RadioSettings
 
@@ -40,7 +40,7 @@ class Mesh(IMeshNetwork):
         self.undelivered.append(payload)
 
     def on_antenna_power(self, on, now_s):
-        raise AssertionError("no one switches it")
+        self.powered = on
 
     def on_antenna_registered(self, now_s):
         raise AssertionError("a radio is not registered anywhere")
@@ -53,17 +53,16 @@ class Rig:
         self.clock = VirtualClock()
         self.loses = lambda hop: False
         model = ScriptedLoss(links or IdealDisc(9.0), lambda hop: self.loses(hop))
-        self.air = SharedAir(self.clock, model, settings or RadioSettings(), 9.0)
+        self.air = SharedChannel(self.clock, model, settings or RadioSettings(), 9.0)
         self.meshes, self.antennas = [], []
         for node_id, x_m in enumerate(places_m):
             mesh = Mesh(node_id)
-            antenna = SharedAntenna(
-                self.air,
-                node_id,
-                GroundEngine(node_id, Location(0.0, x_m, 0.0)),
-                lambda work: work(self.clock.now_s),
-                random.Random(f"bench {node_id}"),
+            host = SimpleNamespace(
+                node_id=node_id,
+                drone=GroundEngine(node_id, Location(0.0, x_m, 0.0)),
+                submit=lambda work: work(self.clock.now_s),
             )
+            antenna = self.air.antenna(host, random.Random(f"bench {node_id}"))
             antenna.start_antenna(mesh)
             self.meshes.append(mesh)
             self.antennas.append(antenna)
@@ -170,7 +169,9 @@ def test_a_radio_without_power_neither_sends_nor_hears():
 
 
 def test_an_unknown_radio_or_rate_is_refused():
-    with pytest.raises(ConfigurationError, match="invalid radio 'sharde': use disc or shared"):
+    with pytest.raises(
+        ConfigurationError, match="invalid radio 'sharde': use disc, shared or chips"
+    ):
         Network(radio="sharde")
     with pytest.raises(ConfigurationError, match="invalid data rate '3M': use one of 250k, 1M, 2M"):
         Network(radio="shared", rate="3M")

@@ -5,7 +5,6 @@ Mesh software, radio driver and MAVLink pilot are the real ones; chips, air and 
 
 from __future__ import annotations
 
-import random
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "drone"))
 from mavlink_rig import ALL, ORIGIN, Wire
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -27,12 +25,9 @@ from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.drone.mavlink_vehicle.modes import Mode
 from drone_mesh.drone.mavlink_vehicle.vehicle import MavlinkVehicle
 from drone_mesh.errors import LocationUnknown
-from drone_mesh.inprocess.emulated_mesh import EmulatedMesh, EmulatedNode
-from drone_mesh.inprocess.node import NoInternet
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.node import InProcessNode
 from drone_mesh.layouts import Layouts
-from drone_mesh.nrf24.airtime import NS_PER_S
-from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
-from drone_mesh.nrf24.emulator.links import IdealDisc
 
 STEP_S = 0.05
 LIMITS = FlightLimits(speed_m_s=4.0, cruise_height_m=3.0, layer_m=0.5)
@@ -44,7 +39,7 @@ LAYOUT_202 = {0: GATEWAY, **dict(Layouts.load(CASUS).orders(202))}
 class VirtualEngine(IDroneEngine):
     """A MAVLink pilot with its vehicle at the other end of a line, driven by the air's clock."""
 
-    def __init__(self, mesh: EmulatedMesh, node_id: int, home: Location, kind: Autopilot) -> None:
+    def __init__(self, mesh: Network, node_id: int, home: Location, kind: Autopilot) -> None:
         self._mesh, self._node_id = mesh, node_id
         self._down = Wire(OUR_SYSTEM_ID, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
         self._up = Wire(1, mavlink.MAV_COMP_ID_AUTOPILOT1)
@@ -68,8 +63,8 @@ class VirtualEngine(IDroneEngine):
         self._status = self.pilot.status(now_s)
         node = self._mesh.nodes.get(self._node_id)
         if node is not None and self._status.location is not None:
-            node.chip.position = self._status.location.to_vector()
-        self._mesh.clock.call_at(round((now_s + STEP_S) * NS_PER_S), self._step, None)
+            node.antenna.chip.position = self._status.location.to_vector()
+        self._mesh.clock.call_at(now_s + STEP_S, self._step, None)
 
     def commands(self) -> list[int]:
         return [m.command for m in self._down.sent if m.get_type() == "COMMAND_LONG"]
@@ -99,30 +94,19 @@ class VirtualEngine(IDroneEngine):
         return bool(self._goals) or self._status.is_flying
 
 
-class FlyingMesh(EmulatedMesh):
+class FlyingMesh(Network):
     """Each node has a vehicle."""
 
     def __init__(self, kind: Autopilot, seed: int) -> None:
         timing = MeshTiming(check_period_s=5.0, connection_lost_after_s=15.0)
-        super().__init__(CooperativeClock(), IdealDisc(9.0), seed, timing=timing)
+        super().__init__(seed, timing, radio="chips")
         self.engines: dict[int, VirtualEngine] = {}
         self._kind = kind
 
-    def add(self, node_id: int, place: Location) -> None:
-        rng = random.Random(f"{self._seed} {node_id}")
-        node = EmulatedNode(self.air, node_id, place.to_vector(), self._settings, rng)
-        self.engines[node_id] = VirtualEngine(self, node_id, place, self._kind)
-        node.component = assemble_component(
-            node_id,
-            node.antenna,
-            self.engines[node_id],
-            rng,
-            internet=None if node_id else NoInternet(),
-            timing=self._timing,
-            observer=self.events.append,
-        )
-        self.nodes[node_id] = node
-        node.start()
+    def _install(self, node: InProcessNode, node_id: int) -> None:
+        home = node.drone.get_location()
+        node.drone = self.engines[node_id] = VirtualEngine(self, node_id, home, self._kind)
+        super()._install(node, node_id)
 
 
 @pytest.mark.slow
@@ -130,7 +114,8 @@ class FlyingMesh(EmulatedMesh):
 def test_layout_202_without_node_1_is_repaired_by_drones_that_really_fly(kind: Autopilot) -> None:
     mesh = FlyingMesh(kind, seed=3)
     for node_id, place in LAYOUT_202.items():
-        mesh.add(node_id, place._replace(height=0.0))
+        add = mesh.add_router if node_id else mesh.add_gateway
+        add(node_id, place.longitude, place.latitude)
     try:
         assert mesh.run_until(mesh.all_connected, within_s=60.0)
         mesh.run_for(30.0)  # everything is reported, and each knows where to step back to

@@ -15,8 +15,6 @@ from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import Network
-from drone_mesh.inprocess.radio import InProcessAir, InProcessAntenna
-from drone_mesh.inprocess.shared_antenna import SharedAntenna
 
 BESIDE = 201  # a router of the stranger, without a key
 
@@ -80,18 +78,14 @@ class Stranger(IMeshNetwork):
         self.heard: list[bytes] = []  # packets to its own address
         self.swallows: set[int] = set()  # nodes that drop packets for other nodes
         self.on_packet: Callable[[bytes], None] = self.heard.append
-        drone = InProcessDrone(
+        self.drone = InProcessDrone(
             network.clock, Location.from_vector((x, y, 0.0)), lambda _started: None, ""
         )
         self._receiver: IMeshNetwork = self
         self._is_inside = False
-        self._air = air = network.air
-        self.antenna: IWirelessCommunication
-        if isinstance(air, InProcessAir):
-            self.antenna = InProcessAntenna(air, node_id, drone, self._hear)
-        else:
-            rng = random.Random(f"stranger {node_id}")
-            self.antenna = SharedAntenna(air, node_id, drone, self._work, rng)
+        self._air = network.air
+        rng = random.Random(f"stranger {node_id}")
+        self.antenna: IWirelessCommunication = network.air.antenna(self, rng)
 
     def join_with(self, keys: Keys) -> None:
         """Send and receive with the keys of a captured node."""
@@ -159,10 +153,10 @@ class Stranger(IMeshNetwork):
 
     # IMeshNetwork ----------------------------------------------------------------------------
 
-    def _work(self, work: Callable[[float], None]) -> None:
+    def submit(self, work: Callable[[float], None]) -> None:
         work(self.network.now_s())
 
-    def _hear(self, payload: bytes) -> None:
+    def hear(self, payload: bytes) -> None:
         self._receiver.on_msg(payload, self.network.now_s())
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
