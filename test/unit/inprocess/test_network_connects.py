@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 
 import pytest
 from air_watch import AirWatch
@@ -23,7 +24,6 @@ from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.drone import InProcessDrone
-from drone_mesh.inprocess.radio import InProcessAntenna
 
 SHORT = ("STARTED", "CONNECTED", "DISCONNECTED", "EMERGENCY", "FLIGHT_DECIDED", "LANDED")
 
@@ -148,10 +148,12 @@ class StrangersNode:
     """A foreign radio without our mesh software. It records what it hears."""
 
     def __init__(self, network, node, x, y):
+        self.node_id = node
+        self.drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda started: None)
         self.heard = []
-        drone = InProcessDrone(network.clock, Location(y, x, 0.0), lambda started: None)
-        self.antenna = InProcessAntenna(network.air, node, drone, self.heard.append)
-        self.antenna.start_antenna(None)
+        self.hear = self.heard.append
+        self.antenna = network.air.antenna(self, random.Random(node))
+        self.antenna.start_antenna(self)
 
 
 def test_a_stranger_is_answered_on_the_first_try():
