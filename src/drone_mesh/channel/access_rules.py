@@ -28,6 +28,7 @@ class AccessRules:
     broadcast_jitter_s: float  # a broadcast waits for a random part of this
     answer_jitter_s: float  # so does any packet within this time after a broadcast was heard
     lifetime_s: float  # a packet that waited for this time is no longer useful
+    still_there_s: float  # a node that was heard within this time counts as present
     queue_length: int  # packets that may wait, in total
     data_queue_length: int  # of these: users' packets
     most_patience: float  # check periods without probes on a busy channel, at most
@@ -53,7 +54,8 @@ class AccessRules:
             most_hold_s=200 * cycle_s,
             broadcast_jitter_s=60 * cycle_s,
             answer_jitter_s=60 * cycle_s,
-            lifetime_s=10.0,
+            lifetime_s=max(10.0, 3800 * cycle_s),
+            still_there_s=max(5.0, 1900 * cycle_s),
             queue_length=300,
             data_queue_length=120,
             most_patience=2.5,

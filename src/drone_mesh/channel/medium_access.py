@@ -49,7 +49,6 @@ class Fate(enum.Enum):
 
 _LEARNING = 0.1  # weight of the latest first try in the estimate of contention
 _MOST_CONTENTION = 0.9
-_STILL_THERE_S = 5.0  # our choice: a node that was heard within this time is considered present
 
 
 class MediumAccess:
@@ -172,7 +171,7 @@ class MediumAccess:
         if packet.tries >= most or now_s - packet.queued_s > rules.lifetime_s:
             counts["sent"] += 1
             counts["lost"] += 1
-            if self._heard_s.get(receiver, -math.inf) > packet.queued_s - _STILL_THERE_S:
+            if self._heard_s.get(receiver, -math.inf) > packet.queued_s - rules.still_there_s:
                 self._learn(True)  # it is there, so the channel is to blame
             self._silent.add(receiver)
             self._queue.remove(packet)

@@ -151,7 +151,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         the gateway for minutes.
         """
         _hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
-        return self._antenna.medium.shared and self._deadlines.now_s - heard_s < SEARCH_WITHIN_S
+        medium = self._antenna.medium
+        ago_s = self._deadlines.now_s - heard_s
+        return medium.shared and ago_s < medium.stretched(SEARCH_WITHIN_S)
 
     def _begin(self) -> None:
         self._internet.connect(self)

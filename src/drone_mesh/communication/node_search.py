@@ -35,7 +35,7 @@ class NodeSearch:
     def search(self, node: int) -> bool:
         """Broadcast a search for `node`. False: too soon after another search."""
         now_s = self._parts.now_s
-        if now_s - self._searched_s < SEARCH_EVERY_S:
+        if now_s - self._searched_s < self._parts.antenna.medium.stretched(SEARCH_EVERY_S):
             return False
         self._searched_s = now_s
         number = int(now_s * NUMBERS_PER_S) % 2**16

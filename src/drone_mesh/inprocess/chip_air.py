@@ -9,14 +9,13 @@ from __future__ import annotations
 import functools
 import math
 import random
-from typing import Any, Callable, Iterable
+from typing import Callable, Iterable
 
 from drone_mesh.channel.runtime import Task
 from drone_mesh.inprocess.interfaces import Host, IInProcessAir, IInProcessAntenna
-from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.inprocess.task_clock import TaskClock
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
-from drone_mesh.nrf24.emulator.cooperative_clock import CooperativeClock
 from drone_mesh.nrf24.emulator.links import LinkModel
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
@@ -25,31 +24,11 @@ from drone_mesh.nrf24.settings import RadioSettings
 FLIGHT_STEP_S = 0.1  # a flying antenna moves in steps of this
 
 
-class ChipClock:
-    """The clock of the chips, in seconds."""
-
-    def __init__(self) -> None:
-        self.chips = CooperativeClock()
-
-    @property
-    def now_s(self) -> float:
-        return self.chips.now_s()
-
-    def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
-        """Call `function(argument)` at `at_s`, or at once; it must not wait for a chip."""
-        at_ns = max(math.ceil(at_s * NS_PER_S), self.chips.now_ns)
-        self.chips.call_at(at_ns, function, argument)
-
-    def run_until(self, until_s: float) -> None:
-        """Process all events up to and including `until_s`."""
-        self.chips.sleep(max(0.0, until_s - self.now_s))
-
-
 class ChipAntenna(NRF24HighLevelInterface, IInProcessAntenna):
     """One node's chip, driver and antenna."""
 
     def __init__(self, air: ChipAir, host: Host, rng: random.Random) -> None:
-        clock = air.clock.chips
+        clock = air.clock.tasks
         place = host.drone.get_location().to_vector()
         self.chip = EmulatedChip(air.air, f"node {host.node_id}", place)
         driver = NRF24LowLevelInterface(
@@ -77,14 +56,14 @@ class ChipAntenna(NRF24HighLevelInterface, IInProcessAntenna):
 class ChipAir(IInProcessAir):
     """The emulated chips of a network and the air between them."""
 
-    clock: ChipClock
+    clock: TaskClock
 
     def __init__(
         self, links: LinkModel, settings: RadioSettings, max_distance_m: float, rng: random.Random
     ) -> None:
         """`max_distance_m`: the range for pictures and path searches."""
-        self.clock = ChipClock()
-        self.air = Air(self.clock.chips, links, rng)
+        self.clock = TaskClock()
+        self.air = Air(self.clock.tasks, links, rng)
         self.settings = settings
         self.max_distance_m = max_distance_m
         self._links = links
@@ -123,7 +102,7 @@ class ChipAir(IInProcessAir):
 
     def run(self, function: Callable[[], None]) -> None:
         """Run it in a task of its own, because drivers wait for their chips."""
-        self._tasks.append(self.clock.chips.start(function, "node"))
+        self._tasks.append(self.clock.tasks.start(function, "node"))
 
     def stop(self) -> None:
         """Wait until all nodes have stopped."""

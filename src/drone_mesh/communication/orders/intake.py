@@ -174,7 +174,9 @@ class OrderIntake:
             order.tries_left = 0
         elif order.tries_left:
             order.tries_left -= 1
-            parts.deadlines.set(Due.ORDER_REPLIES, parts.now_s + REPLY_AGAIN_S)
+            parts.deadlines.set(
+                Due.ORDER_REPLIES, parts.now_s + parts.antenna.medium.stretched(REPLY_AGAIN_S)
+            )
 
 
 _NOWHERE = Location(math.nan, math.nan, math.nan)
