@@ -59,8 +59,9 @@ class Impairments:
         else:
             for node in self.network.nodes.values():
                 self._watch(node.antenna)
-            self.frames = {"control": 0, "data": 0}
-            self._watch_frames(air)
+            if isinstance(air, SharedAir):
+                self.frames = {"control": 0, "data": 0}
+                self._watch_frames(air)
 
     @property
     def disc(self) -> InProcessAir:
