@@ -23,6 +23,7 @@ from drone_mesh.drone.fleet import (
     DEFAULT_SPACING_M,
     MAX_DRONES,
 )
+from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.yaml_file import read_mapping
 
@@ -59,6 +60,14 @@ class FactoryConfiguration:
     flight: Literal["kinematic", "dynamic"] = Field("kinematic")  # dynamic: physics moves drones
     wind_x: float = Field(0.0, ge=-20, le=20, description="metres per second")
     wind_y: float = Field(0.0, ge=-20, le=20, description="metres per second")
+    cruise_height: float = Field(
+        MAX_HEIGHT_M, gt=0, le=MAX_HEIGHT_M, description="metres"
+    )  # ceiling of ordered flights
+    missions: str = Field("", description="the absolute path of a file of missions, or empty")
+    mobility: Literal[
+        "none", "random_waypoint", "gauss_markov", "group", "patrol", "oval", "eight"
+    ] = Field("none")  # how pilots fly the routers
+    speed: float = Field(0.3, gt=0, le=20, description="metres per second")  # of mobility
     shape: Literal["quadrocopter", "box"] = Field("quadrocopter")  # how drones are drawn
     real_time_factor: float = Field(
         1.0,

@@ -272,6 +272,7 @@ class NodeState(Message, NodeStatus):
     route: bytes
     position: Sequence[float]
     path: Sequence[float]
+    heading: Sequence[float]
     report_age: float
     airtime: float
     tries: float
@@ -311,6 +312,7 @@ class NodeState(Message, NodeStatus):
         route: bytes | Sequence[int] = ...,
         position: Sequence[float] = ...,
         path: Sequence[float] = ...,
+        heading: Sequence[float] = ...,
         report_age: float = ...,
         airtime: float = ...,
         tries: float = ...,

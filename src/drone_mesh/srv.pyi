@@ -4,7 +4,7 @@ from typing import Final, Sequence
 
 from genpy import Message
 
-from drone_mesh.msg import NRF24
+from drone_mesh.msg import NRF24, Location
 
 class AddDroneRequest(Message):
     LOWEST_FREE: Final = 255
@@ -64,6 +64,32 @@ class CasusResponse(Message): ...
 class Casus:
     _request_class = CasusRequest
     _response_class = CasusResponse
+
+class FlyMissionRequest(Message):
+    FLY: Final = 0
+    PAUSE: Final = 1
+    RESUME: Final = 2
+    STOP: Final = 3
+    action: int
+    waypoints: list[Location]
+    speed: float
+    loop: bool
+    def __init__(
+        self,
+        action: int = ...,
+        waypoints: Sequence[Location] = ...,
+        speed: float = ...,
+        loop: bool = ...,
+    ) -> None: ...
+
+class FlyMissionResponse(Message):
+    success: bool
+    message: str
+    def __init__(self, success: bool = ..., message: str = ...) -> None: ...
+
+class FlyMission:
+    _request_class = FlyMissionRequest
+    _response_class = FlyMissionResponse
 
 class OrderLayoutRequest(Message):
     caseID: int

@@ -20,7 +20,7 @@ from typing import Any, Iterable, Mapping, Sequence
 
 from drone_mesh.console.history import History
 from drone_mesh.state.condition import condition_of
-from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use
+from drone_mesh.state.links import LinkForecast, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import (
     EventRecord,
     MeshStatus,
@@ -62,6 +62,7 @@ class FrameStore:
         self._samples: deque[tuple[int, MeshSample]] = deque(maxlen=SAMPLES_KEPT)
         self._sampled_at_s = float("-inf")
         self._lost_links = LostLinks()
+        self._forecast = LinkForecast()
         self._orders = OrderWatch()
         self._story: tuple[int, Mapping[str, Any]] = (0, {})
         self._run_began_at = 0
@@ -113,7 +114,7 @@ class FrameStore:
             order = self._orders.words(node.id)
             fields.update(slot=slots.get(node.id), order=order, **more.get(node.id, {}))
             self._update_node(node.id, fields)
-        for node_id, fields in self._links(mesh.nodes, wall_s).items():
+        for node_id, fields in self._links(mesh, wall_s).items():
             self._update_node(node_id, fields)
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:
             self._sampled_at_s = wall_s
@@ -230,18 +231,24 @@ class FrameStore:
             frame["story"] = self._story[1]
         return frame
 
-    def _links(self, nodes: Sequence[NodeStatus], wall_s: float) -> dict[int, dict[str, str]]:
-        """For each node and use, the nodes with higher ids that it has a link with."""
-        lost = self._lost_links.update(known_links(nodes), wall_s)
-        bits = {use: dict.fromkeys((node.id for node in nodes), 0) for use in LinkUse}
-        for use, links in links_by_use(nodes, lost).items():
+    def _links(self, mesh: MeshStatus, wall_s: float) -> dict[int, dict[str, str]]:
+        """For each node and use, the nodes with higher ids that it has a link with.
+
+        `soon`: the links that will soon break, which are also known or on a route.
+        """
+        nodes, known = mesh.nodes, known_links(mesh.nodes)
+        lost = self._lost_links.update(known, wall_s)
+        sets = {use.name.lower(): links for use, links in links_by_use(nodes, lost).items()}
+        soon = self._forecast.update(known, nodes, mesh.stamp_s, mesh.max_distance)
+        sets["soon"] = set(soon)
+        bits = {use: dict.fromkeys((node.id for node in nodes), 0) for use in sets}
+        for use, links in sets.items():
             of_node = bits[use]
             for low, high in links:
                 if low in of_node:
                     of_node[low] |= 1 << high
         return {
-            node.id: {f"{use.name.lower()}_links": _hex(bits[use][node.id]) for use in LinkUse}
-            for node in nodes
+            node.id: {f"{use}_links": _hex(bits[use][node.id]) for use in sets} for node in nodes
         }
 
     def _update_node(self, node_id: int, fields: Mapping[str, Any]) -> None:
@@ -260,7 +267,7 @@ class FrameStore:
     def _forget_run(self) -> None:
         """Simulated time jumped: a different world. Charts and logs of all pages start over."""
         self._run_began_at = self.version
-        self._lost_links = LostLinks()
+        self._lost_links, self._forecast = LostLinks(), LinkForecast()
         self._orders.forget()
         self._events.clear()
         self._samples.clear()
@@ -283,6 +290,7 @@ def _fields(node: NodeStatus, trouble: Trouble | None) -> dict[str, Any]:
         "route": list(node.route),
         "position": _centimetres(node.position) if position_is_known(node) else None,
         "path": _centimetres(node.path),
+        "heading": _centimetres(node.heading),
         "repair": node.repair,
         "battery": round(node.battery) if math.isfinite(node.battery) else None,
         "why_not_fly": node.why_not_fly,

@@ -29,7 +29,8 @@ class FlightPath:
 
     A flight over a straight distance d takes d / speed_m_s and climbs d / 2. The path is longer
     than d, so the drone flies faster than speed_m_s for most of it. If `across_m` requires a higher
-    climb, or `around` a detour, the extra metres take additional time. On a detour the drone flies
+    climb, or `around` a detour, the extra metres take additional time. Under a ceiling it climbs
+    less, in the same time. On a detour the drone flies
     at one height, the greater one of the two ends.
     """
 
@@ -39,6 +40,7 @@ class FlightPath:
     speed_m_s: float = SPEED_M_S
     across_m: float = -math.inf  # least height of the way across, to pass over obstacles
     around: tuple[Point, ...] = ()  # x, y: corners of a detour on the way across
+    ceiling_m: float = math.inf  # height of the way across at most, unless it starts or ends higher
     duration_s: float = field(init=False)
     above_start: Vector = field(init=False)  # where it is at 10 %
     above_goal: Vector = field(init=False)  # where it is at 90 %
@@ -47,10 +49,11 @@ class FlightPath:
         distance_m = math.dist(self.start, self.goal)
         climb_m = distance_m / 2
         usual = (self.start[2] + climb_m, self.goal[2] + climb_m)
-        heights = [max(height, self.across_m) for height in usual]
+        ceiling_m = max(self.ceiling_m, self.start[2], self.goal[2])
+        heights = [max(min(height, ceiling_m), self.across_m) for height in usual]
         if self.around:
             heights = [max(heights)] * 2
-        extra_m = sum(height - least for height, least in zip(heights, usual))
+        extra_m = sum(max(0.0, height - least) for height, least in zip(heights, usual))
         if self.around:
             over_ground = (self.start[:2], *self.around, self.goal[:2])
             extra_m += _length(over_ground) - math.dist(self.start[:2], self.goal[:2])

@@ -13,6 +13,10 @@ from drone_mesh.state.model import NodeStatus, position_is_known
 
 JUST_LOST_S = 6.0  # our choice: long enough to be noticed
 
+SOON_S = 5.0  # our choice: a forecast of more than that rarely holds
+VELOCITY_OVER_S = 1.0  # our choice: simulated time over which a velocity is measured
+SLOWEST_M_S = 0.02  # our choice: slower drones count as standing
+
 Link = Tuple[int, int]  # the lower id first
 
 
@@ -66,6 +70,56 @@ def shortest(links: set[Link], nodes: Sequence[NodeStatus], most: int) -> list[L
         return sorted(drawable)
     drawable.sort(key=lambda link: (math.dist(positions[link[0]], positions[link[1]]), link))
     return drawable[:most]
+
+
+class LinkForecast:
+    """Which links will soon break because their ends fly apart. Belongs to one thread."""
+
+    def __init__(self) -> None:
+        self._before: tuple[float, dict[int, Sequence[float]]] = (-math.inf, {})
+        self._velocities: dict[int, np.ndarray] = {}
+
+    def update(
+        self, links: Iterable[Link], nodes: Sequence[NodeStatus], now_s: float, range_m: float
+    ) -> list[Link]:
+        """Those of these links that end within SOON_S if nobody changes course."""
+        places: dict[int, Sequence[float]] = {
+            node.id: tuple(node.position) for node in nodes if position_is_known(node)
+        }
+        before_s, before = self._before
+        passed_s = now_s - before_s
+        if not 0.0 <= passed_s < VELOCITY_OVER_S:
+            is_fresh = 0.0 < passed_s < 5 * VELOCITY_OVER_S
+            self._velocities = {
+                node: (np.subtract(place, before[node]) / passed_s)
+                for node, place in places.items()
+                if is_fresh and node in before
+            }
+            self._before = now_s, places
+        found = []
+        for one, other in links:
+            if {one, other} <= self._velocities.keys() & places.keys():
+                away = np.subtract(places[other], places[one])
+                drift = self._velocities[other] - self._velocities[one]
+                if link_expires_s(away.tolist(), drift.tolist(), range_m) < SOON_S:
+                    found.append((one, other))
+        return sorted(found)
+
+
+def link_expires_s(away: Sequence[float], drift: Sequence[float], range_m: float) -> float:
+    """Time until two nodes lose each other, given their relative place (m) and velocity (m/s).
+
+    Su, Lee, Gerla: Mobility prediction and routing in ad hoc wireless networks, IJNM 2001. Infinity
+    if they never do, 0 if they are out of range already.
+    """
+    speed2 = sum(v * v for v in drift)
+    ahead = sum(a * v for a, v in zip(away, drift))
+    room = range_m**2 - sum(a * a for a in away)
+    if room <= 0.0:
+        return 0.0
+    if speed2 < SLOWEST_M_S**2:
+        return math.inf
+    return (-ahead + math.sqrt(ahead**2 + speed2 * room)) / speed2
 
 
 class LostLinks:

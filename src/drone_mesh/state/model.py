@@ -40,6 +40,7 @@ class NodeStatus:
     route: bytes = b""
     position: Sequence[float] = UNKNOWN_POSITION  # (3,) m, map frame, of the underside
     path: Sequence[float] = ()  # (3 * waypoints,) m, map frame
+    heading: Sequence[float] = ()  # (3,) m, map frame, where its pilot flies it to; empty: nowhere
     report_age: float = 0.0  # wall seconds
     airtime: float = 0.0  # share of the time that its frames occupy a shared channel
     tries: float = 0.0  # per packet on a shared channel; 0 on another medium

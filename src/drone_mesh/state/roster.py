@@ -18,6 +18,7 @@ class DroneView:
     role: int
     position: Sequence[float]  # (3,) m, map frame, of the underside
     path: Sequence[float] = ()  # (3 * waypoints,) m, the rest of its flight; empty: none
+    heading: Sequence[float] = ()  # (3,) m, where its pilot flies it to; empty: nowhere
     battery: float = math.nan  # percent; NaN: it has none
     crashed: bool = False
     why_not_fly: str = ""  # empty: it can fly
@@ -67,6 +68,7 @@ class MeshRoster:
             view = views.get(node.id)
             node.position = view.position if view else UNKNOWN_POSITION
             node.path = view.path if view else ()
+            node.heading = view.heading if view else ()
             if view is not None:
                 node.battery, node.crashed = view.battery, view.crashed
                 node.why_not_fly = view.why_not_fly

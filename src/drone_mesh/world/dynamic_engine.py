@@ -16,6 +16,7 @@ from drone_mesh.world.engine import DroneEngine
 
 ARRIVED_M = 0.15
 STANDS_M_S = 0.1
+PILOT_LEAD_M = 1.0  # our choice: greatest distance of the place that a pilot wants it to hold
 ON_GROUND_M = 0.02  # of its underside
 LAND_AT_PERCENT = 20.0  # our choice: it lands while it still can
 MOVED_M = 1e-4  # a smaller movement is not reported
@@ -100,6 +101,7 @@ class DynamicEngine(DroneEngine):
         self._velocity = velocity
         while self._goals:
             self._begin(Location.from_vector(self._goals.popleft()), position, now_s)
+        self._follow_pilot(now_s)
         in_air = self._route is not None or self._hover is not None
         if in_air and not self._crashed:
             self._fly(position, passed_s)
@@ -130,11 +132,27 @@ class DynamicEngine(DroneEngine):
             return
         # As high as a kinematic drone would fly.
         across_m = max(path.above_start[2], path.above_goal[2])
+        self.pause_pilot(True)
         self._route = Route(
             here, goal, across_m, lands=False, speed_m_s=SPEED_M_S, around=path.around
         )
         self._hover = None
         self._notify(position, path, now_s)
+
+    def _follow_pilot(self, now_s: float) -> bool:
+        """Move the place that the drone holds as its pilot says; it waits for a slow drone."""
+        pilot = self._pilot
+        if pilot is None or pilot.paused or self._route is not None or self.why_not_fly():
+            return False
+        here = Location.from_vector(self._state.position)
+        held = self._hover or here
+        if here.distance_m(held) > PILOT_LEAD_M:
+            pilot.wait(now_s)
+        else:
+            lift_m = self._half_height_m
+            x, y, z = pilot.move(held._replace(height=held.height - lift_m).to_vector(), now_s)
+            self._hover = Location.from_vector((x, y, z + lift_m))
+        return True
 
     def _fly(self, position: Vector, passed_s: float) -> None:
         self._use_battery(position, passed_s)

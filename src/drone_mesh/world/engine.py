@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import deque
 from typing import Callable, NamedTuple
 
@@ -13,9 +14,11 @@ from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
+from drone_mesh.mobility.pilot import TrackPilot
 from drone_mesh.world.interfaces import World
 
 ARRIVED_M = 0.01  # on each axis
+PILOT_STEP_S = 0.1  # our choice: a pilot moves its drone ten times a second
 
 _log = logging.getLogger(__name__)
 
@@ -64,6 +67,8 @@ class DroneEngine(IDroneEngine):
         self._half_height_m = half_height_m
         self._plan_flight = plan_flight
         self._goals: deque[Vector] = deque()  # filled by any thread, emptied by the world's
+        self._pilot: TrackPilot | None = None  # replaced by any thread, moved by the world's
+        self._piloted_s = -math.inf  # when the pilot last moved the drone
         self._followed: Vector | None = None  # set by any thread, used by the world's
         self._listeners: list[StateListener] = []
         self._observers: list[EngineObserver] = []
@@ -126,6 +131,23 @@ class DroneEngine(IDroneEngine):
         self._followed = centre
         self._world.wake(self)
 
+    @property
+    def pilot(self) -> TrackPilot | None:
+        """Who flies it while it is not on an ordered flight; None: nobody. Any thread."""
+        return self._pilot
+
+    def fly_with(self, pilot: TrackPilot | None) -> None:
+        """Let this pilot fly it from the next step on, or nobody. Any thread."""
+        self._pilot = pilot
+        self._world.wake(self)
+
+    def pause_pilot(self, paused: bool) -> None:
+        """Let the pilot stay, or fly on. Any thread."""
+        pilot = self._pilot
+        if pilot is not None:
+            (pilot.pause if paused else pilot.resume)()
+            self._world.wake(self)
+
     def get_location(self) -> Location:
         """The underside's position after the last step, in metres. Never raises LocationUnknown."""
         x, y, z = self._state.position
@@ -143,13 +165,25 @@ class DroneEngine(IDroneEngine):
             self._move(followed, None, now_s)
         path = self._state.path
         if path is None:
-            return False
+            return self._follow_pilot(now_s)
         position = path.position_at(now_s)
         # A drone has arrived only once it descends: a vertical ascent passes its goal on the way.
         if path.is_descending(now_s) and _is_close(position, path.goal):
             position, path = path.goal, None
         self._move(position, path, now_s)
         return path is not None
+
+    def _follow_pilot(self, now_s: float) -> bool:
+        pilot = self._pilot
+        if pilot is None or pilot.paused:
+            return False
+        if now_s - self._piloted_s >= PILOT_STEP_S - self._world.tick_s / 2:
+            self._piloted_s = now_s
+            before = self.get_location().to_vector()
+            x, y, z = pilot.move(before, now_s)
+            if (x, y, z) != before:
+                self._move((x, y, z + self._half_height_m), None, now_s)
+        return True
 
     def _move(self, position: Vector, path: FlightPath | None, now_s: float) -> None:
         self._world.move_box(self._box, position)
@@ -168,6 +202,7 @@ class DroneEngine(IDroneEngine):
         if path is None:  # it has moved since the goal was accepted
             _log.warning("box %d stays: no path past the obstacles to %s", self._box, goal)
             return
+        self.pause_pilot(True)
         self._state = DroneState(position, path, now_s)
         _log.debug("box %d flies from %s to %s", self._box, position, goal)
 

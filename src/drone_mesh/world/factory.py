@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Iterable
 
@@ -35,18 +36,20 @@ class DroneFactory:
         debug: bool,
         wind: Vector | None = None,
         obstacles: Obstacles | None = None,
+        cruise_height_m: float = math.inf,
     ) -> None:
         """Parameters and errors as for `plan_fleet`.
 
         `debug`: whether the nodes of the drones publish debug information; `wind`: as for
-        VirtualDrone. The `obstacles` are added to the world too. Raises ConfigurationError if a
-        drone would start in or against one.
+        VirtualDrone. The `obstacles` are added to the world too; without them, `cruise_height_m` is
+        the ceiling of ordered flights. Raises ConfigurationError if a drone would start in or
+        against an obstacle.
         """
         self.debug = debug
         self._world = world
         self._wind = wind
         self._for_flights: Obstacles | None = None
-        self._plan_flight: PlanFlight = FlightPath
+        self._plan_flight: PlanFlight = functools.partial(FlightPath, ceiling_m=cruise_height_m)
         fleet = plan_fleet(gateways, routers, gridsize, spacing)
         if obstacles is not None:
             check_starts(fleet, obstacles)

@@ -280,6 +280,9 @@ byId("show-known").addEventListener("change", (event) =>
 byId("show-ranges").addEventListener("change", (event) =>
   map.setOption("ranges", event.target.checked),
 );
+byId("show-trails").addEventListener("change", (event) =>
+  map.setOption("trails", event.target.checked),
+);
 byId("show-legend").addEventListener("change", () => map.moved || map.fit()); // the legend covers part of the map
 byId("find-form").addEventListener("submit", (event) => {
   event.preventDefault();

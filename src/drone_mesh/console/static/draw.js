@@ -146,6 +146,10 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
       [],
     );
   }
+  drawLines(context, camera, radius, ends(mesh.links.soon), colours.flying, 2, [3, 4]);
+  if (options.trails)
+    for (const trail of mesh.trails.values()) drawTrail(context, camera, trail, colours);
+  for (const node of mesh.nodes.values()) drawHeading(context, camera, node, colours, radius);
   for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours, radius);
   for (const node of drawingOrder(mesh))
     drawn.drones += drawDrone(
@@ -275,6 +279,30 @@ function drawLines(context, camera, radius, pairs, colour, width, dash) {
   return count;
 }
 
+/** Where a drone has been. */
+function drawTrail(context, camera, trail, colours) {
+  context.strokeStyle = colours.muted;
+  context.lineWidth = 1;
+  context.globalAlpha = 0.5;
+  context.beginPath();
+  for (const place of trail) context.lineTo(...camera.toScreen(...place));
+  context.stroke();
+  context.globalAlpha = 1;
+}
+
+/** The line to where a drone's pilot flies it. */
+function drawHeading(context, camera, node, colours, radius) {
+  if (!node.heading.length || !node.position) return;
+  context.strokeStyle = colours.muted;
+  context.lineWidth = 1.5;
+  context.setLineDash([1, 4]);
+  context.beginPath();
+  context.moveTo(...onScreen(camera, node, radius));
+  context.lineTo(...camera.toScreen(node.heading[0], node.heading[1]));
+  context.stroke();
+  context.setLineDash([]);
+}
+
 function drawPath(context, camera, node, colours, radius) {
   if (!node.path.length || !node.position) return;
   context.strokeStyle = colours.path;
@@ -305,7 +333,7 @@ function drawArms(context, px, py, node, colours, r) {
     context.lineTo(px + east * MOTOR_AT * r, py + north * MOTOR_AT * r);
   }
   context.stroke();
-  const flying = node.path.length > 0;
+  const flying = node.path.length > 0 || node.heading.length > 0;
   const turned = flying ? (performance.now() / 1000) * ROTOR_RAD_PER_S : 0.6;
   for (const [number, [east, north]] of MOTORS.entries()) {
     const [x, y] = [px + east * MOTOR_AT * r, py + north * MOTOR_AT * r];

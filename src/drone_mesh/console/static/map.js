@@ -35,7 +35,7 @@ export class MapView {
     this.onPlace = null; // called with the place (x, y) of a click, while the user chooses one
     this.newDrone = null; // {x, y, gateway}, where a drone would be added
     this.held = []; // [{id, x, y}] that are about to leave
-    this.options = { known: true, ranges: false };
+    this.options = { known: true, ranges: false, trails: false };
     this.colours = readColours();
     this.drag = null;
     this.fitted = false; // whether it has been fitted to a first mesh
@@ -173,7 +173,9 @@ export class MapView {
   #keepTurning({ radius }) {
     clearTimeout(this.turning);
     if (this.still.matches || !hasArms(this.mesh.clock.shape, radius)) return;
-    const flying = [...this.mesh.nodes.values()].some((node) => node.path.length);
+    const flying = [...this.mesh.nodes.values()].some(
+      (node) => node.path.length || node.heading.length,
+    );
     if (flying) this.turning = setTimeout(() => this.redraw(), TURN_PERIOD_MS);
   }
 

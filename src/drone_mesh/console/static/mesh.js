@@ -2,7 +2,9 @@
 // Conditions, colours and uses of links are decided by the server.
 
 export const UNKNOWN = 255; // NO_ROUTE of the mesh
-const LINK_USES = ["known", "lost", "route"]; // in the order in which they are drawn
+const TRAIL_STEP_M = 0.5;
+const TRAIL_PLACES = 60;
+const LINK_USES = ["known", "lost", "route", "soon"]; // in the order in which they are drawn
 
 /** Numbers of the set bits of a hex string, ascending. */
 function idsOf(hex) {
@@ -26,7 +28,8 @@ export class Mesh extends EventTarget {
     this.limits = { coordinate: Infinity, height: Infinity, events: Infinity, samples: Infinity };
     this.nodes = new Map(); // id -> node
     this.obstacles = []; // {corners: [[x, y]], top}, m
-    this.links = { known: [], lost: [], route: [] }; // use -> [[id, higher id]]
+    this.trails = new Map(); // id -> its last positions [x, y], m, one for every TRAIL_STEP_M
+    this.links = { known: [], lost: [], route: [], soon: [] }; // use -> [[id, higher id]]
     this.events = [];
     this.samples = [];
     this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}}
@@ -42,6 +45,7 @@ export class Mesh extends EventTarget {
   apply(frame) {
     if (frame.full) {
       this.nodes.clear();
+      this.trails.clear();
       this.events = [];
       this.samples = [];
       this.story = {};
@@ -53,6 +57,7 @@ export class Mesh extends EventTarget {
     let linksChanged = frame.full;
     for (const id of frame.gone ?? []) {
       this.nodes.delete(id);
+      this.trails.delete(id);
       linksChanged = true;
     }
     for (const [key, fields] of Object.entries(frame.nodes ?? {})) {
@@ -61,6 +66,7 @@ export class Mesh extends EventTarget {
       Object.assign(node, fields);
       if (LINK_USES.some((use) => `${use}_links` in fields)) linksChanged = true;
       this.nodes.set(id, node);
+      if ("position" in fields) this.#trail(node);
       changed.add(id);
     }
     if (linksChanged) this.#relink();
@@ -78,6 +84,15 @@ export class Mesh extends EventTarget {
       events: frame.events ?? [],
       samples: frame.samples ?? [],
     });
+  }
+
+  #trail(node) {
+    if (!node.position) return;
+    const trail = this.trails.get(node.id) ?? [];
+    const last = trail.at(-1);
+    const [x, y] = node.position;
+    if (last && Math.hypot(x - last[0], y - last[1]) < TRAIL_STEP_M) return;
+    this.trails.set(node.id, [...trail, [x, y]].slice(-TRAIL_PLACES));
   }
 
   applyDetail(detail) {

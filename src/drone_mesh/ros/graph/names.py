@@ -87,6 +87,11 @@ def goal_topic(node_id: int) -> str:
     return f"/Drones/{node_id}/goal"
 
 
+def mission_service(node_id: int) -> str:
+    """FlyMission, offered by the engine."""
+    return f"/Drones/{node_id}/mission"
+
+
 def fly_action(node_id: int) -> str:
     """Fly, an action: users -> fly_actions."""
     return f"/Drones/{node_id}/fly"

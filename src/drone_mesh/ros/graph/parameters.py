@@ -14,6 +14,7 @@ from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import Layouts
+from drone_mesh.missions import Mission, read_missions
 from drone_mesh.ros.graph import names
 
 PACKAGE = "drone_mesh"
@@ -42,14 +43,28 @@ def configured_obstacles(configuration: FactoryConfiguration) -> Obstacles | Non
     """The boxes that the configuration names, or None. Raises ConfigurationError."""
     if not configuration.obstacles:
         return None
-    path = Path(configuration.obstacles).expanduser()
-    if not path.is_absolute():  # roslaunch starts nodes in another folder
-        raise ConfigurationError(
-            f"invalid obstacles {configuration.obstacles!r}: expected an absolute path, such as "
-            f"$PWD/{configuration.obstacles}"
-        )
+    path = _absolute("obstacles", configuration.obstacles)
     with naming_argument("obstacles: ", path):
         return read_obstacles(path, configuration.obstacle_radio == "block")
+
+
+def configured_missions(configuration: FactoryConfiguration) -> dict[int, Mission]:
+    """The missions that the configuration names, by drone. Raises ConfigurationError."""
+    if not configuration.missions:
+        return {}
+    path = _absolute("missions", configuration.missions)
+    with naming_argument("missions: ", path):
+        return read_missions(path)
+
+
+def _absolute(key: str, given: str) -> Path:
+    """This path; roslaunch starts nodes in another folder. Raises ConfigurationError."""
+    path = Path(given).expanduser()
+    if not path.is_absolute():
+        raise ConfigurationError(
+            f"invalid {key} {given!r}: expected an absolute path, such as $PWD/{given}"
+        )
+    return path
 
 
 def manager_layouts(parameter: str = names.LAYOUTS_PARAM) -> Layouts:

@@ -67,4 +67,10 @@ def _nodes() -> list[tuple[str, Colour, float]]:
 
 def _lines() -> list[tuple[str, Colour, float]]:
     links = [(use.value, DARK.of_link(use), 0.25) for use in LinkUse]
-    return [*links, ("flight path", DARK.path, 0.25), ("obstacle", DARK.obstacle, 0.8)]
+    return [
+        *links,
+        ("link that will soon break", DARK.flying, 0.25),
+        ("flight path", DARK.path, 0.25),
+        ("heading", DARK.muted, 0.25),
+        ("obstacle", DARK.obstacle, 0.8),
+    ]

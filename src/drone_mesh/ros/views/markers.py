@@ -14,7 +14,14 @@ from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.views.marker_legend import legend_rows
 from drone_mesh.state.condition import condition_of
-from drone_mesh.state.links import LinkUse, LostLinks, known_links, links_by_use, shortest
+from drone_mesh.state.links import (
+    LinkForecast,
+    LinkUse,
+    LostLinks,
+    known_links,
+    links_by_use,
+    shortest,
+)
 from drone_mesh.state.model import NodeStatus, ObstacleStatus, position_is_known
 from drone_mesh.view.fan import fanned_positions
 from drone_mesh.view.palette import DARK, Colour, rgb  # rviz has a dark background
@@ -47,6 +54,7 @@ class MarkerMaker:
     def __init__(self) -> None:
         self._shown: dict[tuple[str, int], object] = {}
         self._lost = LostLinks()
+        self._forecast = LinkForecast()
 
     def forget_shown(self) -> None:
         """Create all markers at the next call, for a new subscriber."""
@@ -56,7 +64,9 @@ class MarkerMaker:
         """The markers that changed since the last call."""
         nodes = [node for node in state.nodes if position_is_known(node)]
         positions = fanned_positions(nodes, BOX_RADIUS_M)
-        lost = self._lost.update(known_links(nodes), wall_s)
+        known = known_links(nodes)
+        lost = self._lost.update(known, wall_s)
+        soon = self._forecast.update(known, nodes, state.header.stamp.to_sec(), state.max_distance)
         array = MarkerArray()
         self._add_obstacles(array, state.obstacles)
         if shape_named(state.shape) is Shape.BOX:
@@ -70,8 +80,15 @@ class MarkerMaker:
             lines = [(positions[a], positions[b]) for a, b in shortest(links, nodes, MOST_LINKS)]
             colour = _colour(DARK.of_link(use), LINK_OPACITY[use])
             self._add_lines(array, f"links: {use.name.lower()}", lines, colour, LINK_WIDTH_M[use])
+        breaking = [(positions[a], positions[b]) for a, b in shortest(set(soon), nodes, MOST_LINKS)]
+        self._add_lines(
+            array, "links: soon", breaking, _colour(DARK.flying), LINK_WIDTH_M[LinkUse.ROUTE]
+        )
         self._add_lines(
             array, "flight paths", _path_lines(nodes, positions), _colour(DARK.path), PATH_WIDTH_M
+        )
+        self._add_lines(
+            array, "headings", _heading_lines(nodes, positions), _colour(DARK.muted), PATH_WIDTH_M
         )
         self._add_ids(array, nodes, positions)
         self._add_legend(array, positions)
@@ -98,7 +115,7 @@ class MarkerMaker:
         """Add two markers per drone, frame and lamp, because a mesh in rviz has one colour."""
         for node in nodes:
             colour = DARK.of_node(node.role, condition_of(node))
-            flying = len(node.path) > 0
+            flying = _is_in_flight(node)
             frame = MESHES + ("flying.obj" if flying else "standing.obj")
             lamp = f"{MESHES}{Role(node.role).word}_lamp.obj"
             looks = (("frames", frame, FRAME_COLOUR), ("lamps", lamp, colour))
@@ -117,7 +134,7 @@ class MarkerMaker:
         self, array: MarkerArray, nodes: Sequence[NodeStatus], positions: _Positions, time_s: float
     ) -> None:
         """The blades of all drones in flight, as one marker; they turn in simulated time."""
-        flying = [positions[node.id] for node in nodes if len(node.path) > 0]
+        flying = [positions[node.id] for node in nodes if _is_in_flight(node)]
         marker = self._changed(array, "rotors", 0, [time_s, *flying] if flying else [])
         if marker:
             marker.type = Marker.LINE_LIST
@@ -213,6 +230,11 @@ class MarkerMaker:
         return marker
 
 
+def _is_in_flight(node: NodeStatus) -> bool:
+    """On a flight of its own, or flown by its pilot."""
+    return len(node.path) > 0 or len(node.heading) > 0
+
+
 def _path_lines(
     nodes: Sequence[NodeStatus], positions: _Positions
 ) -> list[tuple[Sequence[float], ...]]:
@@ -221,6 +243,12 @@ def _path_lines(
         waypoints = [positions[node.id], *zip(*[iter(node.path)] * 3)]
         lines += zip(waypoints, waypoints[1:])
     return lines
+
+
+def _heading_lines(
+    nodes: Sequence[NodeStatus], positions: _Positions
+) -> list[tuple[Sequence[float], ...]]:
+    return [(positions[node.id], tuple(node.heading)) for node in nodes if len(node.heading)]
 
 
 def _colour(colour: Colour, opacity: float = 1.0) -> ColorRGBA:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Iterable
+from typing import Iterable, Sequence
 
 from drone_mesh.state.observation import describe_drone
 from drone_mesh.state.roster import DroneView
 from drone_mesh.world.drones import VirtualDrone
+from drone_mesh.world.engine import DroneEngine
 
 
 def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]:
@@ -22,9 +23,15 @@ def drone_views(drones: Iterable[VirtualDrone], now_s: float) -> list[DroneView]
         views.append(
             replace(
                 view,
+                heading=_heading(engine),
                 battery=math.nan if battery is None else battery,
                 crashed=engine.crashed,
                 why_not_fly=engine.why_not_fly(),
             )
         )
     return views
+
+
+def _heading(engine: DroneEngine) -> Sequence[float]:
+    pilot = engine.pilot
+    return () if pilot is None or engine.state.path else pilot.heading or ()

@@ -11,12 +11,20 @@ import rospy
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.errors import GoalRefused
+from drone_mesh.missions import Mission
 from drone_mesh.msg import DroneInfo
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import engine_info, gps_response, power_off_info
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.srv import RequestGPS, RequestGPSRequest, RequestGPSResponse
+from drone_mesh.srv import (
+    FlyMission,
+    FlyMissionRequest,
+    FlyMissionResponse,
+    RequestGPS,
+    RequestGPSRequest,
+    RequestGPSResponse,
+)
 from drone_mesh.state.model import EventRecord
 from drone_mesh.world.drones import VirtualDrone
 from drone_mesh.world.engine import DroneState
@@ -70,7 +78,8 @@ class PositionReporter(rospy.SubscribeListener):
 class EngineServer:
     """Offers the engine of one drone.
 
-    Subscribes: /Drones/<id>/goal (Location). Services: /Drones/<id>/gps (RequestGPS).
+    Subscribes: /Drones/<id>/goal (Location). Services: /Drones/<id>/gps (RequestGPS),
+    /Drones/<id>/mission (FlyMission).
     Goals and requests come in threads of rospy; `_moved` runs in the world's thread.
     """
 
@@ -92,12 +101,36 @@ class EngineServer:
         self._engine.add_listener(self._moved)
         self._engine.observe(self._observed)
         self._goals = rospy.Subscriber(names.goal_topic(drone.node_id), LocationMsg, self._goal)
-        self._service = rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps)
+        self._services = [
+            rospy.Service(names.gps_service(drone.node_id), RequestGPS, self._gps),
+            rospy.Service(names.mission_service(drone.node_id), FlyMission, self._mission),
+        ]
 
     def close(self) -> None:
         """Withdraw the topic and the service."""
         self._goals.unregister()
-        self._service.shutdown()
+        for service in self._services:
+            service.shutdown()
+
+    def _mission(self, request: FlyMissionRequest) -> FlyMissionResponse:
+        engine = self._engine
+        if request.action == FlyMissionRequest.FLY:
+            places = [(p.longitude, p.latitude, float(p.height)) for p in request.waypoints]
+            why_not = engine.why_not_fly()
+            try:
+                pilot = Mission(places, request.speed, request.loop).pilot()
+            except GoalRefused as error:
+                why_not = str(error)
+            if why_not:
+                return FlyMissionResponse(False, f"drone {self._node_id}: {why_not}")
+            engine.fly_with(pilot)
+        elif engine.pilot is None:
+            return FlyMissionResponse(False, f"drone {self._node_id} has no mission")
+        elif request.action == FlyMissionRequest.STOP:
+            engine.fly_with(None)
+        else:
+            engine.pause_pilot(request.action == FlyMissionRequest.PAUSE)
+        return FlyMissionResponse(True, "")
 
     def _goal(self, goal: LocationMsg) -> None:
         try:

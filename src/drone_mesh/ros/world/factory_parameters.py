@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Mapping
 
 import rospy
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.fleet import plan_fleet
+from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.missions import Mission
 from drone_mesh.ros.graph.parameters import (
+    configured_missions,
     configured_obstacles,
     factory_configuration,
     manager_layouts,
@@ -27,6 +31,7 @@ class FactoryParameters:
     configuration: FactoryConfiguration
     settings: MeshSettings
     obstacles: Obstacles | None
+    missions: Mapping[int, Mission]
     hosts: int  # 1: the nodes run in this process; otherwise in others
 
     @classmethod
@@ -42,6 +47,18 @@ class FactoryParameters:
         obstacles = configured_obstacles(configuration)
         if obstacles is not None:
             check_starts(fleet, obstacles)
+            if configuration.cruise_height < MAX_HEIGHT_M:
+                raise ConfigurationError(
+                    "argument: cruise_height does not go with obstacles: flights cross over boxes"
+                )
+        missions = configured_missions(configuration)
+        if configuration.drones == "external" and (missions or configuration.mobility != "none"):
+            raise ConfigurationError(
+                "argument: missions and mobility need drones builtin: others fly external drones"
+            )
+        unknown = sorted(missions.keys() - {place.node_id for place in fleet})
+        if unknown:
+            raise ConfigurationError(f"missions: there is no drone {unknown[0]}")
         if configuration.gui:
             require_screen("gui")
         # With a bad layout file the manager would be restarted for ever; this ends the launch.
@@ -54,7 +71,7 @@ class FactoryParameters:
         if configuration.radio == "nrf24":
             _check_emulated_radio(configuration, int(hosts))
         settings = MeshSettings.of(configuration, obstacles)
-        return cls(configuration, settings, obstacles, int(hosts))
+        return cls(configuration, settings, obstacles, missions, int(hosts))
 
 
 def _check_emulated_radio(configuration: FactoryConfiguration, hosts: int) -> None:

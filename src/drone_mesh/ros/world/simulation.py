@@ -24,6 +24,7 @@ from drone_mesh.ros.world.external_engines import ExternalEngines
 from drone_mesh.ros.world.factory_parameters import FactoryParameters
 from drone_mesh.ros.world.fleet_changes import FleetChanges
 from drone_mesh.ros.world.mesh_state import MeshStatePublisher, WorldView
+from drone_mesh.ros.world.pilots import start_pilots
 from drone_mesh.ros.world.world_runner import WorldRunner
 from drone_mesh.ros.world.world_window import window_of
 from drone_mesh.state.model import EventRecord
@@ -57,7 +58,9 @@ class RosSimulation:
             if configuration.flight == "dynamic"
             else None,
             parameters.obstacles,
+            configuration.cruise_height,
         )
+        start_pilots(configuration, parameters.missions, self._factory.drones)
         _log.info(
             "fleet: gateways %d, routers %d, spacing %g m",
             configuration.gateways,

@@ -1,0 +1,118 @@
+"""Drones of the world that pilots fly, kinematic and with physics."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from still_world import StillWorld
+
+from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.mobility.pilot import TrackPilot, along
+from drone_mesh.world.body import BodyLimits
+from drone_mesh.world.bullet_world import BulletWorld
+from drone_mesh.world.drones import RouterDrone
+from drone_mesh.world.dynamic_engine import DynamicEngine
+
+SQUARE = [(4.0, 0.0, 2.0), (4.0, 4.0, 2.0), (0.0, 4.0, 2.0), (0.0, 0.0, 2.0)]
+
+
+def pilot(speed_m_s=1.0, loop=True):
+    return TrackPilot(along(SQUARE, speed_m_s, loop), speed_m_s)
+
+
+def drone(world):
+    return RouterDrone(world, 3, 0.0, 0.0, (0.0, 0.0, 0.0)).engine
+
+
+def run(world, seconds, engine=None):
+    """The drone's places during this time, ten each second."""
+    places = []
+    for tick in range(round(seconds * 100)):
+        world.step()
+        if engine is not None and tick % 10 == 0:
+            places.append(engine.get_location().to_vector())
+    return places
+
+
+@pytest.fixture(params=["kinematic", "dynamic"])
+def world(request):
+    with StillWorld() if request.param == "kinematic" else BulletWorld() as world:
+        yield world
+
+
+def test_a_piloted_drone_passes_its_waypoints_at_one_height(world):
+    engine = drone(world)
+    engine.fly_with(pilot())
+    places = run(world, 40.0, engine)
+    for waypoint in SQUARE:
+        assert min(math.dist(place, waypoint) for place in places) < 0.5
+    assert all(abs(place[2] - 2.0) < 0.3 for place in places[60:])
+    assert engine.state.path is None  # it is on no ordered flight
+
+
+def test_an_order_pauses_the_pilot_who_takes_over_again_when_told(world):
+    engine = drone(world)
+    flown = pilot()
+    engine.fly_with(flown)
+    run(world, 6.0)
+    engine.set_goal(-3.0, -3.0, 0)
+    run(world, 0.5)
+    assert flown.paused
+    assert engine.state.is_flying
+    run(world, 30.0)
+    assert math.dist(engine.get_location().to_vector(), (-3.0, -3.0, 0.0)) < 0.3
+    engine.pause_pilot(False)
+    places = run(world, 40.0, engine)
+    assert min(math.dist(place, SQUARE[1]) for place in places) < 0.5
+
+
+def test_a_pause_holds_the_drone_where_it_is(world):
+    engine = drone(world)
+    engine.fly_with(pilot())
+    run(world, 8.0)
+    engine.pause_pilot(True)
+    run(world, 8.0)  # physics swings
+    places = run(world, 5.0, engine)
+    assert max(math.dist(place, places[0]) for place in places) < 0.1
+
+
+def test_without_a_pilot_the_drone_stays(world):
+    engine = drone(world)
+    engine.fly_with(pilot())
+    run(world, 6.0)
+    engine.fly_with(None)
+    run(world, 8.0)
+    places = run(world, 3.0, engine)
+    assert max(math.dist(place, places[0]) for place in places) < 0.1
+    assert places[0][2] > 1.0
+
+
+def test_a_kinematic_pilot_moves_the_drone_ten_times_a_second():
+    world = StillWorld()
+    engine = drone(world)
+    states = []
+    engine.add_listener(states.append)
+    engine.fly_with(pilot())
+    run(world, 5.0)
+    assert 45 <= len(states) <= 51
+
+
+def test_a_pilot_lets_physics_land_a_drone_whose_battery_is_low():
+    with BulletWorld() as world:
+        box = world.add_body((0.2, 0.2, 0.1), (0.0, 0.0, 0.05), BodyLimits().mass_kg)
+        engine = DynamicEngine(world, box, (0.0, 0.0, 0.05), 0.05, limits=BodyLimits(hover_s=30.0))
+        engine.fly_with(pilot())
+        run(world, 60.0)
+        assert engine.why_not_fly()
+        assert engine.get_location().height < 0.05
+
+
+def test_a_ceiling_lowers_a_flight_but_takes_no_longer():
+    free = FlightPath((0.0, 0.0, 0.0), (20.0, 0.0, 0.0), 0.0)
+    low = FlightPath((0.0, 0.0, 0.0), (20.0, 0.0, 0.0), 0.0, ceiling_m=3.0)
+    assert free.above_start[2] == 10.0
+    assert low.above_start[2] == low.above_goal[2] == 3.0
+    assert low.duration_s == free.duration_s
+    high = FlightPath((0.0, 0.0, 5.0), (20.0, 0.0, 0.0), 0.0, ceiling_m=3.0)
+    assert high.above_start[2] == 5.0
