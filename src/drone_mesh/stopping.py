@@ -1,10 +1,17 @@
-"""StopRequest: how a signal handler asks a program to end."""
+"""How programs end: StopRequest, and a reader that has closed the pipe."""
 
 from __future__ import annotations
 
+import functools
 import os
 import select
+import sys
 from types import TracebackType
+from typing import Any, Callable, TypeVar, cast
+
+CLOSED_PIPE = 141  # exit status, as in a shell for SIGPIPE
+
+Main = TypeVar("Main", bound=Callable[..., int])
 
 
 class StopRequest:
@@ -53,3 +60,21 @@ class StopRequest:
         self._made = True
         os.close(self._read_end)
         os.close(self._write_end)
+
+
+def quiet_on_closed_pipe(main: Main) -> Main:
+    """Decorates `main` of a program: it ends quietly when the reader of its output has ended."""
+
+    @functools.wraps(main)
+    def quiet_main(*args: Any, **kwargs: Any) -> int:
+        try:
+            try:
+                return main(*args, **kwargs)
+            finally:
+                sys.stdout.flush()
+        except BrokenPipeError:
+            # Or else the interpreter would try once more to write what is left, and complain.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return CLOSED_PIPE
+
+    return cast(Main, quiet_main)

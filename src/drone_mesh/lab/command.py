@@ -22,12 +22,14 @@ from drone_mesh.lab.proofs.damage import KEY, keys_of, table
 from drone_mesh.lab.proofs.fuzz import NODES, crowd, fuzz
 from drone_mesh.lab.status import describe_folder
 from drone_mesh.lab.template import write_template
+from drone_mesh.stopping import quiet_on_closed_pipe
 
 PROGRAM = "lab"
 CELLS_SHOWN = 30  # by `lab plan`
 _RESULTS = "results folder of the experiment"
 
 
+@quiet_on_closed_pipe
 def main(argv: Sequence[str] | None = None) -> int:
     """Returns the exit status: 0 done, 1 some runs failed or an error, 2 usage, 130 Ctrl-C."""
     given = list(sys.argv[1:] if argv is None else argv)
@@ -47,9 +49,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # `lab plan | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -13,8 +13,10 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.seals.key_file import read_key_file, write_key_file
 from drone_mesh.communication.seals.keys import KEY_BYTES, MeshKey
 from drone_mesh.errors import ConfigurationError, naming_argument
+from drone_mesh.stopping import quiet_on_closed_pipe
 
 
+@quiet_on_closed_pipe
 def main(arguments: Sequence[str] | None = None) -> int:
     """Create a key file; the exit status is 1 if that is not possible."""
     parser = argparse.ArgumentParser(

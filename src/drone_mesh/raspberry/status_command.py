@@ -10,12 +10,14 @@ from typing import Sequence
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.raspberry.http_options import TOKEN_VARIABLE
 from drone_mesh.raspberry.node_status import table
+from drone_mesh.stopping import quiet_on_closed_pipe
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 10.0
 
 
+@quiet_on_closed_pipe
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print it; the exit status is 1 if the gateway does not answer properly."""
     parser = argparse.ArgumentParser(

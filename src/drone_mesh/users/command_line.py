@@ -128,5 +128,3 @@ def run(command: str, work: Callable[[], int]) -> int:
         return 1
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:
-        return 1

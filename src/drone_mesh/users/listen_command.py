@@ -6,9 +6,11 @@ import json
 import sys
 from typing import Any, Sequence
 
+from drone_mesh.stopping import quiet_on_closed_pipe
 from drone_mesh.users import command_line
 
 
+@quiet_on_closed_pipe
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the messages that arrive, one line each, until Ctrl-C."""
     parser = command_line.parser_for("mesh_listen", "Prints the messages that a node receives.")

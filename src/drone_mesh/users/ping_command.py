@@ -6,10 +6,12 @@ import time
 from typing import Sequence
 
 from drone_mesh.communication.observer import in_hops
+from drone_mesh.stopping import quiet_on_closed_pipe
 from drone_mesh.users import command_line
 from drone_mesh.users.local_client import LocalClient, Refused
 
 
+@quiet_on_closed_pipe
 def main(arguments: Sequence[str] | None = None) -> int:
     """Send echo requests to a node; the exit status is 1 if none was answered."""
     parser = command_line.parser_for(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Sequence
 
 from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYTES, check_size
+from drone_mesh.stopping import quiet_on_closed_pipe
 from drone_mesh.users import command_line
 
 
+@quiet_on_closed_pipe
 def main(arguments: Sequence[str] | None = None) -> int:
     """Send one message; the exit status is 1 if it was not delivered."""
     parser = command_line.parser_for(
@@ -41,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def work() -> int:
         text = parsed.text
-        payload = sys.stdin.buffer.read() if text is None else text.encode()
+        payload = sys.stdin.buffer.read() if text is None else os.fsencode(text)
         check_size(payload)
         arrived, ticket = command_line.client(parsed).send(
             parsed.to, payload, port=parsed.port, reliable=not parsed.no_ack, wait_s=parsed.wait

@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from typing import Sequence
 
+from drone_mesh.stopping import quiet_on_closed_pipe
 from drone_mesh.users import command_line
 
 
+@quiet_on_closed_pipe
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the path to a node; the exit status is 1 if it does not answer."""
     parser = command_line.parser_for("mesh_trace", "Prints the path of packets to a node.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import socket
 import sys
 import threading
@@ -62,6 +63,11 @@ def test_send_reports_that_the_message_arrived(rig, capsys, to):
     assert send_command.main(["--node", "2", to, "21.5 degrees"]) == 0
     assert "delivered" in capsys.readouterr().out
     assert [message.payload for message in rig.network.received[0]] == [b"21.5 degrees"]
+
+
+def test_send_takes_an_argument_that_is_no_text_as_the_bytes_that_it_is(rig):
+    assert send_command.main(["--node", "2", "0", os.fsdecode(b"\xff\xfe")]) == 0
+    assert [message.payload for message in rig.network.received[0]] == [b"\xff\xfe"]
 
 
 def test_send_takes_any_bytes_from_standard_input(rig, monkeypatch):

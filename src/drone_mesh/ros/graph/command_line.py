@@ -13,6 +13,7 @@ import rosgraph
 import rospy
 
 from drone_mesh.errors import MeshError
+from drone_mesh.stopping import quiet_on_closed_pipe
 
 FAILED = 2  # exit code: the tool could not do its work; 1 means that it did, with a bad result
 
@@ -60,14 +61,10 @@ def prepare_node(about: str | None) -> None:
 def run_tool(name: str, work: Callable[[], int]) -> None:
     """Run a tool and exit with its code. A MeshError becomes one line; Ctrl-C is silent."""
     try:
-        code = work()
-        sys.stdout.flush()
+        code = quiet_on_closed_pipe(work)()
     except MeshError as error:
         print(f"{name}: {error}", file=sys.stderr)
         code = FAILED
     except KeyboardInterrupt:
         code = 130  # as in a shell for SIGINT
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 141  # as in a shell for SIGPIPE
     sys.exit(code)

@@ -1,0 +1,53 @@
+"""Programs whose reader ends, as in `raspberry_radio registers | head -n 1`, end quietly."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments"),
+    [
+        ("raspberry.radio_command", ["--help"]),
+        ("raspberry.radio_command", ["test", "--emulated"]),
+        ("raspberry.status_command", ["--help"]),
+        ("raspberry.key_command", ["--help"]),
+        ("users.ping_command", ["--help"]),
+        ("users.send_command", ["--help"]),
+        ("lab.command", ["--help"]),
+    ],
+)
+def test_a_reader_that_has_closed_the_pipe_is_no_error(module, arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    code = f"import sys; from drone_mesh.{module} import main; sys.exit(main())"
+    ended = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    os.close(writer)
+    assert "Traceback" not in ended.stderr, ended.stderr
+    assert "Exception ignored" not in ended.stderr, ended.stderr
+    assert "Broken pipe" not in ended.stderr, ended.stderr
+
+
+def test_without_the_decorator_the_interpreter_complains():
+    reader, writer = os.pipe()
+    os.close(reader)
+    ended = subprocess.run(
+        [sys.executable, "-c", "print('x' * 100_000)"], stdout=writer, stderr=subprocess.PIPE
+    )
+    os.close(writer)
+    assert b"Broken pipe" in ended.stderr
