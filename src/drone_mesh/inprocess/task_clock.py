@@ -22,6 +22,8 @@ class TaskClock:
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None:
         """Call `function(argument)` at `at_s`, or at once if that is past; it must not wait."""
         at_ns = max(math.ceil(at_s * NS_PER_S), self.tasks.now_ns)
+        if at_ns / NS_PER_S < at_s:  # the product was rounded down: the time would not have come
+            at_ns += 1
         self.tasks.call_at(at_ns, function, argument)
 
     def run_until(self, until_s: float) -> None:
