@@ -8,7 +8,6 @@ getters of IMeshDebugInfo.
 from __future__ import annotations
 
 import abc
-import math
 import struct
 
 from drone_mesh.communication import messages
@@ -30,7 +29,6 @@ from drone_mesh.communication.packet_types import (
 )
 from drone_mesh.drone.location import Location
 
-_HEARTBEAT = int(MessageType.HEARTBEAT)
 _PRESENT = int(MessageType.PRESENT)
 _LOCATION = int(MessageType.LOCATION)
 _MOVE_TO_LOCATION = int(MessageType.MOVE_TO_LOCATION)
@@ -44,7 +42,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def start(self, now_s: float) -> None:
         """Start the antenna, and debugging if configured; schedule the first check; introduce."""
         self._deadlines.now_s = now_s
-        self._receivers = receivers(self, self._drop_unknown)
+        self._receivers = [*receivers(self, self._drop_unknown)]
+        for kind, receive in self.control.receivers.items():
+            self._receivers[kind] = receive
         self._antenna.start_antenna(self)
         if self._debug:
             self._antenna.debugging_mode(self, True)
@@ -53,7 +53,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self._reporter.start(share=(first_check_s - now_s) / self._timing.check_period_s)
         self._report(MeshEventKind.STARTED)
         self._begin()
-        self._routing.start_routing(self)
+        self.control.start()
 
     def stop(self) -> None:
         """Stop the antenna and debugging; nothing is due from now on."""
@@ -77,11 +77,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         """Do what is due."""
         deadlines = self._deadlines
         deadlines.now_s = now_s
-        if now_s >= deadlines.get(Due.INTRODUCE):
-            self._introduction.on_due()
-        if now_s >= deadlines.get(Due.ROUTING):
-            deadlines.set(Due.ROUTING, math.inf)
-            self._routing.on_time(now_s)
+        self.control.on_time(now_s)
         if now_s >= deadlines.get(Due.ASK_POSITION):
             self._watch_flight()
         if now_s >= deadlines.get(Due.ORDER_REPLIES):
@@ -95,7 +91,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             period_s = self._timing.check_period_s
             deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))
             if self._antenna.on():
-                self._check(due_s)
+                self.control.check(due_s)
             else:
                 self._antenna_is_off()
 
@@ -121,8 +117,8 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._report(MeshEventKind.NEIGHBOUR_FOUND, from_)
             self._on_neighbour_found(from_)
         if creator == me:  # it came back, so it teaches no route
-            self._routing.can_communicate_with_node(from_)
-        elif not self._routing.learn(creator, from_, kind, payload):
+            self.control.own_came_back(from_)
+        elif not self._learn(creator, from_, kind, payload):
             return
         if (
             kind == _PRESENT
@@ -138,12 +134,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
                 self._orders.on_foreign_order(order, messages.order_number(payload), from_)
             return
         if forward != me and forward != BROADCAST:
-            if kind == _HEARTBEAT:
-                if self._shared:
-                    self._on_passing_heartbeat(creator, *messages.heartbeat_body(payload))
-            elif kind == _LOCATION:
+            if kind == _LOCATION:
                 self._on_passing_location(creator, payload)
-            self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
+            self._forward(payload, creator, from_, kind, forward, now_s)
         else:
             self._receivers[kind](payload, creator, from_)
 
@@ -152,36 +145,30 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
         """A neighbour has received a packet; the routes learn from this."""
         self._deadlines.now_s = now_s
-        self._delivery.delivered(neighbour, tries)
+        self.control.on_delivered(neighbour, tries)
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         """Send the packet over another route, if there is one; the routes learn from this."""
         self._deadlines.now_s = now_s
-        if not self._delivery.undelivered(payload, tries):
-            self._forwarding.stranded(payload, now_s)
+        self.control.on_undelivered(payload, tries)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:
         """Switched on: introduce the node soon. Switched off: a router disconnects at once."""
         self._deadlines.now_s = now_s
         self._report(MeshEventKind.POWER_ON if on else MeshEventKind.POWER_OFF)
-        self._introduction.on_power(on)
+        self.control.on_power(on)
         if not on:
             self._antenna_is_off()
 
     def on_antenna_registered(self, now_s: float) -> None:
         """The medium is back: introduce the node soon, each node at a different moment."""
         self._deadlines.now_s = now_s
-        if self._antenna.on():
-            self._introduction.on_registered()
+        self.control.on_registered()
 
     # Implemented by router and gateway -------------------------------------------------------
 
     def _begin(self) -> None:
         """Start this kind of node, before routing starts."""
-
-    @abc.abstractmethod
-    def _check(self, due_s: float) -> None:
-        """Do the periodic work while the antenna is on; it was due at `due_s`."""
 
     @abc.abstractmethod
     def _antenna_is_off(self) -> None:
@@ -192,11 +179,6 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self, bid: messages.MovementNegotiationMessage, gateway: messages.GatewayPlace | None
     ) -> None:
         """A neighbour bids for the flight; `gateway`: the gateway's place in the announcement."""
-
-    def _on_passing_heartbeat(
-        self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
-    ) -> None:
-        """On a shared medium: a heartbeat for another node is about to be forwarded."""
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
         """A LOCATION for another node is about to be forwarded."""
@@ -235,12 +217,6 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         if gateway is not None:
             self._on_gateway_place(gateway)
 
-    def receive_missing(self, payload: bytes, creator: int, from_: int) -> None:
-        """A node cannot reach another one."""
-        missing = messages.MissingMessage.from_payload(payload).missing
-        if missing != self._node_id:
-            self._on_missing(creator, missing, reported_by=from_)
-
     def receive_move_to_location(self, payload: bytes, _creator: int, _from: int) -> None:
         """An order to fly."""
         order = messages.GoToLocationMessage.from_payload(payload)
@@ -255,18 +231,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         """Users' data."""
         self.data.on_packet(payload)
 
-    def receive_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
-        """A packet of the routing technique."""
-        kind = messages.type_of(payload)
-        self._routing.on_packet(creator, from_, kind, messages.body(payload))
-
     def receive_order_query(self, payload: bytes, creator: int, _from: int) -> None:
         """A gateway asks for the state of an order."""
         self._orders.on_query(creator, OrderQuery.number_in(payload))
-
-    def receive_node_search(self, payload: bytes, creator: int, _from: int) -> None:
-        """A gateway looks for a node."""
-        self._search.on_packet(creator, payload)
 
     def receive_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
         """A neighbour has a key; with one, the antenna would have answered."""
@@ -275,10 +242,6 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     def _drop_unknown(self, payload: bytes, _creator: int, _from: int) -> None:
         self._drop("a packet of a type that this node does not process", payload)
-
-    def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
-        """`creator` reports that it cannot reach the node `missing`."""
-        self._delivery.forget_route(creator, missing, reported_by)
 
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._deadlines.now_s)
@@ -292,10 +255,10 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
                 gateway, age_s = self.get_preferred_gateway(), now_s - places.gateway_seen_s
                 extension = messages.GatewayPlace(gateway, places.gateway, age_s)
                 if self._parts.seals.reserved_bytes(MessageType.LOCATION):
-                    self._delivery.send_own(extension.to_payload(me, me, asker, asker))
+                    self._parts.delivery.send_own(extension.to_payload(me, me, asker, asker))
                 else:
                     answer = extension.appended_to(answer)
-            self._delivery.send_own(answer)
+            self._parts.delivery.send_own(answer)
 
     # Flight ----------------------------------------------------------------------------------
 
@@ -306,7 +269,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _landed(self) -> None:
         """The drone is at another place and has other neighbours."""
         self._neighbours.forget_all()
-        self._routing.node_moved_location()
+        self.control.routes.node_moved_location()
         self._report(MeshEventKind.LANDED)
-        self.search_other_nodes_in_range()
+        self.control.introduce()
         self._orders.on_landed()

@@ -18,8 +18,6 @@ from drone_mesh.communication.interfaces import (
 from drone_mesh.communication.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
-    heartbeat_body,
-    present_body,
     type_of,
 )
 from drone_mesh.communication.observer import MeshObserver, ignore_events
@@ -57,7 +55,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
         self._reports = ReportBook()
-        self._book = OrderBook(self._parts, self._may_find, self._search.search)
+        self._book = OrderBook(self._parts, self._may_find, self.control.search)
         self._orders.on_own_reply = self._book.on_outcome
 
     def stop(self) -> None:
@@ -118,17 +116,21 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         for node in range(MAX_NODE_ID + 1):
             if node == self._node_id:
                 continue
-            next_hop = self._routing.get_direction_to_node(node)
+            next_hop = self.control.routes.get_direction_to_node(node)
             hops, heard_s = self._heartbeats.get(node, (NO_ROUTE, -math.inf))
             heard_s = max(heard_s, self._neighbours.last_heard_s(node, otherwise=-math.inf))
             if next_hop != NO_ROUTE or heard_s > -math.inf:
                 nodes.append(KnownNode(node, next_hop, hops, heard_s))
         return nodes
 
-    def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
+    def on_node_missing(self, node: int) -> None:
         """A relay that cannot forward an order reports this to the gateway."""
-        super()._on_missing(creator, missing, reported_by)
-        self._book.on_missing(missing)
+        self._book.on_missing(node)
+
+    def on_node_heard(self, node: int, hops: int) -> None:
+        """Its path works: send it what waits."""
+        self._heartbeats[node] = (min(hops, NO_ROUTE), self._deadlines.now_s)
+        self._book.on_found(node)
 
     def receive_node_report(self, payload: bytes, creator: int, _from: int) -> None:
         """Keep the report."""
@@ -158,25 +160,8 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _begin(self) -> None:
         self._internet.connect(self)
 
-    def _check(self, due_s: float) -> None:
-        self._routing.maintain_routing()
-
     def _antenna_is_off(self) -> None:
         """Nothing changes: without an antenna it is still a gateway."""
-
-    def receive_present(self, payload: bytes, neighbour: int, _from: int) -> None:
-        """A neighbour that has no gateway learns of this one."""
-        _hops, know_gateway = present_body(payload)
-        if not know_gateway:
-            self._introduction.answer_search(neighbour)
-
-    def receive_heartbeat(self, payload: bytes, creator: int, _from: int) -> None:
-        """Answer a node that has this gateway, or none."""
-        _know_gateway, preferred_gateway, hops = heartbeat_body(payload)
-        self._heartbeats[creator] = (min(hops + 1, NO_ROUTE), self._deadlines.now_s)
-        self._book.on_found(creator)
-        if creator != preferred_gateway:  # gateways do not answer each other
-            self.send_heartbeat(creator)
 
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None

@@ -7,22 +7,16 @@ from __future__ import annotations
 
 import math
 import random
-from typing import Sequence
 
 from drone_mesh.communication.component import MeshnetworkComponent
-from drone_mesh.communication.connection import GatewayConnection
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import (
-    MAX_NODE_ID,
-    NO_ROUTE,
     IWirelessCommunication,
 )
 from drone_mesh.communication.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
-    heartbeat_body,
     place_in,
-    present_body,
 )
 from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
 from drone_mesh.communication.packet_types import MessageType
@@ -31,7 +25,7 @@ from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.strategies.thesis import Thesis
-from drone_mesh.communication.router_states import ConnectionState, RepairState, RouterStates
+from drone_mesh.communication.router_states import RepairState, RouterStates
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -58,16 +52,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
         repair_options: RepairOptions | None = None,
     ) -> None:
         """Like MeshnetworkComponent; the default of `repair` is Thesis."""
-        super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
         self._states = RouterStates()
-        self._connection = GatewayConnection(
-            self._parts, self._states, self.search_other_nodes_in_range
+        super().__init__(
+            node_id, antenna, engine, routing, rng, timing, observer, debug, self._states
         )
         self._repair = ConnectionRepair(
             self._parts,
             self._states,
-            self._connection,
-            self.search_other_nodes_in_range,
+            self.control,
             repair or Thesis(),
             repair_options or RepairOptions(),
         )
@@ -75,9 +67,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
-        self._deadlines.now_s = now_s
-        if now_s >= self._deadlines.get(Due.ANSWER):
-            self._connection.answer_missed()
         super().tick(now_s)
         if now_s >= self._deadlines.get(Due.GOAL):
             self._deadlines.set(Due.GOAL, math.inf)
@@ -102,89 +91,41 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def get_preferred_gateway(self) -> int:
         """Id of the gateway that this node uses, or NO_ROUTE while it knows none."""
-        return self._connection.gateway
+        return self.control.gateway
 
     def get_hops_from_gateway_away(self) -> int:
         """Hops to the preferred gateway; 255 while unknown."""
-        return self._connection.hops
+        return self.control.hops
 
     def get_repair_status(self) -> RepairStatus:
         """What the node does about a lost connection, and why."""
         return self._repair_status
 
-    def send_heartbeat(self, other: int) -> bool:
-        """Send a heartbeat to `other`; the preferred gateway is expected to answer."""
-        if other == self._connection.gateway:
-            return self._connection.send_heartbeat()
-        return super().send_heartbeat(other)
+    # For the control plane -------------------------------------------------------------------
 
-    def send_heartbeats(self, others: Sequence[int]) -> None:
-        """Send a heartbeat to each of these; the preferred gateway's is sent as if alone."""
-        gateway = self._connection.gateway
-        if gateway in others and not self._connection.proven(self._antenna.patience()):
-            self._connection.send_heartbeat()
-        super().send_heartbeats([other for other in others if other != gateway])
+    def may_connect(self, node: int, know_gateway: bool) -> bool:
+        """See ConnectionRepair; also for the functions below."""
+        return self._repair.may_connect(node, know_gateway)
 
-    def _check(self, due_s: float) -> None:
-        if not self._repair.may_connect(NO_ROUTE, know_gateway=False):
-            return
-        before = self._states.connection  # the routing may send a heartbeat to the gateway
-        was_connected = self._states.connected
-        self._routing.maintain_routing()
-        if was_connected:
-            self._connection.check(self._antenna.patience())
-        elif before is ConnectionState.SEARCHING and self._states.repair is not RepairState.FLYING:
-            self._repair.on_unconnected_check(due_s)
+    def on_connected(self) -> None:  # noqa: D102
+        self._repair.on_connected()
+
+    def on_unconnected_check(self, due_s: float) -> None:  # noqa: D102
+        self._repair.on_unconnected_check(due_s)
+
+    def on_neighbour_lost(self, node: int) -> None:  # noqa: D102
+        self._repair.on_neighbour_lost(node)
+
+    # Packets ---------------------------------------------------------------------------------
 
     def _antenna_is_off(self) -> None:
         self._repair.on_antenna_off()
-
-    def receive_present(self, payload: bytes, neighbour: int, _from: int) -> None:
-        """A neighbour introduces itself."""
-        hops, know_gateway = present_body(payload)
-        self._neighbours.set_hops(neighbour, hops)
-        if not self._repair.may_connect(neighbour, know_gateway):
-            return
-        if know_gateway and hops <= self._connection.hops:
-            self._introduction.search_is_answered()
-        if self._connection.on_present(neighbour, hops, know_gateway):
-            if know_gateway:
-                self.send_heartbeat(neighbour)
-            else:
-                self._introduction.answer_search(neighbour)
-
-    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
-        """A gateway's answer, or the heartbeat of another node."""
-        know_gateway, preferred_gateway, hops = heartbeat_body(payload)
-        if creator == self._node_id:
-            return  # its own heartbeat came back, which proves nothing
-        if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
-            self._neighbours.set_gateway(creator, preferred_gateway)
-        if not self._repair.may_connect(from_, know_gateway):
-            return
-        if creator == preferred_gateway:
-            if self._connection.on_gateway_heartbeat(creator, hops + 1):
-                self._repair.on_connected()
-        elif know_gateway != self._states.connected:
-            if not know_gateway:
-                self.send_heartbeat(creator)
-            elif not self._states.awaiting:
-                self._connection.take_gateway_of(from_, preferred_gateway)
-
-    def _on_passing_heartbeat(
-        self, creator: int, know_gateway: bool, preferred_gateway: int, hops: int
-    ) -> None:
-        """A gateway's answer proves the connection of each relay as well."""
-        proves = creator == preferred_gateway and self._repair.may_connect(NO_ROUTE, know_gateway)
-        proves = proves and self._parts.seals.may_be_gateway(creator)
-        if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
-            self._repair.on_connected()
 
     def _on_passing_location(self, creator: int, payload: bytes) -> None:
         """Relays use the gateway's place as well, unless only the addressee can check it."""
         if self._parts.seals.reserved_bytes(MessageType.LOCATION):
             return
-        if creator == self._connection.gateway:
+        if creator == self.control.gateway:
             self.places.update_gateway(place_in(payload), self._deadlines.now_s)
 
     def _on_negotiation(
@@ -197,38 +138,28 @@ class MeshnetworkRouter(MeshnetworkComponent):
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
         now_s = self._deadlines.now_s
         self._neighbours.set_place(node, location, now_s)
-        connection = self._connection
-        if node == connection.gateway:
+        control = self.control
+        if node == control.gateway:
             self.places.update_gateway(location, now_s)
-            connection.gateway_sent_place()
+            control.gateway_sent_place()
         elif gateway is not None:
             self._on_gateway_place(gateway)
-        if node == connection.next_hop():
+        if node == control.next_hop():
             self.places.update_next_hop(node, location, now_s)
         self._repair.on_place(node, location)
 
-    def _on_missing(self, creator: int, missing: int, reported_by: int) -> None:
-        super()._on_missing(creator, missing, reported_by)
-        self._connection.on_route_lost()
-
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
-        if self._connection.may_use(gateway.gateway):
+        if self.control.may_use(gateway.gateway):
             seen_s = self._deadlines.now_s - gateway.age_s
             self.places.update_gateway(gateway.place, seen_s)
 
     def _on_neighbour_found(self, node: int) -> None:
         self._repair.on_neighbour_found(node)
 
-    def _on_neighbour_lost(self, node: int) -> None:
-        self._connection.on_route_lost()
-        self._repair.on_neighbour_lost(node)
-
     def _on_goal(self, neighbour: int, goal: Location) -> None:
         here = self._pilot.goal or self._pilot.location()
-        if not self._antenna.medium.shared or here is None:
-            return
-        if here.distance_m(goal) >= self._repair.range_m:
-            self._delivery.neighbour_leaves(neighbour)
+        if here is not None and here.distance_m(goal) >= self._repair.range_m:
+            self.control.neighbour_leaves(neighbour)
 
     def _took_off(self) -> None:
         goal = self._pilot.goal
@@ -238,7 +169,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             for neighbour in sorted(self._neighbours.ids()):
                 heard = self._neighbours.place_of(neighbour)
                 if heard is not None and heard.place.distance_m(goal) >= self._repair.range_m:
-                    self._delivery.neighbour_leaves(neighbour)
+                    self.control.neighbour_leaves(neighbour)
         self._neighbours.takes_off(by_order=True)
         if not self._is_short_flight():
             self._repair.on_ordered_flight()
@@ -264,4 +195,4 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._report(MeshEventKind.LANDED)
         self._orders.on_landed()
         if self._antenna.on():
-            self._check(self._deadlines.now_s)
+            self.control.check(self._deadlines.now_s)

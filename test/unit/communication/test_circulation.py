@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drone_mesh.communication.circulation import CirculationGuard, came_round
+from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
 from drone_mesh.lab.proofs.fuzz import tables
 
 

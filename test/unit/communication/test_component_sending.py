@@ -41,7 +41,7 @@ def test_debugging_stays_off_unless_it_is_asked_for():
 def test_a_router_introduces_itself_without_a_gateway_and_a_gateway_with_itself():
     for gateway, introduction in ((False, "03 03 03 fe fe ff 00"), (True, "03 03 03 fe fe 00 01")):
         rig = Rig(node_id=3, gateway=gateway)
-        rig.mesh.search_other_nodes_in_range()
+        rig.mesh.control.search_other_nodes_in_range()
         assert rig.broadcasts() == [packet(introduction)]
 
 
@@ -117,7 +117,7 @@ def test_a_round_of_heartbeats_tries_three_times_and_then_another_way():
     rig.know_neighbour(2, 3)
     rig.routing.other_can_communicate_with_node(3, 2)
     rig.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] == 2
-    rig.mesh.send_heartbeats([2, 3])
+    rig.mesh.control.send_heartbeats([2, 3])
     lost, other_way = packet("01 01 04 02 02 00 ff"), packet("01 01 04 03 02 00 ff")
     heartbeats = rig.tried(4)
     assert heartbeats.count(lost) == 3
@@ -130,7 +130,7 @@ def test_a_round_of_heartbeats_goes_to_those_behind_others_as_well():
     rig = Rig()
     rig.know_neighbour(3)
     rig.routing.other_can_communicate_with_node(3, 9)
-    rig.mesh.send_heartbeats([9])
+    rig.mesh.control.send_heartbeats([9])
     assert rig.sent(4) == [packet("01 01 04 03 09 00 ff")]
 
 
@@ -147,7 +147,7 @@ def test_a_technique_that_does_not_forget_a_route_does_not_stop_the_node():
     router.start(0.0)
     router.on_msg(packet("00 02 04 01 01 01 00 01"), 0.0)
     router.on_msg(packet("02 02 00 01 fe"), 0.0)
-    router.send_heartbeat(0)
+    router.control.send_heartbeat(0)
     for now_s in (1.0, 5.0, 15.0):
         router.tick(now_s)
     assert not router.get_connected_to_gateway()
@@ -187,7 +187,7 @@ def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
 
 def test_broadcasts_do_not_count_as_sent():
     rig = Rig()
-    rig.mesh.search_other_nodes_in_range()
+    rig.mesh.control.search_other_nodes_in_range()
     assert rig.mesh.get_total_message_sent() == 0
 
 
@@ -235,14 +235,14 @@ def test_own_packets_try_every_route():
     for child in (2, 3, 4):
         rig.routing.other_can_communicate_with_node(child, 9)
     rig.antenna.gets_lost = lambda payload: payload[2] == 4 and payload[3] in (2, 3)
-    assert rig.mesh.send_heartbeat(9)
+    assert rig.mesh.control.send_heartbeat(9)
     assert rig.sent(4) == [packet("01 01 04 04 09 00 ff")]
 
 
 def test_a_heartbeat_without_a_route_is_false_and_sends_nothing():
     rig = Rig()
     rig.know_neighbour(2)
-    assert not rig.mesh.send_heartbeat(9)
+    assert not rig.mesh.control.send_heartbeat(9)
     assert rig.tried() == []
 
 
@@ -250,7 +250,7 @@ def test_a_heartbeat_without_an_acknowledgement_is_false():
     rig = Rig()
     rig.routing.other_can_communicate_with_node(2, 9)
     rig.antenna.dead = {2}
-    assert not rig.mesh.send_heartbeat(9)
+    assert not rig.mesh.control.send_heartbeat(9)
     assert rig.routing.empty()
 
 

@@ -142,7 +142,7 @@ def test_another_number_or_another_node_is_another_search(other):
 
 def test_the_node_that_is_searched_for_answers_even_if_a_heartbeat_is_under_way():
     rig = router_rig()
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.forget()
     rig.hear("00 03 44 01 fe 01 20 00")
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 00 00 01 00 00")]

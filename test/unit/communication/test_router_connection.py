@@ -121,13 +121,13 @@ def test_a_check_finds_an_antenna_that_is_off_and_does_nothing_but_disconnect():
 def test_a_heartbeat_says_that_its_creator_is_connected_and_to_whom():
     """The flag is noted for the packet before it becomes false."""
     rig = connected_rig()
-    assert rig.mesh.send_heartbeat(0)
+    assert rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 00 00 01 00 00")]
 
 
 def test_a_heartbeat_that_is_not_answered_ends_the_connection():
     rig = connected_rig()
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(0.6)
     assert not rig.mesh.get_connected_to_gateway()
     assert rig.kinds()[-1] == "DISCONNECTED"
@@ -135,7 +135,7 @@ def test_a_heartbeat_that_is_not_answered_ends_the_connection():
 
 def test_a_heartbeat_that_is_answered_keeps_the_connection():
     rig = connected_rig()
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(0.1)
     rig.hear(ANSWER)
     rig.wait(4.0)
@@ -145,7 +145,7 @@ def test_a_heartbeat_that_is_answered_keeps_the_connection():
 
 def test_an_answer_after_more_than_half_a_second_connects_again():
     rig = connected_rig()
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(0.7)
     rig.hear(ANSWER)
     assert rig.mesh.get_connected_to_gateway()
@@ -156,7 +156,7 @@ def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
     """Introduced, and the places asked for: the first question may have been lost with it."""
     rig = Rig()
     rig.connect_through(2)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(0.7)
     rig.forget()
     rig.hear("00 02 04 01 01 01 00 01")
@@ -167,13 +167,13 @@ def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
 def test_a_heartbeat_without_an_acknowledgement_ends_the_connection_at_once():
     rig = connected_rig()
     rig.antenna.dead = {0}
-    assert not rig.mesh.send_heartbeat(0)
+    assert not rig.mesh.control.send_heartbeat(0)
     assert not rig.mesh.get_connected_to_gateway()
 
 
 def test_waiting_for_an_answer_does_not_touch_the_hops():
     rig = connected_rig()
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(0.6)
     assert rig.mesh.get_hops_from_gateway_away() == 1
 
@@ -181,19 +181,19 @@ def test_waiting_for_an_answer_does_not_touch_the_hops():
 def test_a_heartbeat_to_another_node_does_not_touch_the_connection():
     rig = connected_rig()
     rig.know_neighbour(2)
-    rig.mesh.send_heartbeat(2)
+    rig.mesh.control.send_heartbeat(2)
     rig.wait(0.6)
     assert rig.mesh.get_connected_to_gateway()
 
 
 def test_one_heartbeat_to_the_gateway_is_under_way_within_half_a_second():
     rig = connected_rig()
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(0.4)
-    assert rig.mesh.send_heartbeat(0)
+    assert rig.mesh.control.send_heartbeat(0)
     assert len(rig.sent(HEARTBEAT)) == 1
     rig.wait(0.2)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     assert len(rig.sent(HEARTBEAT)) == 1
 
 
@@ -202,7 +202,7 @@ def test_waiting_for_the_first_answer_is_not_being_connected():
     rig.hear("02 02 04 01 01 01 00 00")
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 00 00 00")]
     assert not rig.mesh.get_connected_to_gateway()
-    rig.mesh.search_other_nodes_in_range()
+    rig.mesh.control.search_other_nodes_in_range()
     assert rig.broadcasts() == [packet("01 01 03 fe fe ff 00")]
     rig.hear("03 03 04 01 01 00 ff 00")  # knows none: there is nothing to tell it
     assert rig.sent() == []
@@ -313,7 +313,7 @@ def test_an_unconnected_router_answers_the_introduction_of_one_that_is():
 def test_a_router_that_waits_for_its_gateway_does_not_answer_one_that_is_connected():
     rig = connected_rig()
     rig.know_neighbour(2)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.forget()
     rig.hear("02 02 03 01 fe 03 01")
     assert rig.tried() == []
@@ -335,7 +335,7 @@ def test_the_next_heartbeat_tries_a_neighbour_with_fewer_hops():
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear("03 03 03 01 fe 02 01")
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00 00")]
     rig.hear("00 03 04 01 01 01 00 02")
     assert rig.mesh.get_hops_from_gateway_away() == 3
@@ -346,7 +346,7 @@ def test_the_neighbour_with_the_fewest_hops_is_tried():
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear("03 03 03 01 fe 03 01", "04 04 03 01 fe 01 01", "05 05 03 01 fe 02 01")
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 04 00 01 00 00")]
 
 
@@ -355,7 +355,7 @@ def test_a_neighbour_that_would_not_shorten_the_route_is_not_tried(hops):
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear(f"03 03 03 01 fe {hops} 01")
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
@@ -365,7 +365,7 @@ def test_an_introduction_counts_for_one_heartbeat():
     rig.hear("03 03 03 01 fe 02 01")
     for next_hop in (3, 2):
         rig.forget()
-        rig.mesh.send_heartbeat(0)
+        rig.mesh.control.send_heartbeat(0)
         assert rig.sent(HEARTBEAT) == [packet(f"01 01 04 0{next_hop} 00 01 00 00")]
         rig.wait(0.1)
         rig.hear("00 02 04 01 01 01 00 04")
@@ -377,7 +377,7 @@ def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():
     rig.connect_through(2, hops=4)
     rig.hear("03 03 03 01 fe 02 01")
     rig.antenna.dead = {3}
-    assert rig.mesh.send_heartbeat(0)
+    assert rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
@@ -385,7 +385,7 @@ def test_a_neighbour_whose_route_has_become_longer_is_no_shortcut():
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear("03 03 03 01 fe 02 01", "03 03 03 01 fe 06 01")
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
@@ -395,7 +395,7 @@ def test_only_a_neighbour_can_be_a_shortcut():
         rig = Rig()
         rig.connect_through(2, hops=4)
         rig.hear(f"{creator} 03 03 01 fe 01 01")
-        rig.mesh.send_heartbeat(0)
+        rig.mesh.control.send_heartbeat(0)
         assert rig.tried(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
 
 
@@ -404,7 +404,7 @@ def test_a_neighbour_nearer_to_another_gateway_is_a_shortcut_to_that_one_only():
     rig = Rig()
     rig.connect_through(2, hops=4)
     rig.hear("03 03 04 01 01 01 09 00", "03 03 03 01 fe 02 01")
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     assert rig.sent(HEARTBEAT) == [
         packet("01 01 04 03 09 01 00 00"),
         packet("01 01 04 02 00 01 00 00"),
@@ -419,7 +419,7 @@ def test_a_neighbour_nearer_to_another_gateway_is_a_shortcut_to_that_one_only():
 def test_a_shortcut_from_before_the_loss_does_not_count():
     rig = Rig()
     rig.connect_through(2, hops=4)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.hear("03 03 03 01 fe 02 01")
     rig.wait_until(5.0)
     rig.forget()
@@ -451,7 +451,7 @@ def test_the_own_gateway_is_believed_whatever_it_says():
 def test_within_a_period_of_the_last_answer_a_lost_gateway_is_not_given_up_for_a_far_one():
     rig = Rig()
     rig.connect_through(2, hops=2)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(1.0)
     assert not rig.mesh.get_connected_to_gateway()
     rig.hear("09 03 04 01 01 01 09 02")
@@ -492,7 +492,7 @@ def test_switching_off_disconnects_at_once():
 
 def test_switching_off_while_waiting_for_an_answer_disconnects_at_once():
     rig = connected_rig()
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.mesh.on_antenna_power(False, rig.now_s)
     assert not rig.mesh.get_connected_to_gateway()
 
@@ -500,7 +500,7 @@ def test_switching_off_while_waiting_for_an_answer_disconnects_at_once():
 def test_the_time_without_a_gateway_does_not_count_while_the_antenna_is_off():
     rig = Rig()
     rig.connect_through(2)
-    rig.mesh.send_heartbeat(0)  # never answered
+    rig.mesh.control.send_heartbeat(0)  # never answered
     rig.hear("02 02 01 01 01 00 00 80 3f")
     rig.antenna.dead = {2}
     rig.wait_until(16.0)  # the timer runs since 5 s
@@ -551,7 +551,7 @@ def test_a_queued_packet_teaches_the_routes_when_the_antenna_reports_its_outcome
     rig = Rig(routing=routing)
     rig.antenna.medium = Medium(shared=True)
     rig.connect_through(2)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     assert routing.links.etx(2) == 1.0
     rig.mesh.on_delivered(2, 4, rig.now_s)
     assert routing.links.etx(2) > 1.0

@@ -128,7 +128,7 @@ def ring():
     network.add_router(4, -7.0, 0.0)
     network.run_for(0.1)
     for node, next_node in ((1, 2), (2, 3), (3, 1)):
-        network.nodes[node].component._routing.other_can_communicate_with_node(next_node, 9)
+        network.nodes[node].component.control.routes.other_can_communicate_with_node(next_node, 9)
     return network
 
 

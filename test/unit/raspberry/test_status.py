@@ -210,7 +210,7 @@ def worst_stop_s(seed: int) -> tuple[float, State]:
         mesh.stop(*mesh.nodes[1:])
         for node in (1, 2, 3):
             gateway._slot.submit(lambda _now_s, node=node: gateway.component.send_heartbeat(node))
-        gateway._slot.submit(lambda _now_s: gateway.component._routing.maintain_routing())
+        gateway._slot.submit(lambda _now_s: gateway.component.control.routes.maintain_routing())
         time.sleep(rng.uniform(0.0, 0.5))
         started_s = time.monotonic()
         mesh.stop(gateway)

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Callable
 
 from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.heartbeats.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import GoToLocationMessage, with_order_number
-from drone_mesh.communication.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.orders.messages import OrderOutcome, OrderQuery, OrderReply

@@ -7,9 +7,8 @@ docs/protocol.md, "Lost connection" and "Flight".
 from __future__ import annotations
 
 import math
-from typing import Callable
 
-from drone_mesh.communication.connection import GatewayConnection
+from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.messages import (
@@ -41,14 +40,11 @@ class ConnectionRepair(RepairViews):
         self,
         parts: NodeParts,
         states: RouterStates,
-        connection: GatewayConnection,
-        introduce: Callable[[], None],
+        control: IControlPlane,
         strategy: IRepairStrategy,
         options: RepairOptions,
     ) -> None:
-        """`introduce` broadcasts a PRESENT."""
-        super().__init__(parts, states, connection, options)
-        self._introduce = introduce
+        super().__init__(parts, states, control, options)
         self._strategy = strategy
         self._lost_since_s = math.inf  # valid from LOSS_NOTICED until the router is AT_REST
         self._checked_s: float | None = None  # when the first check during an election was due
@@ -86,7 +82,7 @@ class ConnectionRepair(RepairViews):
 
     def on_antenna_off(self) -> None:
         """The antenna is off."""
-        self._connection.end(RouterEvent.ANTENNA_OFF)
+        self._control.end(RouterEvent.ANTENNA_OFF)
         self._clear()
         self._strategy.reason = ""
         self._strategy.on_stopped()
@@ -159,7 +155,12 @@ class ConnectionRepair(RepairViews):
         """See IRepairActions; also for the functions below."""
         self._parts.report(MeshEventKind.FLIGHT_DECIDED, step.owner)
         flight = RepairFlight(
-            self._parts, self._introduce, step.owner, step.place, self._goal(step), self._options
+            self._parts,
+            self._control.introduce,
+            step.owner,
+            step.place,
+            self._goal(step),
+            self._options,
         )
         flight.stops_when_connected = until_connected or step.home
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
@@ -184,7 +185,7 @@ class ConnectionRepair(RepairViews):
         creator = me if node is None else node
         packet = MovementNegotiationMessage(creator, me, me, me, score).to_payload()
         if about is not None:
-            packet = GatewayPlace(self._connection.gateway, about, 0.0).appended_to(packet)
+            packet = GatewayPlace(self._control.gateway, about, 0.0).appended_to(packet)
         for neighbour in sorted(self._parts.routing.get_set_of_children() - {creator, but_not_to}):
             self._parts.delivery.send_own(addressed(packet, neighbour))
 
@@ -200,7 +201,7 @@ class ConnectionRepair(RepairViews):
         self._parts.antenna.broadcast_message(packet)
 
     def present(self) -> None:  # noqa: D102
-        self._introduce()
+        self._control.introduce()
 
     def wait_until(self, at_s: float) -> None:  # noqa: D102
         self._parts.deadlines.set(Due.REPAIR, at_s)
@@ -252,7 +253,7 @@ class ConnectionRepair(RepairViews):
     def on_landed(self) -> None:
         """The flight is over."""
         was_repair, self._flight = self._flight is not None, None
-        self._connection.end(RouterEvent.LANDED)
+        self._control.end(RouterEvent.LANDED)
         if was_repair:
             self._strategy.on_landed()
 
@@ -285,16 +286,16 @@ class ConnectionRepair(RepairViews):
 
     def _notice_loss(self, due_s: float) -> None:
         self._lost_since_s = due_s
-        self._connection.end(RouterEvent.LOSS_NOTICED)
-        self._connection.give_up_routes()
+        self._control.end(RouterEvent.LOSS_NOTICED)
+        self._control.give_up_routes()
         self._strategy.on_gateway_lost()
 
     def _took_off(self) -> None:
-        self._connection.end(RouterEvent.TOOK_OFF)
+        self._control.end(RouterEvent.TOOK_OFF)
         self._clear()
         self._strategy.reason = ""
         self._strategy.on_stopped()
-        self._parts.places.left_own_place(self._connection.gateway)
+        self._parts.places.left_own_place(self._control.gateway)
 
     def _clear(self) -> None:
         """Forget what was under way; not the end of a flight, which is due whatever happens."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Mapping
 
-from drone_mesh.communication.connection import GatewayConnection
+from drone_mesh.communication.control_plane import IControlPlane
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.parts import NodeParts
@@ -25,12 +25,12 @@ class RepairViews(IRepairActions):
         self,
         parts: NodeParts,
         states: RouterStates,
-        connection: GatewayConnection,
+        control: IControlPlane,
         options: RepairOptions,
     ) -> None:
         self._parts = parts
         self._states = states
-        self._connection = connection
+        self._control = control
         self._options = options
         self._tried_goals: list[Location] = []  # goals of this drone since it was last connected
 
@@ -91,7 +91,7 @@ class RepairViews(IRepairActions):
 
     @property
     def steps(self) -> list[Step]:  # noqa: D102
-        places, gateway = self._parts.places, self._connection.gateway
+        places, gateway = self._parts.places, self._control.gateway
         candidates = ((places.good, places.good_id), (places.gateway, gateway))
         return [
             Step(place, owner, home=owner == gateway)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import abc
 from typing import ClassVar, Sequence
 
+from drone_mesh.communication.control_plane import IRoutes
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import UNDISTURBED, Medium
 from drone_mesh.communication.packet_types import MessageType
@@ -75,8 +76,8 @@ class IRoutingEssentials(abc.ABC):
         """The last reported place of `node`, or None."""
 
 
-class IRoutingTechnique(abc.ABC):
-    """Decides which neighbour leads to which node.
+class IRoutingTechnique(IRoutes):
+    """Decides by heartbeats which neighbour leads to which node.
 
     A node in direct reach is a "child"; nodes behind it are its "grandchildren".
 
@@ -85,20 +86,12 @@ class IRoutingTechnique(abc.ABC):
     """
 
     @abc.abstractmethod
-    def get_direction_to_node(self, node: int) -> int:
-        """The next hop for `node`, or NO_ROUTE."""
-
-    @abc.abstractmethod
     def start_routing(self, essentials: IRoutingEssentials) -> None:
         """Start finding routes, through `essentials`."""
 
     @abc.abstractmethod
     def maintain_routing(self) -> None:
         """Check the routes; called once a check period."""
-
-    @abc.abstractmethod
-    def node_moved_location(self) -> None:
-        """This node moved: forget its neighbours and routes."""
 
     @abc.abstractmethod
     def cant_communicate_with_node(self, node: int) -> int:
@@ -126,10 +119,6 @@ class IRoutingTechnique(abc.ABC):
     @abc.abstractmethod
     def get_amount_of_children(self) -> int:
         """Number of nodes in direct reach."""
-
-    @abc.abstractmethod
-    def get_set_of_children(self) -> frozenset[int]:
-        """Ids of the nodes in direct reach."""
 
     @abc.abstractmethod
     def empty(self) -> bool:

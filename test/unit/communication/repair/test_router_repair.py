@@ -362,7 +362,7 @@ def test_a_lost_gateway_is_dropped_and_the_neighbours_are_informed():
     rig = Rig()
     rig.connect_through(2)
     rig.routing.other_can_communicate_with_node(3, 0)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait_until(4.9)
     rig.forget()
     assert rig.mesh.get_hops_from_gateway_away() == 2
@@ -393,7 +393,7 @@ def test_the_emergency_comes_at_the_first_check_when_the_time_has_run_out(timing
     rig = Rig(timing=timing)
     rig.connect_through(2)
     rig.hear(NEIGHBOUR_2_AT_0_8)
-    rig.mesh.send_heartbeat(0)  # never answered
+    rig.mesh.control.send_heartbeat(0)  # never answered
     rig.wait_until(0.9)
     rig.antenna.dead = {2}
     rig.wait_until(flies_at_s - 0.1)
@@ -407,7 +407,7 @@ def test_the_timer_is_off_when_a_gateway_answers():
     rig.wait_until(34.0)
     assert not rig.mesh.get_connected_to_gateway()
     rig.hear("00 03 04 01 01 01 00 04")
-    rig.mesh.send_heartbeat(0)  # taken, but never answered
+    rig.mesh.control.send_heartbeat(0)  # taken, but never answered
     rig.wait_until(44.9)  # lost again at the check at 35 s
     rig.antenna.dead = {2, 3}
     rig.wait_until(64.9)
@@ -610,7 +610,7 @@ def test_a_neighbour_that_dies_in_the_middle_is_not_waited_for():
     rig.wait_until(BIDS_S)
     rig.hear(bid(3, 1.0))
     rig.antenna.dead = {2, 4}
-    rig.mesh.send_heartbeat(4)
+    rig.mesh.control.send_heartbeat(4)
     rig.wait(TO_DECISION_S)
     assert rig.engine.goals == [NEIGHBOUR_PLACE]
 
@@ -648,7 +648,7 @@ def test_a_bid_makes_an_unconnected_node_with_a_running_timer_join_at_once():
 
 def test_a_bid_before_the_timer_runs_is_kept_and_not_answered():
     rig = group_rig(3)
-    rig.mesh.send_heartbeat(0)
+    rig.mesh.control.send_heartbeat(0)
     rig.wait(0.6)
     rig.hear(bid(3, 9.0))
     assert rig.sent(BID) == []

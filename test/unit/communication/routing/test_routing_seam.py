@@ -45,27 +45,27 @@ def rig():
 
 def test_extension_bytes_follow_the_body_of_a_present(rig):
     rig.routing.bytes = b"\xaa\xbb"
-    rig.mesh.search_other_nodes_in_range()
+    rig.mesh.control.search_other_nodes_in_range()
     assert rig.antenna.broadcasts[-1] == packet("01 01 03 fe fe ff 00 aa bb")
 
 
 def test_extension_bytes_follow_the_body_of_a_heartbeat(rig):
     rig.hear("02 02 03 01 fe 00 01")
     rig.routing.bytes = b"\xaa\xbb"
-    rig.mesh.send_heartbeat(2)
+    rig.mesh.control.send_heartbeat(2)
     assert rig.antenna.taken[-1] == packet("01 01 04 02 02 00 ff 00 aa bb")
 
 
 def test_a_technique_learns_how_many_bytes_fit(rig):
     rig.hear("02 02 03 01 fe 00 01")
-    rig.mesh.search_other_nodes_in_range()
+    rig.mesh.control.search_other_nodes_in_range()
     assert rig.routing.rooms == {3: 23, 4: 24}
 
 
 def test_extension_bytes_that_do_not_fit_are_an_error_of_the_technique(rig):
     rig.routing.bytes = bytes(26)
     with pytest.raises(PacketError, match="26 extension bytes do not fit into 23"):
-        rig.mesh.search_other_nodes_in_range()
+        rig.mesh.control.search_other_nodes_in_range()
 
 
 def test_a_forwarded_heartbeat_keeps_its_extension_bytes(rig):
@@ -87,10 +87,10 @@ def test_a_technique_hears_each_packet_and_may_drop_it(rig):
 def test_a_technique_learns_the_result_and_the_transmissions_of_each_send(rig):
     rig.hear("02 02 03 01 fe 00 01")
     rig.antenna.losing = 1
-    rig.mesh.send_heartbeat(2)
+    rig.mesh.control.send_heartbeat(2)
     assert rig.routing.results[-1] == (2, True, 2)
     rig.antenna.dead.add(2)
-    rig.mesh.send_heartbeat(2)
+    rig.mesh.control.send_heartbeat(2)
     assert (2, False, 3) in rig.routing.results
 
 
@@ -104,14 +104,14 @@ def test_a_technique_gets_packets_of_its_own_types_and_of_no_others(rig):
 
 def test_a_technique_sends_packets_of_its_own_types(rig):
     rig.hear("02 02 03 01 fe 00 01")
-    rig.mesh.send_packet(8, 2, b"\7")
+    rig.mesh.control.send_packet(8, 2, b"\7")
     assert rig.antenna.taken[-1] == packet("01 01 08 02 02 07")
-    rig.mesh.broadcast_packet(9, b"\7")
+    rig.mesh.control.broadcast_packet(9, b"\7")
     assert rig.antenna.broadcasts[-1] == packet("01 01 09 fe fe 07")
 
 
 def test_a_technique_is_woken_when_it_asked_to_be(rig):
-    rig.mesh.wake_at(1.5)
+    rig.mesh.control.wake_at(1.5)
     assert rig.mesh.next_tick_s == 1.5
     rig.mesh.tick(1.5)
     assert rig.routing.woken_s == [1.5]
@@ -121,7 +121,7 @@ def test_a_technique_is_woken_when_it_asked_to_be(rig):
 def test_child_table_tree_adds_no_byte_to_any_packet():
     rig = Rig()
     rig.hear("02 02 03 01 fe 00 01")
-    rig.mesh.search_other_nodes_in_range()
-    rig.mesh.send_heartbeat(2)
+    rig.mesh.control.search_other_nodes_in_range()
+    rig.mesh.control.send_heartbeat(2)
     assert rig.antenna.broadcasts[-1][7:] == bytes(25)
     assert rig.antenna.taken[-1][8:] == bytes(24)

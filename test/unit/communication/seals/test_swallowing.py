@@ -6,7 +6,7 @@ import pytest
 from seal_rig import KEY
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
-from drone_mesh.communication.swallowing import Swallowing
+from drone_mesh.communication.heartbeats.swallowing import Swallowing
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.proofs.stranger import Hole
 

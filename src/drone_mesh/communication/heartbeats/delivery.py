@@ -10,6 +10,7 @@ from collections import deque
 from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
+from drone_mesh.communication.control_plane import IDelivery
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
 from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
@@ -23,7 +24,7 @@ NodeReport = Callable[[MeshEventKind, int], None]
 """Called with an event and the other node concerned."""
 
 
-class Delivery:
+class Delivery(IDelivery):
     """Sends the packets of one node; the routes learn from success and failure.
 
     Called only by the node's component and its parts.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Hashable, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.circulation import CirculationGuard, came_round
 from drone_mesh.communication.complaints import Complaints
-from drone_mesh.communication.delivery import Delivery, NodeReport
+from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
+from drone_mesh.communication.heartbeats.delivery import Delivery, NodeReport
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.observer import MeshEventKind

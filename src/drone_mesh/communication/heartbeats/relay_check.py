@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import logging
 
-from drone_mesh.communication.detours import SWALLOWER_AVOIDED_S, Detours
+from drone_mesh.communication.heartbeats.detours import SWALLOWER_AVOIDED_S, Detours
+from drone_mesh.communication.heartbeats.parts import HeartbeatParts
+from drone_mesh.communication.heartbeats.swallowing import Swallowing
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_for_place
-from drone_mesh.communication.swallowing import Swallowing
 
 _log = logging.getLogger(__name__)
 
@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 class RelayCheck:
     """The checks of one router. If packets are swallowed, it finds a detour for heartbeats."""
 
-    def __init__(self, parts: NodeParts, detours: Detours) -> None:
+    def __init__(self, parts: HeartbeatParts, detours: Detours) -> None:
         self._parts = parts
         self._detours = detours
         self._swallowing = Swallowing(parts.timing.check_period_s)

@@ -9,12 +9,12 @@ import math
 from typing import Callable, NamedTuple
 
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.detours import AVOIDED_S, Detours
+from drone_mesh.communication.heartbeats.detours import AVOIDED_S, Detours
+from drone_mesh.communication.heartbeats.parts import HeartbeatParts
+from drone_mesh.communication.heartbeats.relay_check import RelayCheck
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind, in_hops
-from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_for_place
-from drone_mesh.communication.relay_check import RelayCheck
 from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
 
 _HOPS_UNTIL_KNOWN = 10  # our choice: the number of hops for which to wait for the first answer
@@ -35,7 +35,7 @@ class GatewayConnection:
     """
 
     def __init__(
-        self, parts: NodeParts, states: RouterStates, introduce: Callable[[], None]
+        self, parts: HeartbeatParts, states: RouterStates, introduce: Callable[[], None]
     ) -> None:
         """`introduce` broadcasts a PRESENT."""
         self.gateway = NO_ROUTE  # the preferred one

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import random
 from typing import Callable
 
 from drone_mesh.communication import messages
+from drone_mesh.communication.control_plane import IControlHost
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.frames import CommonFrame
-from drone_mesh.communication.interfaces import IMeshDebugInfo
+from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.parts import NodeParts
 
 AFTER_POWER_S = 0.2  # our choice: the medium must register the antenna first
 SPREAD_S = 1.0  # our choice: spreads the nodes' packets after an outage
@@ -27,17 +25,15 @@ class Introduction:
 
     def __init__(
         self,
-        parts: NodeParts,
-        node: IMeshDebugInfo,
-        frame: CommonFrame,
-        rng: random.Random,
+        parts: HeartbeatParts,
+        node: IControlHost,
         send_heartbeat: Callable[[int], bool],
     ) -> None:
         """`node` provides its connection and hops."""
         self._parts = parts
         self._node = node
-        self._frame = frame
-        self._rng = rng
+        self._frame = parts.frame
+        self._rng = parts.rng
         self._send_heartbeat = send_heartbeat
         self._medium = parts.antenna.medium
         self._search_again_s = self._medium.search_s  # 0: no repetition before the next check

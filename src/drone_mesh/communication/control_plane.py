@@ -1,0 +1,178 @@
+"""The control plane of a node: who is a neighbour, whether a gateway is reached, which way to send.
+
+The component hands every packet, every outcome of a transmission and the time to its control plane
+and asks it for next hops. There are two: `heartbeats`, the document's way, with a routing technique
+to choose among routes; and `beacon`, in which one broadcast per node and period decides everything.
+A node has no further idea of a neighbour, a connection or a route than its control plane.
+"""
+
+# ruff: noqa: B027 - a host overrides only what concerns it
+
+from __future__ import annotations
+
+import abc
+from typing import Callable, Mapping
+
+from drone_mesh.communication.router_states import RouterEvent
+
+Receive = Callable[[bytes, int, int], None]
+Learn = Callable[[int, int, int, bytes], bool]
+Forward = Callable[[bytes, int, int, int, int, float], None]
+
+
+class IDelivery(abc.ABC):
+    """Sends the packets of one node."""
+
+    total_sent: int  # packets delivered, or handed to the antenna; broadcasts not counted
+
+    @abc.abstractmethod
+    def send_own(self, payload: bytes) -> bool:
+        """Send this node's own packet towards its addressee. False: there is no way to it."""
+
+
+class IRoutes(abc.ABC):
+    """What a node knows about others. A reporting thread may call the first two at any time."""
+
+    @abc.abstractmethod
+    def get_direction_to_node(self, node: int) -> int:
+        """The next hop for `node`, or NO_ROUTE."""
+
+    @abc.abstractmethod
+    def get_table_size(self) -> int:
+        """Number of known nodes; how often one counts is the technique's own matter."""
+
+    @abc.abstractmethod
+    def get_set_of_children(self) -> frozenset[int]:
+        """Ids of the nodes in direct reach."""
+
+    @abc.abstractmethod
+    def node_moved_location(self) -> None:
+        """This node is at another place, with other neighbours."""
+
+
+class IControlHost(abc.ABC):
+    """What a control plane tells its node. The defaults are those of a node that never flies."""
+
+    def may_connect(self, node: int, know_gateway: bool) -> bool:
+        """Whether to connect through `node` now (NO_ROUTE: through any); see ConnectionRepair."""
+        return True
+
+    def on_connected(self) -> None:
+        """A gateway is reached again."""
+
+    def on_unconnected_check(self, due_s: float) -> None:
+        """A check, due at `due_s`, finds no gateway."""
+
+    def on_neighbour_lost(self, node: int) -> None:
+        """A neighbour is out of reach; the routes are already updated."""
+
+    def on_node_heard(self, node: int, hops: int) -> None:
+        """At a gateway: a packet of `node` proves a path of so many hops."""
+
+    def on_node_missing(self, node: int) -> None:
+        """At a gateway: a relay has no route to `node`."""
+
+    @abc.abstractmethod
+    def get_connected_to_gateway(self) -> bool:
+        """Whether a gateway is reached; always true for a gateway."""
+
+    @abc.abstractmethod
+    def get_hops_from_gateway_away(self) -> int:
+        """Hops to the preferred gateway; 255 while unknown."""
+
+
+class IControlPlane(abc.ABC):
+    """Decides neighbours, connection and routes of one node. Belongs to its component's thread."""
+
+    delivery: IDelivery
+    routes: IRoutes
+
+    # Attributes that hold functions, because each packet calls one of them.
+    learn: Learn
+    """(creator, from, type, payload): a packet of another node came in. False: drop it."""
+
+    forward: Forward
+    """(payload, creator, from, type, addressee, now_s): pass on a packet for another node."""
+
+    receivers: Mapping[int, Receive]
+    """By packet type, of the plane's own: (payload, creator, from) handles one for this node."""
+
+    # Time and surroundings -------------------------------------------------------------------
+
+    @abc.abstractmethod
+    def start(self) -> None:
+        """The node starts."""
+
+    @abc.abstractmethod
+    def on_time(self, now_s: float) -> None:
+        """Do what is due; called at every tick of the component."""
+
+    @abc.abstractmethod
+    def check(self, due_s: float) -> None:
+        """The periodic check, with the antenna on, was due at `due_s`."""
+
+    @abc.abstractmethod
+    def on_power(self, on: bool) -> None:
+        """The antenna was switched on or off."""
+
+    @abc.abstractmethod
+    def on_registered(self) -> None:
+        """The medium has registered the antenna again."""
+
+    @abc.abstractmethod
+    def introduce(self) -> None:
+        """Make this node known to all in range, now."""
+
+    @abc.abstractmethod
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """A neighbour or this node flies, and they will be out of reach of each other."""
+
+    @abc.abstractmethod
+    def gateway_sent_place(self) -> None:
+        """The preferred gateway itself reported its place."""
+
+    # Packets ---------------------------------------------------------------------------------
+
+    @abc.abstractmethod
+    def own_came_back(self, from_: int) -> None:
+        """A packet of this node came back through `from_`."""
+
+    @abc.abstractmethod
+    def on_delivered(self, neighbour: int, tries: int) -> None:
+        """A neighbour received a queued packet after `tries` transmissions."""
+
+    @abc.abstractmethod
+    def on_undelivered(self, payload: bytes, tries: int) -> None:
+        """The antenna gave up a queued packet: send it another way, or drop it."""
+
+    @abc.abstractmethod
+    def search(self, node: int) -> bool:
+        """Look for a node without a known route. False: not now."""
+
+    # The connection of a router --------------------------------------------------------------
+
+    @property
+    @abc.abstractmethod
+    def gateway(self) -> int:
+        """The preferred gateway, itself for a gateway; NO_ROUTE: none is known."""
+
+    @property
+    @abc.abstractmethod
+    def hops(self) -> int:
+        """Hops to it; NO_ROUTE: unknown."""
+
+    @abc.abstractmethod
+    def next_hop(self) -> int:
+        """The next hop to the preferred gateway, or NO_ROUTE."""
+
+    @abc.abstractmethod
+    def may_use(self, gateway: int) -> bool:
+        """Whether `gateway` is the preferred one. If there is none yet, it becomes that."""
+
+    @abc.abstractmethod
+    def end(self, event: RouterEvent) -> None:
+        """The connection ends because of `event`."""
+
+    @abc.abstractmethod
+    def give_up_routes(self) -> None:
+        """Forget every route to the preferred gateway."""

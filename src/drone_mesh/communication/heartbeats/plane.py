@@ -1,0 +1,222 @@
+"""HeartbeatPlane: the part of the document's way that routers and gateways have in common."""
+
+from __future__ import annotations
+
+import abc
+import math
+from typing import Sequence
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.control_plane import IControlHost, IControlPlane
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.heartbeats.delivery import Delivery
+from drone_mesh.communication.heartbeats.forwarding import Forwarding
+from drone_mesh.communication.heartbeats.introduction import Introduction
+from drone_mesh.communication.heartbeats.node_search import NodeSearch
+from drone_mesh.communication.heartbeats.parts import HeartbeatParts
+from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.packet_types import TECHNIQUE_TYPES, MessageType
+from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
+from drone_mesh.drone.location import Location
+
+
+class HeartbeatPlane(IControlPlane, IRoutingEssentials):
+    """Neighbours, connection and routes by PRESENT, HEARTBEAT and MISSING."""
+
+    def __init__(
+        self, basics: NodeBasics, technique: IRoutingTechnique, host: IControlHost
+    ) -> None:
+        self._host = host
+        self._technique = self.routes = technique
+        self._antenna = basics.antenna
+        self._deadlines = basics.deadlines
+        self._neighbours = basics.neighbours
+        self._delivery = self.delivery = Delivery(
+            basics.node_id,
+            basics.antenna,
+            technique,
+            basics.neighbours,
+            basics.deadlines,
+            basics.timing.send_attempts,
+            basics.report,
+            self._on_neighbour_lost,
+        )
+        self._forwarding = Forwarding(
+            basics.node_id,
+            technique,
+            self._delivery,
+            basics.complaints,
+            basics.report,
+            basics.antenna.medium,
+        )
+        self._parts = HeartbeatParts(**vars(basics), routing=technique, delivery=self._delivery)
+        self._introduction = Introduction(self._parts, host, lambda node: self.send_heartbeat(node))
+        self._search = NodeSearch(self._parts, self._answer_search)
+        self.learn = technique.learn
+        self.forward = self._forwarding.forward
+        self.receivers = {
+            **dict.fromkeys(TECHNIQUE_TYPES, self._on_technique_packet),
+            int(MessageType.HEARTBEAT): self._on_heartbeat,
+            int(MessageType.PRESENT): self._on_present,
+            int(MessageType.MISSING): self._on_missing,
+            int(MessageType.NODE_SEARCH): self._on_search,
+        }
+
+    # Time and surroundings -------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the technique, which introduces the node."""
+        self._technique.start_routing(self)
+
+    def on_time(self, now_s: float) -> None:
+        """Introduce the node, and let the technique do what it planned."""
+        if now_s >= self._deadlines.get(Due.INTRODUCE):
+            self._introduction.on_due()
+        if now_s >= self._deadlines.get(Due.ROUTING):
+            self._deadlines.set(Due.ROUTING, math.inf)
+            self._technique.on_time(now_s)
+
+    def on_power(self, on: bool) -> None:
+        """Introduce the node soon after the antenna is switched on."""
+        self._introduction.on_power(on)
+
+    def on_registered(self) -> None:
+        """Introduce the node soon."""
+        if self._antenna.on():
+            self._introduction.on_registered()
+
+    def introduce(self) -> None:
+        """Send PRESENT to each node in range."""
+        self._introduction.broadcast()
+
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """On a shared medium, look for other routes; otherwise the next packet shows it."""
+        if self._antenna.medium.shared:
+            self._delivery.neighbour_leaves(neighbour)
+
+    # Packets ---------------------------------------------------------------------------------
+
+    def own_came_back(self, from_: int) -> None:
+        """It teaches no route except that `from_` is in reach."""
+        self._technique.can_communicate_with_node(from_)
+
+    def on_delivered(self, neighbour: int, tries: int) -> None:
+        """The routes learn from this."""
+        self._delivery.delivered(neighbour, tries)
+
+    def on_undelivered(self, payload: bytes, tries: int) -> None:
+        """Send the packet over another route, if there is one; the routes learn from this."""
+        if not self._delivery.undelivered(payload, tries):
+            self._forwarding.stranded(payload, self._deadlines.now_s)
+
+    @abc.abstractmethod
+    def _on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+        """A HEARTBEAT for this node arrived."""
+
+    @abc.abstractmethod
+    def _on_present(self, payload: bytes, creator: int, from_: int) -> None:
+        """A neighbour introduced itself."""
+
+    def _on_missing(self, payload: bytes, creator: int, from_: int) -> None:
+        """`creator` reports that it cannot reach a node."""
+        missing = messages.MissingMessage.from_payload(payload).missing
+        if missing != self._parts.node_id:
+            self._delivery.forget_route(creator, missing, from_)
+            self._after_missing(missing)
+
+    def _after_missing(self, missing: int) -> None:
+        """The routes are updated."""
+
+    def _on_technique_packet(self, payload: bytes, creator: int, from_: int) -> None:
+        kind = messages.type_of(payload)
+        self._technique.on_packet(creator, from_, kind, messages.body(payload))
+
+    def search(self, node: int) -> bool:
+        """Ask all nodes for `node`, which answers with a heartbeat."""
+        return self._search.search(node)
+
+    def _on_search(self, payload: bytes, creator: int, _from: int) -> None:
+        self._search.on_packet(creator, payload)
+
+    def _on_neighbour_lost(self, node: int) -> None:
+        """A neighbour did not take a packet; the routes are already updated."""
+
+    # For the routing technique ---------------------------------------------------------------
+
+    def get_node_id(self) -> int:
+        """This node's id, 0..253."""
+        return self._parts.node_id
+
+    def get_preferred_gateway(self) -> int:
+        """The gateway that this node uses, itself for a gateway."""
+        return self.gateway
+
+    def get_connected_to_gateway(self) -> bool:
+        """Whether a gateway answered the last heartbeat, or may still answer."""
+        return self._host.get_connected_to_gateway()
+
+    def search_other_nodes_in_range(self) -> None:
+        """Send PRESENT to each node in range."""
+        self._introduction.broadcast()
+
+    def send_heartbeat(self, other: int) -> bool:
+        """Send a heartbeat to `other`."""
+        return self._delivery.send_own(messages.addressed(self._heartbeat(), other))
+
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """Send a heartbeat to each of these; those for direct neighbours leave together.
+
+        On a busy channel, skip neighbours that were heard recently.
+        """
+        patience = self._antenna.patience()
+        if patience > 0.0:
+            since_s = self._deadlines.now_s - patience * self._parts.timing.check_period_s
+            heard_s = self._neighbours.last_heard_s
+            others = [other for other in others if heard_s(other, otherwise=since_s) <= since_s]
+        self._delivery.send_own_to_each(self._heartbeat(), others)
+
+    def now_s(self) -> float:
+        """The time of the component's latest call."""
+        return self._deadlines.now_s
+
+    @property
+    def medium(self) -> Medium:
+        """The properties of the antenna's medium."""
+        return self._antenna.medium
+
+    def wake_at(self, at_s: float) -> None:
+        """Call the technique's `on_time` at this time."""
+        self._deadlines.set(Due.ROUTING, at_s)
+
+    def send_packet(self, kind: int, neighbour: int, body: bytes) -> bool:
+        """Send a packet of the technique's own type to a neighbour."""
+        me = self._parts.node_id
+        return self._delivery.send(
+            messages.packet(kind, me, me, neighbour, neighbour, body), neighbour
+        )
+
+    def broadcast_packet(self, kind: int, body: bytes) -> None:
+        """Send a packet of the technique's own type to each node in range."""
+        me = self._parts.node_id
+        self._antenna.broadcast_message(messages.packet(kind, me, me, BROADCAST, BROADCAST, body))
+
+    def own_place(self) -> Location | None:
+        """The drone's position, if it can report it."""
+        return self._parts.pilot.location()
+
+    def place_of(self, node: int) -> Location | None:
+        """The last place reported by `node`, or None."""
+        places = self._parts.places
+        if node == self.gateway:
+            return places.gateway
+        return places.good if node == places.good_id else None
+
+    def _answer_search(self, gateway: int) -> bool:
+        """Send a heartbeat even if one is under way: that one may have been lost."""
+        return self._delivery.send_own(messages.addressed(self._heartbeat(), gateway))
+
+    def _heartbeat(self) -> bytes:
+        me = self._parts.node_id
+        return self._parts.heartbeat(me, me, self.get_connected_to_gateway(), self.gateway)

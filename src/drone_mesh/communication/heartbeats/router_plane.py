@@ -1,0 +1,154 @@
+"""RouterHeartbeats: a router's control plane by heartbeats (docs/protocol.md, "Connection")."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.control_plane import IControlHost
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.heartbeats.connection import GatewayConnection
+from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
+from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
+from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.router_states import (
+    ConnectionState,
+    RepairState,
+    RouterEvent,
+    RouterStates,
+)
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+
+_HEARTBEAT = int(MessageType.HEARTBEAT)
+
+
+class RouterHeartbeats(HeartbeatPlane):
+    """Keeps a connection to a gateway by heartbeats that it answers."""
+
+    def __init__(
+        self,
+        basics: NodeBasics,
+        technique: IRoutingTechnique,
+        host: IControlHost,
+        states: RouterStates,
+    ) -> None:
+        super().__init__(basics, technique, host)
+        self._states = states
+        self._connection = GatewayConnection(self._parts, states, self.introduce)
+        if self._antenna.medium.shared:
+            self.forward = self._forward_and_learn
+
+    @property
+    def gateway(self) -> int:
+        """The preferred gateway."""
+        return self._connection.gateway
+
+    @property
+    def hops(self) -> int:
+        """Hops to it."""
+        return self._connection.hops
+
+    def on_time(self, now_s: float) -> None:
+        """Do what is due."""
+        if now_s >= self._deadlines.get(Due.ANSWER):
+            self._connection.answer_missed()
+        super().on_time(now_s)
+
+    def check(self, due_s: float) -> None:
+        """Check neighbours, routes and gateway."""
+        if not self._host.may_connect(NO_ROUTE, False):
+            return
+        before = self._states.connection  # the routing may send a heartbeat to the gateway
+        was_connected = self._states.connected
+        self._technique.maintain_routing()
+        if was_connected:
+            self._connection.check(self._antenna.patience())
+        elif before is ConnectionState.SEARCHING and self._states.repair is not RepairState.FLYING:
+            self._host.on_unconnected_check(due_s)
+
+    def send_heartbeat(self, other: int) -> bool:
+        """Send a heartbeat to `other`; the preferred gateway is expected to answer."""
+        if other == self._connection.gateway:
+            return self._connection.send_heartbeat()
+        return super().send_heartbeat(other)
+
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """Send a heartbeat to each of these; the preferred gateway's is sent as if alone."""
+        gateway = self._connection.gateway
+        if gateway in others and not self._connection.proven(self._antenna.patience()):
+            self._connection.send_heartbeat()
+        super().send_heartbeats([other for other in others if other != gateway])
+
+    # The connection --------------------------------------------------------------------------
+
+    def next_hop(self) -> int:
+        """The next hop to the preferred gateway, or NO_ROUTE."""
+        return self._connection.next_hop()
+
+    def may_use(self, gateway: int) -> bool:
+        """Whether `gateway` is the preferred one. If there is none yet, it becomes that."""
+        return self._connection.may_use(gateway)
+
+    def end(self, event: RouterEvent) -> None:
+        """Disconnect because of `event`."""
+        self._connection.end(event)
+
+    def give_up_routes(self) -> None:
+        """Forget every route to the gateway and inform the neighbours."""
+        self._connection.give_up_routes()
+
+    def gateway_sent_place(self) -> None:
+        """The preferred gateway itself reported its place."""
+        self._connection.gateway_sent_place()
+
+    # Packets ---------------------------------------------------------------------------------
+
+    def _on_present(self, payload: bytes, creator: int, _from: int) -> None:
+        hops, know_gateway = messages.present_body(payload)
+        self._neighbours.set_hops(creator, hops)
+        if not self._host.may_connect(creator, know_gateway):
+            return
+        if know_gateway and hops <= self._connection.hops:
+            self._introduction.search_is_answered()
+        if self._connection.on_present(creator, hops, know_gateway):
+            if know_gateway:
+                self.send_heartbeat(creator)
+            else:
+                self._introduction.answer_search(creator)
+
+    def _on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+        if creator == self._parts.node_id:
+            return  # its own heartbeat came back, which proves nothing
+        know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
+        if creator == from_ and know_gateway and preferred_gateway <= MAX_NODE_ID:
+            self._neighbours.set_gateway(creator, preferred_gateway)
+        if not self._host.may_connect(from_, know_gateway):
+            return
+        if creator == preferred_gateway:
+            if self._connection.on_gateway_heartbeat(creator, hops + 1):
+                self._host.on_connected()
+        elif know_gateway != self._states.connected:
+            if not know_gateway:
+                self.send_heartbeat(creator)
+            elif not self._states.awaiting:
+                self._connection.take_gateway_of(from_, preferred_gateway)
+
+    def _forward_and_learn(
+        self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float
+    ) -> None:
+        """A gateway's answer proves the connection of each relay as well."""
+        if kind == _HEARTBEAT:
+            know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
+            proves = creator == preferred_gateway and self._host.may_connect(NO_ROUTE, know_gateway)
+            proves = proves and self._parts.seals.may_be_gateway(creator)
+            if proves and self._connection.on_gateway_heartbeat(creator, hops + 1):
+                self._host.on_connected()
+        self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
+
+    def _after_missing(self, missing: int) -> None:
+        self._connection.on_route_lost()
+
+    def _on_neighbour_lost(self, node: int) -> None:
+        self._connection.on_route_lost()
+        self._host.on_neighbour_lost(node)
