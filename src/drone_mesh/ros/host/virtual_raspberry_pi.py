@@ -53,7 +53,7 @@ class VirtualRaspberryPi(abc.ABC):
                 node_id,
                 settings.key,
                 random.SystemRandom(),
-                lambda: self.component.now_s(),
+                lambda: self.component.deadlines.now_s,
                 settings.timing,
             )
         self.component = assemble_component(
