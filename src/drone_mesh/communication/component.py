@@ -42,9 +42,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def start(self, now_s: float) -> None:
         """Start the antenna, and debugging if configured; schedule the first check; introduce."""
         self._deadlines.now_s = now_s
-        self._receivers = [*receivers(self, self._drop_unknown)]
-        for kind, receive in self.control.receivers.items():
-            self._receivers[kind] = receive
+        self._receivers = receivers(self._drop_unknown, self, self.control)
         self._antenna.start_antenna(self)
         if self._debug:
             self._antenna.debugging_mode(self, True)

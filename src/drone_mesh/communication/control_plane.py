@@ -11,11 +11,10 @@ A node has no further idea of a neighbour, a connection or a route than its cont
 from __future__ import annotations
 
 import abc
-from typing import Callable, Mapping
+from typing import Callable
 
 from drone_mesh.communication.router_states import RouterEvent
 
-Receive = Callable[[bytes, int, int], None]
 Learn = Callable[[int, int, int, bytes], bool]
 Forward = Callable[[bytes, int, int, int, int, float], None]
 
@@ -82,7 +81,10 @@ class IControlHost(abc.ABC):
 
 
 class IControlPlane(abc.ABC):
-    """Decides neighbours, connection and routes of one node. Belongs to its component's thread."""
+    """Decides neighbours, connection and routes of one node. Belongs to its component's thread.
+
+    A method `receive_NAME` handles the packets of that type (see packet_types) for this node.
+    """
 
     delivery: IDelivery
     routes: IRoutes
@@ -93,9 +95,6 @@ class IControlPlane(abc.ABC):
 
     forward: Forward
     """(payload, creator, from, type, addressee, now_s): pass on a packet for another node."""
-
-    receivers: Mapping[int, Receive]
-    """By packet type, of the plane's own: (payload, creator, from) handles one for this node."""
 
     # Time and surroundings -------------------------------------------------------------------
 

@@ -41,6 +41,7 @@ class Handler(enum.Enum):
     NODE = "every node"
     GATEWAY = "a gateway"
     SEAL = "the seals"  # without a key, a node at most reports that a neighbour has one
+    CONTROL = "the control plane"
     TECHNIQUE = "the routing technique"
     USERS = "the users' data service"
     NOBODY = "no node"
@@ -71,6 +72,7 @@ _UNKNOWN = PacketType(PacketKind.OTHER, Handler.NOBODY)
 _TECHNIQUE = PacketType(PacketKind.OTHER, Handler.TECHNIQUE)
 _DATA = PacketType(PacketKind.DATA, Handler.USERS, priority=Priority.DATA)
 _NODE, _GATEWAY, _SEAL = Handler.NODE, Handler.GATEWAY, Handler.SEAL
+_CONTROL = Handler.CONTROL
 # Bodies that fill a line
 _PLACE = "float32 latitude, float32 longitude, int16 height"
 _LOCATION = f"{_PLACE}, uint32 timeSincePosix"
@@ -101,11 +103,11 @@ class MessageType(enum.IntEnum):
     LOCATION = 1, PacketType(PacketKind.POSITION, _NODE, _LOCATION, "LocationMessage")
     REQUESTLOCATION = 2, PacketType(PacketKind.POSITION, _NODE)
     # Introduces its creator to every node in range
-    PRESENT = 3, PacketType(PacketKind.INTRODUCTION, _NODE, _PRESENT, "IntroduceMessage")
+    PRESENT = 3, PacketType(PacketKind.INTRODUCTION, _CONTROL, _PRESENT, "IntroduceMessage")
     # Proof of a path; counts its hops
-    HEARTBEAT = 4, PacketType(PacketKind.HEARTBEAT, _NODE, _HEARTBEAT, "HeartbeatMessage")
+    HEARTBEAT = 4, PacketType(PacketKind.HEARTBEAT, _CONTROL, _HEARTBEAT, "HeartbeatMessage")
     # Its creator can no longer reach a node
-    MISSING = 5, PacketType(PacketKind.REPAIR, _NODE, "uint8 missing", "MissingMessage")
+    MISSING = 5, PacketType(PacketKind.REPAIR, _CONTROL, "uint8 missing", "MissingMessage")
     # An order to fly
     MOVE_TO_LOCATION = 6, PacketType(PacketKind.ORDER, _NODE, _PLACE, "GoToLocationMessage")
     # The bid of its creator to fly
@@ -122,7 +124,7 @@ class MessageType(enum.IntEnum):
     # A gateway looks for a node
     NODE_SEARCH = (
         68,
-        PacketType(PacketKind.REPORT, _NODE, "uint8 node, uint16 number", "NodeSearch"),
+        PacketType(PacketKind.REPORT, _CONTROL, "uint8 node, uint16 number", "NodeSearch"),
     )
     # Where a gateway was, in a mesh with a key
     GATEWAY_PLACE = 125, PacketType(PacketKind.POSITION, _NODE, _GATEWAY_PLACE, "GatewayPlace")
@@ -163,6 +165,9 @@ Receiver = Callable[[bytes, int, int], None]
 """Handles a packet, given with its creator and the sender of this hop."""
 
 
-def receivers(node: object, otherwise: Receiver) -> Sequence[Receiver]:
-    """By number: the method of `node` for that type, or `otherwise`."""
-    return [getattr(node, name, otherwise) if name else otherwise for name in HANDLER_NAMES]
+def receivers(otherwise: Receiver, *parts: object) -> Sequence[Receiver]:
+    """By number: the method for that type of the first part that has one, or `otherwise`."""
+    return [
+        next((getattr(part, name) for part in parts if name and hasattr(part, name)), otherwise)
+        for name in HANDLER_NAMES
+    ]

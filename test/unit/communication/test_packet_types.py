@@ -13,6 +13,9 @@ import pytest
 from drone_mesh.communication import messages, packet_types
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
+from drone_mesh.communication.heartbeats.gateway_plane import GatewayHeartbeats
+from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
+from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
 from drone_mesh.communication.orders import messages as order_messages
 from drone_mesh.communication.packet_types import HANDLER_NAMES, Handler, MessageType
 from drone_mesh.communication.reports import node_report
@@ -50,6 +53,10 @@ def test_who_handles_a_type_has_a_method_for_it(kind):
     handles = {cls: hasattr(cls, name) for cls in (MeshnetworkRouter, MeshnetworkGateway)}
     if kind.about.handler is Handler.NODE:
         assert all(handles.values())
+    elif kind.about.handler is Handler.CONTROL:
+        assert not any(handles.values())
+        assert hasattr(RouterHeartbeats, name)
+        assert hasattr(GatewayHeartbeats, name)
     elif kind.about.handler is Handler.GATEWAY:
         assert handles == {MeshnetworkRouter: False, MeshnetworkGateway: True}
     elif kind.about.handler is Handler.NOBODY:
@@ -59,7 +66,7 @@ def test_who_handles_a_type_has_a_method_for_it(kind):
 def test_each_handler_is_for_a_declared_type():
     handlers = {
         name
-        for cls in (MeshnetworkComponent, MeshnetworkGateway, MeshnetworkRouter)
+        for cls in (MeshnetworkComponent, MeshnetworkGateway, MeshnetworkRouter, HeartbeatPlane)
         for name in vars(cls)
         if name.startswith("receive_")
     }

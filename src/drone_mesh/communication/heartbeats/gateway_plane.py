@@ -38,12 +38,14 @@ class GatewayHeartbeats(HeartbeatPlane):
     def gateway_sent_place(self) -> None:
         """It knows its own place."""
 
-    def _on_present(self, payload: bytes, creator: int, _from: int) -> None:
+    def receive_present(self, payload: bytes, creator: int, _from: int) -> None:
+        """A neighbour introduces itself."""
         _hops, know_gateway = messages.present_body(payload)
         if not know_gateway:
             self._introduction.answer_search(creator)
 
-    def _on_heartbeat(self, payload: bytes, creator: int, _from: int) -> None:
+    def receive_heartbeat(self, payload: bytes, creator: int, _from: int) -> None:
+        """A heartbeat for this node."""
         _know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
         self._host.on_node_heard(creator, hops + 1)
         if creator != preferred_gateway:  # gateways do not answer each other

@@ -16,7 +16,6 @@ from drone_mesh.communication.heartbeats.node_search import NodeSearch
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.interfaces import BROADCAST
 from drone_mesh.communication.medium import Medium
-from drone_mesh.communication.packet_types import TECHNIQUE_TYPES, MessageType
 from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.drone.location import Location
@@ -56,13 +55,6 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._search = NodeSearch(self._parts, self._answer_search)
         self.learn = technique.learn
         self.forward = self._forwarding.forward
-        self.receivers = {
-            **dict.fromkeys(TECHNIQUE_TYPES, self._on_technique_packet),
-            int(MessageType.HEARTBEAT): self._on_heartbeat,
-            int(MessageType.PRESENT): self._on_present,
-            int(MessageType.MISSING): self._on_missing,
-            int(MessageType.NODE_SEARCH): self._on_search,
-        }
 
     # Time and surroundings -------------------------------------------------------------------
 
@@ -112,14 +104,14 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             self._forwarding.stranded(payload, self._deadlines.now_s)
 
     @abc.abstractmethod
-    def _on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
         """A HEARTBEAT for this node arrived."""
 
     @abc.abstractmethod
-    def _on_present(self, payload: bytes, creator: int, from_: int) -> None:
+    def receive_present(self, payload: bytes, creator: int, from_: int) -> None:
         """A neighbour introduced itself."""
 
-    def _on_missing(self, payload: bytes, creator: int, from_: int) -> None:
+    def receive_missing(self, payload: bytes, creator: int, from_: int) -> None:
         """`creator` reports that it cannot reach a node."""
         missing = messages.MissingMessage.from_payload(payload).missing
         if missing != self._parts.node_id:
@@ -129,7 +121,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def _after_missing(self, missing: int) -> None:
         """The routes are updated."""
 
-    def _on_technique_packet(self, payload: bytes, creator: int, from_: int) -> None:
+    def receive_of_technique(self, payload: bytes, creator: int, from_: int) -> None:
+        """A packet of the technique's own types."""
         kind = messages.type_of(payload)
         self._technique.on_packet(creator, from_, kind, messages.body(payload))
 
@@ -137,7 +130,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         """Ask all nodes for `node`, which answers with a heartbeat."""
         return self._search.search(node)
 
-    def _on_search(self, payload: bytes, creator: int, _from: int) -> None:
+    def receive_node_search(self, payload: bytes, creator: int, _from: int) -> None:
+        """A gateway looks for a node."""
         self._search.on_packet(creator, payload)
 
     def _on_neighbour_lost(self, node: int) -> None:

@@ -104,7 +104,8 @@ class RouterHeartbeats(HeartbeatPlane):
 
     # Packets ---------------------------------------------------------------------------------
 
-    def _on_present(self, payload: bytes, creator: int, _from: int) -> None:
+    def receive_present(self, payload: bytes, creator: int, _from: int) -> None:
+        """A neighbour introduces itself."""
         hops, know_gateway = messages.present_body(payload)
         self._neighbours.set_hops(creator, hops)
         if not self._host.may_connect(creator, know_gateway):
@@ -117,7 +118,8 @@ class RouterHeartbeats(HeartbeatPlane):
             else:
                 self._introduction.answer_search(creator)
 
-    def _on_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
+        """A heartbeat for this node."""
         if creator == self._parts.node_id:
             return  # its own heartbeat came back, which proves nothing
         know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
