@@ -71,7 +71,9 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self._timing = timing or MeshTiming()
         self._debug = debug
         self._deadlines = Deadlines()
-        self._neighbours = Neighbours(self._timing.check_period_s, noticed_late=self._shared)
+        self._neighbours = Neighbours(
+            self._timing.check_period_s, noticed_late=antenna.medium.shared
+        )
         self._report = Reporter(node_id, self._deadlines, observer)
         self.complaints = Complaints(node_id)
         self.places = KnownPlaces()

@@ -6,7 +6,6 @@ import random
 from dataclasses import dataclass
 
 from drone_mesh.communication.complaints import Complaints
-from drone_mesh.communication.control_plane import IDelivery, IRoutes
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.flight import Pilot
 from drone_mesh.communication.frames import CommonFrame
@@ -15,6 +14,7 @@ from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import Reporter
 from drone_mesh.communication.places import KnownPlaces
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.ways import IDelivery, IRoutes
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from collections import deque
 from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.control_plane import IDelivery
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
 from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.ways import IDelivery
 
 DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
 

@@ -12,7 +12,6 @@ from typing import Callable
 
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.heartbeats.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
-from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import GoToLocationMessage, with_order_number
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderRecord, OrderState
@@ -202,7 +201,7 @@ class OrderBook:
 
     def _send_if_routed(self, order: _Order, packet: bytes) -> None:
         """Send nothing without a route: the drone may be in flight, out of reach."""
-        if self._parts.routing.get_direction_to_node(order.drone) != NO_ROUTE:
+        if self._parts.routing.may_reach(order.drone):
             self._parts.delivery.send_own(packet)
 
     def _packet(self, order: _Order) -> bytes:

@@ -12,7 +12,6 @@ from typing import Callable
 
 from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import GoToLocationMessage
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.orders.messages import OrderOutcome, reply_packets
@@ -169,7 +168,7 @@ class OrderIntake:
         packets = reply_packets(
             order.number, order.outcome, order.reason, parts.node_id, order.gateway
         )
-        has_route = parts.routing.get_direction_to_node(order.gateway) != NO_ROUTE
+        has_route = parts.routing.may_reach(order.gateway)
         if has_route and all([parts.delivery.send_own(packet) for packet in packets]):
             order.tries_left = 0
         elif order.tries_left:
