@@ -60,7 +60,11 @@ def _node(entry: Mapping[str, Any], gateway: int) -> NodeStatus:
         neighbour_ages=bytes(len(entry.get("neighbours", ()))),
         report_age=(age_s or REPORTS_MISSING_S) if is_silent else 0.0,
         total_messages=int(entry.get("messages_sent", 0)),
+        tries=float(entry.get("tries", 0.0)),
+        why_not_fly=str(entry.get("why_not_fly", "")),
     )
+    if entry.get("battery_percent") is not None:
+        node.battery = float(entry["battery_percent"])
     if place is not None:
         latitude, longitude, height = place
         node.position = (longitude, latitude, height)
@@ -75,25 +79,14 @@ def _more(entry: Mapping[str, Any]) -> dict[str, Any]:
     tries = float(entry.get("tries", 0.0))
     more: dict[str, Any] = {
         "earth": entry["earth"],
-        "drone": _drone_in_words(entry),
-        "channel": f"{tries:.1f} tries per packet" if tries else "",
+        "drone": "" if entry["reported"] else "has not reported yet",
+        "channel": f"{tries:.1f} tries per packet" if tries else "",  # the only figure reported
         "known_nodes": None,  # not reported; nor is the next one
         "total_messages": entry.get("messages_sent"),
     }
     if "neighbour_count" in entry:
         more["neighbours"] = int(entry["neighbour_count"])
     return more
-
-
-def _drone_in_words(entry: Mapping[str, Any]) -> str:
-    if not entry["reported"]:
-        return "has not reported yet"
-    battery = entry["battery_percent"]
-    words = [] if battery is None else [f"battery {battery:.0f} %"]
-    if entry["flying"]:
-        words.append("in flight")
-    words.append(f"cannot fly: {entry['why_not_fly']}" if entry["why_not_fly"] else "can fly")
-    return ", ".join(words)
 
 
 def _or_none(value: int | None) -> int:

@@ -104,6 +104,26 @@ def test_each_request_asks_for_the_events_after_the_last_one(gateway):
     assert shown["link"] == ""
 
 
+def test_the_battery_and_the_reason_not_to_fly_are_fields_and_a_trouble(gateway):
+    drone = {
+        **NODE,
+        "id": 4,
+        "role": "router",
+        "hops": 1,
+        "battery_percent": 4,
+        "why_not_fly": "battery at 4 %, below --min-battery 30",
+        "tries": 1.5,
+    }
+    gateway.answer = {**MESH, "nodes": [NODE, drone]}
+    store = FrameStore()
+    GatewayFeed(GatewayClient(gateway.url), store, PromptRunner()).ask()
+    shown = frame(store)["nodes"]["4"]
+    assert (shown["battery"], shown["channel"]) == (4, "1.5 tries per packet")
+    assert shown["why_not_fly"] == "battery at 4 %, below --min-battery 30"
+    assert (shown["trouble"], shown["severity"]) == (f"cannot fly: {shown['why_not_fly']}", 1)
+    assert frame(store)["nodes"]["0"]["battery"] is None
+
+
 def test_a_gateway_that_was_restarted_is_asked_from_the_start(gateway):
     feed = GatewayFeed(GatewayClient(gateway.url), FrameStore(), PromptRunner())
     feed.ask()
