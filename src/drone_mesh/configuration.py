@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.communication.routing.named_techniques import DEFAULT_ROUTING
-from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S, MeshTiming
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,
     DEFAULT_ROUTERS,
@@ -96,6 +96,10 @@ class FactoryConfiguration:
     connection_lost_after: float = Field(
         MeshTiming.connection_lost_after_s, ge=0.1, le=3600, description="seconds"
     )
+    report_period: float = Field(
+        MeshTiming.report_period_s,
+        description=f"seconds, {MIN_REPORT_PERIOD_S:g}..3600, or 0 for no reports",
+    )
     debug: bool = Field(True)
 
     @field_validator("*", mode="before")
@@ -109,6 +113,13 @@ class FactoryConfiguration:
     @classmethod
     def _zero_or_in_bounds(cls, value: float) -> float:
         if value != 0 and not MIN_REAL_TIME_FACTOR <= value <= MAX_REAL_TIME_FACTOR:
+            raise ValueError("out of bounds")
+        return value
+
+    @field_validator("report_period")
+    @classmethod
+    def _zero_or_not_too_often(cls, value: float) -> float:
+        if value != 0 and not MIN_REPORT_PERIOD_S <= value <= 3600:
             raise ValueError("out of bounds")
         return value
 

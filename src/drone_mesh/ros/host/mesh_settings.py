@@ -53,7 +53,11 @@ class MeshSettings:
                 range_m=configuration.max_distance,
                 avoid_wrecks=configuration.avoid_wrecks,
             ),
-            timing=MeshTiming(configuration.check_period, configuration.connection_lost_after),
+            timing=MeshTiming(
+                configuration.check_period,
+                configuration.connection_lost_after,
+                report_period_s=configuration.report_period,
+            ),
             seed=configuration.seed,
             debug=configuration.debug,
             observer=ignore_events,
