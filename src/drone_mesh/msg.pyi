@@ -73,6 +73,12 @@ class GroundedDrones(Message):
     reasons: Sequence[str]
     def __init__(self, ids: bytes | Sequence[int] = ..., reasons: Sequence[str] = ...) -> None: ...
 
+class HostProgress(Message):
+    host: str
+    done: rospy.Time
+    under_way: int
+    def __init__(self, host: str = ..., done: rospy.Time = ..., under_way: int = ...) -> None: ...
+
 class HostReport(Message):
     header: std_msgs.msg.Header
     host: str

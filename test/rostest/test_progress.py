@@ -11,8 +11,8 @@ import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
 from rostest_support import WALL_LIMIT_S, LogWatch, MeshWatch, call, wait_for
-from std_msgs.msg import Header
 
+from drone_mesh.msg import HostProgress
 from drone_mesh.srv import SetSpeed
 
 NOTHING_DONE = rospy.Time()
@@ -28,7 +28,9 @@ class ProgressTest(unittest.TestCase):
         cls.now_s = 0.0
         cls.said: collections.Counter[str] = collections.Counter()
         rospy.Subscriber("/clock", Clock, cls._tick)
-        rospy.Subscriber("/mesh/progress", Header, lambda heard: cls.said.update([heard.frame_id]))
+        rospy.Subscriber(
+            "/mesh/progress", HostProgress, lambda heard: cls.said.update([heard.host])
+        )
         cls.log = LogWatch()
         cls.mesh.wait("all connected", 60, cls.mesh.connected)
 
@@ -51,11 +53,11 @@ class ProgressTest(unittest.TestCase):
         self.mesh.pass_time(1.0)
 
     def test_a_node_that_is_not_a_host_cannot_stop_time(self) -> None:
-        stranger = rospy.Publisher("/mesh/progress", Header, queue_size=10)
+        stranger = rospy.Publisher("/mesh/progress", HostProgress, queue_size=10)
         wait_for("the world listens", WALL_LIMIT_S, lambda: stranger.get_num_connections() >= 2)
         begun_s, until_s = self.now_s, time.monotonic() + STANDS_FOR_S
         while time.monotonic() < until_s or not self.log.lines("progress ignored"):
-            stranger.publish(Header(stamp=NOTHING_DONE, frame_id="/mesh_host_1"))
+            stranger.publish(HostProgress("/mesh_host_1", NOTHING_DONE, 0))
             time.sleep(REPEAT_S)
             self.assertLess(time.monotonic(), until_s + WALL_LIMIT_S, "nothing was logged")
         self.assertIn(rospy.get_name(), self.log.lines("progress ignored")[0])
@@ -68,9 +70,9 @@ class ProgressTest(unittest.TestCase):
 
     def test_the_world_waits_for_a_host_that_is_behind_but_not_for_a_silent_one(self) -> None:
         self.declare_as_host()
-        slow = rospy.Publisher("/mesh/progress", Header, queue_size=10)
+        slow = rospy.Publisher("/mesh/progress", HostProgress, queue_size=10)
         wait_for("the world listens", WALL_LIMIT_S, lambda: slow.get_num_connections() >= 2)
-        late = Header(stamp=NOTHING_DONE, frame_id="/slow_host")
+        late = HostProgress("/slow_host", NOTHING_DONE, 0)
         self._wait_until_time_stands(lambda: slow.publish(late))
         stands_at_s, until_s = self.now_s, time.monotonic() + STANDS_FOR_S
         while time.monotonic() < until_s:
@@ -85,14 +87,14 @@ class ProgressTest(unittest.TestCase):
 
     def test_what_a_host_said_too_late_takes_nothing_back(self) -> None:
         self.declare_as_host()
-        host = rospy.Publisher("/mesh/progress", Header, queue_size=10)
+        host = rospy.Publisher("/mesh/progress", HostProgress, queue_size=10)
         wait_for("the world listens", WALL_LIMIT_S, lambda: host.get_num_connections() >= 2)
         begun_s = self.now_s
         ahead = rospy.Time.from_sec(begun_s + 1000.0)
-        host.publish(Header(stamp=ahead, frame_id="/hasty_host"))
+        host.publish(HostProgress("/hasty_host", ahead, 0))
 
         def time_went_on() -> bool:
-            host.publish(Header(stamp=NOTHING_DONE, frame_id="/hasty_host"))
+            host.publish(HostProgress("/hasty_host", NOTHING_DONE, 0))
             time.sleep(REPEAT_S)
             return self.now_s > begun_s + 2.0
 

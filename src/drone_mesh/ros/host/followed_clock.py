@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import rospy
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header
 
+from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.ros.host.mesh_host import MeshHost
@@ -17,8 +17,7 @@ class FollowedClock:
     """Follows /clock, and reports the progress of this process to the world.
 
     Subscribes: /clock (Clock)
-    Publishes:  /mesh/progress (Header: stamp = all work up to this simulated time is done;
-                seq = packets handed over minus packets processed, modulo 2**32)
+    Publishes:  /mesh/progress (HostProgress)
 
     `now_s` is set by rospy's thread and read by any; `_reported` is set by the executor's worker.
     """
@@ -28,7 +27,7 @@ class FollowedClock:
         self._host: MeshHost | None = None
         self._reported = 0  # packets under way in the last report
         self._progress = rospy.Publisher(
-            names.PROGRESS_TOPIC, Header, tcp_nodelay=True, queue_size=_QUEUE
+            names.PROGRESS_TOPIC, HostProgress, tcp_nodelay=True, queue_size=_QUEUE
         )
         rospy.Subscriber(names.CLOCK_TOPIC, Clock, self._advance, tcp_nodelay=True)
 
@@ -63,6 +62,4 @@ class FollowedClock:
     def _publish(self, done: rospy.Time) -> None:
         assert self._host is not None
         self._reported = self._host.under_way
-        # rospy sets `seq` in a message's header, but not in a message that is a Header.
-        packets = self._reported & 0xFFFFFFFF
-        self._progress.publish(Header(seq=packets, stamp=done, frame_id=rospy.get_name()))
+        self._progress.publish(HostProgress(rospy.get_name(), done, self._reported))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from typing import Callable
 
@@ -14,15 +13,12 @@ from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.msg import HostReport, NodeState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_msg, ros_time
-from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.ros.host.node_snapshots import NodeSnapshots, Worker
 from drone_mesh.state.events import EventBatcher
-from drone_mesh.state.observation import describe_component
 
 REPORT_PERIOD_S = 0.5  # wall time; our choice: an event is seen soon
 REPORT_PERIOD_PER_NODE_S = 0.004  # our choice: 254 nodes with 200 neighbours each, once a second
 REPORTS_QUEUE = 4  # reports that may wait for a slow subscriber; each one is complete in itself
-
-_log = logging.getLogger(__name__)
 
 
 class HostReports:
@@ -31,28 +27,29 @@ class HostReports:
     Publishes: /mesh/reports (HostReport), once or twice a second of wall time, also while time
                stands still
 
-    The workers call `add` and `drop`, any thread calls `observe`. The reporting thread owns each
-    node's NodeState.
+    The workers call `add` and `drop`, any thread calls `observe`. Each node's worker makes its
+    NodeState, which does not change any more.
     """
 
     def __init__(self) -> None:
-        self._hosted: list[tuple[NodeState, MeshnetworkComponent, Callable[[], bool]]] = []
+        self._snapshots: NodeSnapshots[NodeState] = NodeSnapshots(REPORT_PERIOD_S)
         self._batcher = EventBatcher()
-        self._throttled_log = ThrottledLog(_log)
         self._publisher = rospy.Publisher(names.REPORTS_TOPIC, HostReport, queue_size=REPORTS_QUEUE)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="host reports", daemon=True)
 
-    def add(self, component: MeshnetworkComponent, antenna_on: Callable[[], bool]) -> None:
-        """Report on this node from now on."""
+    def add(
+        self, component: MeshnetworkComponent, worker: Worker, antenna_on: Callable[[], bool]
+    ) -> None:
+        """Report on this node, which `worker` drives, from now on."""
         gateway = isinstance(component, MeshnetworkGateway)
         role = NodeState.GATEWAY if gateway else NodeState.ROUTER
-        state = NodeState(id=component.get_node_id(), role=role)
-        self._hosted.append((state, component, antenna_on))
+        node_id = component.get_node_id()
+        self._snapshots.add(component, worker, lambda: NodeState(id=node_id, role=role), antenna_on)
 
     def drop(self, node_id: int) -> None:
         """Stop reporting on this node."""
-        self._hosted = [hosted for hosted in self._hosted if hosted[0].id != node_id]
+        self._snapshots.drop(node_id)
 
     def observe(self, event: MeshEvent) -> None:
         """The observer of all components of this process."""
@@ -75,20 +72,13 @@ class HostReports:
                 self._report()
 
     def _period_s(self) -> float:
-        return max(REPORT_PERIOD_S, REPORT_PERIOD_PER_NODE_S * len(self._hosted))
+        return max(REPORT_PERIOD_S, REPORT_PERIOD_PER_NODE_S * len(self._snapshots))
 
     def _report(self) -> None:
         now_s = rospy.get_time()
         report = HostReport(host=rospy.get_name())
         report.header.stamp = ros_time(now_s)
-        for state, component, antenna_on in list(self._hosted):
-            try:
-                describe_component(state, component, antenna_on(), now_s)
-            except Exception as error:  # the worker changed a routing table meanwhile
-                self._throttled_log.warning(
-                    "a node could not be described", f"node {state.id}: {error!r}"
-                )
-            report.nodes.append(state)
+        report.nodes = self._snapshots.take()
         report.events = [event_msg(event) for event in self._batcher.take()]
         try:
             self._publisher.publish(report)

@@ -163,7 +163,7 @@ class MeshHost:
                 antenna = self._radios.antenna(node_id, slot)
                 why_not_fly = functools.partial(self._grounded.reason, node_id)
                 node = _KINDS[role](node_id, self._settings, antenna, slot, why_not_fly)
-                self._reports.add(node.component, node.antenna.on)
+                self._reports.add(node.component, slot, node.antenna.on)
                 node.start(now_s)
             except MeshError as error:  # retrying would not help
                 self._on_failure(f"node {node_id} cannot start: {error}")

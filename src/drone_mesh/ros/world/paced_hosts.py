@@ -8,8 +8,8 @@ import time
 from typing import NamedTuple, Protocol
 
 import rospy
-from std_msgs.msg import Header
 
+from drone_mesh.msg import HostProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.logs import ThrottledLog
 from drone_mesh.world.under_way import UnderWay
@@ -57,7 +57,7 @@ class PacedHosts:
     all consequences of an event, over any number of hops, happen within that time, however slow the
     machine is.
 
-    Subscribes: /mesh/progress (Header), of processes that have declared themselves hosts
+    Subscribes: /mesh/progress (HostProgress), of processes that have declared themselves hosts
 
     Threads of rospy fill `_progress` and `_strangers`; the world's thread owns everything else.
     """
@@ -72,7 +72,7 @@ class PacedHosts:
         self._throttled_log = ThrottledLog(_log)
         self._seen = (0.0, 0)  # work done and packets under way at the last call
         self._stuck_since_s = time.monotonic()  # time stands still, and no work is done
-        rospy.Subscriber(names.PROGRESS_TOPIC, Header, self._reported, tcp_nodelay=True)
+        rospy.Subscriber(names.PROGRESS_TOPIC, HostProgress, self._reported, tcp_nodelay=True)
 
     def are_behind(self, now_s: float) -> bool:
         """Whether the last quiet moment is too long ago for another step of the world."""
@@ -113,16 +113,15 @@ class PacedHosts:
         if self._nodes is not None:
             self._nodes.time_advanced()
 
-    def _reported(self, progress: Header) -> None:
+    def _reported(self, progress: HostProgress) -> None:
         reporter = progress._connection_header["callerid"]
         if reporter not in self._progress and not self._is_host(reporter):
             self._throttled_log.warning("progress ignored", f"{reporter} is not a host of nodes")
             return
         before = self._progress.get(reporter)
         # Two threads of a host send reports, so a later report may show less progress.
-        done_s = max(0.0 if before is None else before.done_s, progress.stamp.to_sec())
-        under_way = progress.seq - 2**32 if progress.seq >= 2**31 else progress.seq
-        self._progress[reporter] = _Progress(done_s, under_way, time.monotonic())
+        done_s = max(0.0 if before is None else before.done_s, progress.done.to_sec())
+        self._progress[reporter] = _Progress(done_s, progress.under_way, time.monotonic())
 
     def _is_host(self, reporter: str) -> bool:
         """Whether it has declared itself a host; asks the master at most once a second."""

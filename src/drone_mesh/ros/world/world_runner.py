@@ -41,7 +41,7 @@ class WorldRunner:
     """Steps a world in the thread that calls `run`.
 
     Publishes: /clock (Clock) at 100 Hz of simulated time; /DroneFactory/real_time_factor (Float32),
-               the achieved factor, once a second. Subscribes: /mesh/progress (Header).
+               the achieved factor, once a second. Subscribes: /mesh/progress (HostProgress).
     Services:  /DroneFactory/setSpeed (SetSpeed)
 
     The world never runs ahead of pending work of the nodes: when the machine is too slow, simulated

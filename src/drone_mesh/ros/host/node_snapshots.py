@@ -1,0 +1,79 @@
+"""Snapshots of the nodes of a process, each made by the thread that drives its node."""
+
+from __future__ import annotations
+
+import queue
+from typing import Callable, Generic, Protocol, TypeVar
+
+from drone_mesh.communication.component import MeshnetworkComponent
+from drone_mesh.state.model import NodeStatus
+from drone_mesh.state.observation import describe_component
+
+S = TypeVar("S", bound=NodeStatus)
+
+
+class Worker(Protocol):
+    """The thread that drives a node."""
+
+    def submit(self, function: Callable[[float], None]) -> None:
+        """Run `function(now_s)` there, after all earlier submissions."""
+
+
+class NodeSnapshots(Generic[S]):
+    """The latest state of each node; a state does not change once it is here.
+
+    Workers call `add` and `drop`, any other thread `take`.
+    """
+
+    def __init__(self, wait_s: float) -> None:
+        """`wait_s`: wall seconds without a new state after which `take` stops waiting."""
+        self._wait_s = wait_s
+        self._workers: dict[int, tuple[Worker, Callable[[float], S]]] = {}
+        self._latest: dict[int, S] = {}
+
+    def __len__(self) -> int:
+        return len(self._workers)
+
+    def add(
+        self,
+        component: MeshnetworkComponent,
+        worker: Worker,
+        new: Callable[[], S],
+        antenna_on: Callable[[], bool],
+    ) -> None:
+        """Describe this node from now on, each time in a state made by `new`."""
+
+        def describe(now_s: float) -> S:
+            state = new()
+            describe_component(state, component, antenna_on(), now_s)
+            return state
+
+        self._workers[component.get_node_id()] = (worker, describe)
+
+    def drop(self, node_id: int) -> None:
+        """Forget this node."""
+        self._workers.pop(node_id, None)
+        self._latest.pop(node_id, None)
+
+    def take(self) -> list[S]:
+        """A state of each node, of now; of a node whose worker is busy, the one before."""
+        done: queue.SimpleQueue[int] = queue.SimpleQueue()
+        workers = list(self._workers.items())
+        for node_id, (worker, describe) in workers:
+            worker.submit(self._filling(node_id, describe, done))
+        for _worker in workers:
+            try:
+                done.get(timeout=self._wait_s)
+            except queue.Empty:
+                break
+        return list(self._latest.values())
+
+    def _filling(
+        self, node_id: int, describe: Callable[[float], S], done: queue.SimpleQueue[int]
+    ) -> Callable[[float], None]:
+        def fill(now_s: float) -> None:
+            if node_id in self._workers:
+                self._latest[node_id] = describe(now_s)
+            done.put(node_id)
+
+        return fill
