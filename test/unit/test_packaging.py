@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import subprocess
@@ -64,6 +65,40 @@ def test_each_folder_that_ros_reads_is_installed() -> None:
     (folders,) = re.findall(r"^install\(DIRECTORY ([\w ]+)$", cmake, flags=re.MULTILINE)
     read_by_ros = {"config", "launch", "meshes", "rviz"} & {path.name for path in ROOT.iterdir()}
     assert set(folders.split()) >= read_by_ros
+
+
+def third_party_imports(source: Path) -> set[str]:
+    """The packages that it imports, except for those of Python."""
+    found = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module.partition(".")[0])
+    return found - set(sys.stdlib_module_names) - {"drone_mesh"}
+
+
+@pytest.mark.skipif(sys.version_info < (3, 10), reason="sys.stdlib_module_names")
+def test_each_package_that_is_imported_is_declared_or_named_as_one_for_pip() -> None:
+    text = (ROOT / "package.xml").read_text(encoding="utf-8")
+    manifest = ElementTree.fromstring(text)
+    declared = {
+        (element.text or "").replace("python3-", "").lower()
+        for element in manifest
+        if element.tag.endswith("depend")
+    }
+    (by_pip,) = re.findall(r"<!-- By pip.*?known:(.*?)-->", text, re.DOTALL)
+    imported = {
+        name
+        for source in (ROOT / "src" / "drone_mesh").rglob("*.py")
+        for name in third_party_imports(source)
+    }
+    for name in sorted(imported):
+        key = {"PIL": "pil"}.get(name, name)
+        assert key in declared or re.search(rf"\b{key}\b", by_pip), name
+    for name in re.findall(r"[a-z]\w+", by_pip.replace("paho-mqtt", "")):
+        assert name in imported | {"websockets"}, f"{name} is not imported"
+        assert name not in declared, name
 
 
 def test_each_ros_package_that_is_used_is_declared() -> None:
