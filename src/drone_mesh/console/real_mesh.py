@@ -79,7 +79,7 @@ def _more(entry: Mapping[str, Any]) -> dict[str, Any]:
     tries = float(entry.get("tries", 0.0))
     more: dict[str, Any] = {
         "earth": entry["earth"],
-        "drone": "" if entry["reported"] else "has not reported yet",
+        "drone": _drone_in_words(entry),
         "channel": f"{tries:.1f} tries per packet" if tries else "",  # the only figure reported
         "known_nodes": None,  # not reported; nor is the next one
         "total_messages": entry.get("messages_sent"),
@@ -87,6 +87,14 @@ def _more(entry: Mapping[str, Any]) -> dict[str, Any]:
     if "neighbour_count" in entry:
         more["neighbours"] = int(entry["neighbour_count"])
     return more
+
+
+def _drone_in_words(entry: Mapping[str, Any]) -> str:
+    if not entry["reported"]:
+        return "has not reported yet"
+    if entry["flying"]:
+        return "in flight"
+    return "" if entry["why_not_fly"] else "can fly"  # the reason is a field of its own
 
 
 def _or_none(value: int | None) -> int:

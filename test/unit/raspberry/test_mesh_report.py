@@ -58,7 +58,7 @@ def test_the_page_shows_routes_places_and_why_a_drone_cannot_fly(network):
     assert list(two.route) == [2, 1, 0]
     assert tuple(two.position) == (12.0, 1.0, 0.0)
     assert more[1]["drone"] == "can fly"
-    assert more[2]["drone"] == "cannot fly: it stands on the ground"
+    assert (more[2]["drone"], two.why_not_fly) == ("", "it stands on the ground")
     assert more[2]["neighbours"] == 1
     assert more[2]["total_messages"] is None
     assert more[2]["earth"][2] == 3.0

@@ -11,14 +11,16 @@ epoch is accepted.
 from __future__ import annotations
 
 import hashlib
+import math
 import random
 import struct
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from hmac import compare_digest
 from typing import NamedTuple
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
+from drone_mesh.communication.limits import RateLimit
 from drone_mesh.communication.messages import FORWARD_AT, FROM_AT, TO_AT
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import Keys
@@ -32,6 +34,12 @@ LAST_COUNT = 2**32 - 1  # the last counter of an epoch: an answer carries 4 byte
 WAITING_CHALLENGES = 16  # our choice: most unanswered challenges
 CHALLENGE_AGAIN_S = 2.0  # our choice: least time between two challenges to one node
 CHALLENGE_OUT_S = 0.5  # our choice: after this time another challenge may replace it
+MOST_DOUBTED = 16  # our choice: in CHALLENGE_AGAIN_S, challenges to nodes that are known
+DOUBTS = 3  # our choice: the pause after false alarms doubles so many times, to 16 s
+ANSWERS = 4  # our choice: to one node in CHALLENGE_AGAIN_S
+MOST_ANSWERS = 64  # our choice: to all nodes in CHALLENGE_AGAIN_S
+OVERTAKING = 32  # our choice: broadcasts that may overtake an answer in a queue
+NONCES_KEPT = 64  # our choice: of each node; an answered challenge is not answered again
 
 _EPOCH_BITS, _NONCE_BITS = 64, 64
 _CHALLENGE = struct.Struct("<Q")  # nonce
@@ -49,7 +57,7 @@ _unsealed = struct.Struct(f"{SEAL_AT}s{SEAL_BYTES}x").pack
 class _Peer:
     """A neighbour with a known epoch."""
 
-    __slots__ = ("epoch", "heard_s", "state", "state_to_all", "window")
+    __slots__ = ("epoch", "heard_s", "state", "state_to_all", "window", "window_to_all")
 
     def __init__(
         self, network_key: bytes, pair_key: bytes, epoch: int, count: int, now_s: float
@@ -57,13 +65,35 @@ class _Peer:
         self.epoch = epoch
         self.state_to_all = _epoch_state(network_key, epoch)
         self.state = _epoch_state(pair_key, epoch)
-        self.window = ReplayWindow(count)
+        self.window = ReplayWindow(count)  # only the node itself can move it
+        self.window_to_all = ReplayWindow(count)  # any node with the network key can
+        self.heard_s = now_s
+
+    def answered(self, count: int, now_s: float) -> None:
+        """It has proved that this was its count: earlier packets are used up.
+
+        A few broadcasts may have overtaken the answer; one that was further ahead was not its own.
+        """
+        self.window = ReplayWindow(max(count, self.window.highest))
+        ahead = self.window_to_all.highest - count
+        self.window_to_all = ReplayWindow(count + ahead if 0 < ahead <= OVERTAKING else count)
         self.heard_s = now_s
 
 
 class _Challenge(NamedTuple):
     nonce: int
     sent_s: float
+    doubted: bool  # the node was known, so the reason may be a packet of somebody else
+
+
+class _Asked:
+    """When a node may be challenged again."""
+
+    __slots__ = ("doubts", "next_s")
+
+    def __init__(self, next_s: float = -math.inf) -> None:
+        self.next_s = next_s
+        self.doubts = 0  # challenges in a row that its answers showed to be needless
 
 
 class HopSeal:
@@ -81,6 +111,11 @@ class HopSeal:
         self._fresh_s = fresh_s
         self._peers: dict[int, _Peer] = {}
         self._challenges: OrderedDict[int, _Challenge] = OrderedDict()  # oldest first
+        self._asked: dict[int, _Asked] = {}
+        self._doubted = RateLimit(MOST_DOUBTED, CHALLENGE_AGAIN_S)  # all nodes together: 0
+        self._answers = RateLimit(ANSWERS, CHALLENGE_AGAIN_S)
+        self._all_answers = RateLimit(MOST_ANSWERS, CHALLENGE_AGAIN_S)  # all nodes together: 0
+        self._answered: dict[int, deque[int]] = {}  # by node: its nonces that had an answer
         self._epoch = self._count = 0
         self._state_to_all = _epoch_state(keys.network, 0)
         self._states: dict[int, hashlib.blake2s] = {}  # by receiver
@@ -107,11 +142,12 @@ class HopSeal:
         peer = self._peers.get(payload[FROM_AT])
         if peer is None or now_s - peer.heard_s > self._fresh_s:
             return None
-        window = peer.window
+        to_all = payload[FORWARD_AT] == BROADCAST
+        window = peer.window_to_all if to_all else peer.window
         count = window.expand(payload[SEAL_AT] | payload[SEAL_AT + 1] << 8)
         if not 0 <= count <= LAST_COUNT:
             return None
-        if payload[FORWARD_AT] == BROADCAST:
+        if to_all:
             tag = peer.state_to_all.copy()
             tag.update(_covered_to_all(count, payload, BROADCAST, payload[FORWARD_AT:]))
         else:
@@ -136,15 +172,19 @@ class HopSeal:
         """
         while self._challenges and now_s - self._oldest_s() >= CHALLENGE_AGAIN_S:
             self._challenges.popitem(last=False)
-        waiting = self._challenges.get(node)
-        if waiting is not None:
+        asked = self._asked.setdefault(node, _Asked())
+        if node in self._challenges or now_s < asked.next_s:
+            return None
+        doubted = self.knows(node, now_s)
+        if doubted and not self._doubted.count(0, now_s):
             return None
         if len(self._challenges) >= WAITING_CHALLENGES:
             if now_s - self._oldest_s() < CHALLENGE_OUT_S:
                 return None
             self._challenges.popitem(last=False)
         nonce = self._rng.getrandbits(_NONCE_BITS)
-        self._challenges[node] = _Challenge(nonce, now_s)
+        self._challenges[node] = _Challenge(nonce, now_s, doubted)
+        asked.next_s = now_s + CHALLENGE_AGAIN_S * (2**asked.doubts if doubted else 1)
         return self._proven(MessageType.SEAL_CHALLENGE, node, _CHALLENGE.pack(nonce))
 
     @property
@@ -152,11 +192,21 @@ class HopSeal:
         """Whether so many challenges are unanswered that many of those nodes cannot exist."""
         return len(self._challenges) > WAITING_CHALLENGES // 2
 
-    def answer(self, challenge: bytes) -> bytes | None:
-        """The answer to a challenge; None if it is not from a node with the key."""
-        if not self._is_proven(challenge):
-            return None
+    def is_challenge(self, challenge: bytes) -> bool:
+        """Whether it is one of a node with the key, now or earlier."""
+        return self._is_proven(challenge)
+
+    def answer(self, challenge: bytes, now_s: float) -> bytes | None:
+        """The answer to a challenge; None: it had one, or there were too many challenges."""
+        node = messages.sender(challenge)
         (nonce,) = _CHALLENGE.unpack_from(challenge, messages.HEADER_BYTES)
+        answered = self._answered.setdefault(node, deque(maxlen=NONCES_KEPT))
+        if nonce in answered or self._all_answers.reached(0, now_s):
+            return None
+        if not self._answers.count(node, now_s):
+            return None
+        self._all_answers.count(0, now_s)
+        answered.append(nonce)
         body = _ANSWER.pack(nonce, self._epoch, self._count)
         return self._proven(MessageType.SEAL_ANSWER, messages.sender(challenge), body)
 
@@ -174,11 +224,14 @@ class HopSeal:
             return None
         del self._challenges[node]
         known = self._peers.get(node)
-        is_new = known is None or known.epoch != epoch
-        if known is not None and not is_new:
-            count = max(count, known.window.highest)
+        if known is not None and known.epoch == epoch:
+            known.answered(count, now_s)
+            doubts = self._asked[node].doubts
+            self._asked[node].doubts = min(doubts + 1, DOUBTS) if waiting.doubted else 0
+            return False
+        self._asked[node] = _Asked(now_s + CHALLENGE_AGAIN_S)
         self._peers[node] = _Peer(self._keys.network, self._pair_key(node), epoch, count, now_s)
-        return is_new
+        return True
 
     def _oldest_s(self) -> float:
         return next(iter(self._challenges.values())).sent_s

@@ -221,9 +221,12 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
         if messages.addressee(challenge) != self._node_id:
             return
-        answer = self._seal.answer(challenge)
-        if answer is None:
+        if not self._seal.is_challenge(challenge):
             self._complain(challenge, from_, now_s)
+            return
+        answer = self._seal.answer(challenge, now_s)
+        if answer is None:
+            self.complaints.counts["challenges without an answer"] += 1
             return
         self._antenna.send_message_to(answer)
         if self._present:

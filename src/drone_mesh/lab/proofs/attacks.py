@@ -15,6 +15,7 @@ from drone_mesh.communication.messages import (
     LocationMessage,
     MovementNegotiationMessage,
     header,
+    packet,
     readdressed,
 )
 from drone_mesh.communication.packet_types import MessageType
@@ -105,6 +106,17 @@ def invented_ids(stranger: Stranger) -> dict[int, Location]:
     return {}
 
 
+def borrowed_names(stranger: Stranger) -> dict[int, Location]:
+    """Send 20 frames a second that open for nobody, in the names of its living neighbours."""
+    chance = random.Random(stranger.node_id)
+    for _ in stranger.every(0.05, ATTACK_S):
+        near = stranger.in_range()
+        victim, name = chance.sample(near, 2)
+        frame = packet(MessageType.HEARTBEAT, name, name, victim, victim, bytes((0, 255, 0)))
+        stranger.play(victim, frame[:-1] + b"\1")
+    return {}
+
+
 def far_place(stranger: Stranger) -> dict[int, Location]:
     """Claim once that the gateway is far away; then the gateway is off for a while."""
     body = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
@@ -173,6 +185,7 @@ ATTACKS: Mapping[str, Attack] = {
     "black hole": black_hole,
     "relay that swallows": swallowing_relay,
     "heartbeats of invented ids": invented_ids,
+    "frames in neighbours' names": borrowed_names,
 }
 RECORDING = (replayed_order, replay_after_restart, replay_on_another_path)
 

@@ -20,7 +20,7 @@ def node(node_id, seed=0, key=KEY):
 def introduce(receiver, sender, sender_id, now_s=0.0):
     """The receiver challenges the sender, which answers."""
     challenge = receiver.challenge(sender_id, now_s)
-    assert receiver.answered(sender.answer(challenge), now_s) is not None
+    assert receiver.answered(sender.answer(challenge, now_s), now_s) is not None
 
 
 def packet(text):

@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from seal_rig import FRESH_S, KEY, OTHER_KEY, introduce, node, packet
 
-from drone_mesh.communication.seals.seal import HopSeal
+from drone_mesh.communication.seals.seal import HopSeal, _epoch_state
 
 HEARTBEAT = packet("05 05 04 01 01 01 00 00")  # of node 5 for node 1
 PRESENT = packet("05 05 03 fe fe 01 01")
@@ -101,7 +101,7 @@ def test_a_receiver_that_lost_its_memory_opens_no_old_packet(link):
 
 def test_a_recorded_answer_to_a_challenge_is_worthless(link):
     receiver, sender = link
-    old = sender.answer(receiver.challenge(5, 5.0))
+    old = sender.answer(receiver.challenge(5, 5.0), 5.0)
     assert receiver.answered(old, 5.0) is False
     restarted = node(1, seed=1)
     assert restarted.challenge(5, 6.0) is not None
@@ -112,15 +112,15 @@ def test_a_recorded_answer_to_a_challenge_is_worthless(link):
 def test_an_answer_without_a_challenge_is_ignored(link):
     receiver, sender = link
     challenge = receiver.challenge(5, 5.0)
-    answer = sender.answer(challenge)
+    answer = sender.answer(challenge, 5.0)
     assert receiver.answered(answer, 5.0) is False  # its epoch is not new
     assert receiver.answered(answer, 5.0) is None
 
 
 def test_a_node_with_another_key_neither_answers_nor_is_answered():
     receiver, stranger = node(1), node(5, key=OTHER_KEY)
-    assert stranger.answer(receiver.challenge(5, 0.0)) is None
-    assert receiver.answer(stranger.challenge(1, 0.0)) is None
+    assert not stranger.is_challenge(receiver.challenge(5, 0.0))
+    assert not receiver.is_challenge(stranger.challenge(1, 0.0))
 
 
 def test_a_withheld_packet_is_worthless_after_a_silence(link):
@@ -168,3 +168,69 @@ def test_a_captured_node_cannot_pose_as_another_one_to_a_neighbour():
     introduce(receiver, sender, 5)
     with pytest.raises(AssertionError, match="a node has its own keys"):
         captured.seal(HEARTBEAT)
+
+
+def sealed_as(node_id, captured_keys, epoch, count, payload):
+    """A packet to all in the name of `node_id`, made with the network key of another node."""
+    forger = HopSeal(node_id, captured_keys, Random("forger"), FRESH_S)
+    forger._epoch, forger._count = epoch, count - 1
+    forger._state_to_all = _epoch_state(captured_keys.network, epoch)
+    return forger.seal(payload)
+
+
+@pytest.mark.parametrize("ahead", [33, 600, 32_000])
+def test_a_count_that_a_broadcast_claims_does_not_raise_the_bar_for_the_pair(link, ahead):
+    receiver, sender = link
+    forged = sealed_as(5, KEY.for_node(7), sender._epoch, sender._count + ahead, PRESENT)
+    assert receiver.open(forged, 1.0) is not None
+    for _ in range(10):
+        assert receiver.open(sender.seal(HEARTBEAT), 1.0) == HEARTBEAT
+
+
+@pytest.mark.parametrize("ahead", [100, 600, 32_000])
+def test_one_answer_ends_what_a_broadcast_claimed(link, ahead):
+    receiver, sender = link
+    old = sender.seal(PRESENT)
+    forged = sealed_as(5, KEY.for_node(7), sender._epoch, sender._count + ahead, PRESENT)
+    assert receiver.open(forged, 1.0) is not None
+    introduce(receiver, sender, 5, 3.0)
+    assert receiver.open(sender.seal(PRESENT), 3.0) is not None
+    assert receiver.open(old, 3.0) is None
+    assert receiver.open(forged, 3.0) is not None  # the forger can always make another one
+    introduce(receiver, sender, 5, 9.0)
+    assert receiver.open(sender.seal(PRESENT), 9.0) is not None
+
+
+def test_a_known_neighbour_is_challenged_less_and_less_while_its_answers_show_no_reason(link):
+    receiver, sender = link
+    asked = []
+    for tenth in range(10, 3000):
+        challenge = receiver.challenge(5, tenth / 10)
+        if challenge is not None:
+            asked.append(tenth / 10)
+            receiver.answered(sender.answer(challenge, tenth / 10), tenth / 10)
+    pauses = [round(after - before) for before, after in zip(asked, asked[1:])]
+    assert pauses[:4] == [2, 4, 8, 16]
+    assert set(pauses[4:]) == {16}
+    restarted = node(5, seed=1)
+    introduce(receiver, restarted, 5, 400.0)
+    assert receiver.challenge(5, 402.0) is not None
+
+
+def test_an_answered_challenge_gets_no_second_answer_and_does_not_use_up_the_limit(link):
+    receiver, sender = link
+    old = receiver.challenge(5, 5.0)
+    assert sender.answer(old, 5.0) is not None
+    assert not any(sender.answer(old, 5.0 + n / 100) for n in range(1000))
+    assert sender.answer(receiver.challenge(5, 15.0), 15.0) is not None
+
+
+def test_recorded_challenges_get_a_limited_number_of_answers():
+    answers = 0
+    victim = node(5)
+    for other in range(6, 206):
+        challenger = node(other)
+        for n in range(8):
+            challenge = challenger.challenge(5, 2.0 * n)
+            answers += victim.answer(challenge, 0.001 * n) is not None
+    assert answers == 64

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import logging
+import random
 
 import pytest
 from seal_rig import KEY, OTHER_KEY, packet
 
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.interfaces import IMeshNetwork, IWirelessCommunication
+from drone_mesh.communication.seals.seal import HopSeal, _epoch_state
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.proofs.stranger import Tap
@@ -218,3 +220,60 @@ def test_occasional_duplicates_are_not_reported_as_replayed(caplog):
         network.inject(1, record[-1].payload)
         network.run_for(10.0)
     assert "replayed or forged packets in the name of node 0" in caplog.text
+
+
+def seals_heard(network):
+    """What all nodes hear from now on, challenges and answers alone, by time."""
+    record = []
+    for node_id, node in network.nodes.items():
+        node.receiver = Tap(network, node_id, record)
+    return lambda: [one for one in record if one.payload[2] in (126, 127)]
+
+
+def test_a_forged_broadcast_with_a_far_count_cuts_no_link_and_starts_no_storm():
+    network = line(2, node_keys)
+    network.run_for(30.0)
+    victim = network.nodes[1].receiver._seal
+    forger = HopSeal(1, KEY.for_node(7), random.Random(1), 30.0)  # has the network key alone
+    forger._epoch, forger._count = victim._epoch, victim._count + 32_000
+    forger._state_to_all = _epoch_state(KEY.network, victim._epoch)
+    heard = seals_heard(network)
+    network.inject(0, forger.seal(packet("01 01 03 00 fe ff 00")))
+    connected = 0
+    for _ in range(120):
+        network.run_for(1.0)
+        connected += network.connected(1)
+    assert connected >= 110
+    assert len(heard()) < 60
+
+
+def test_a_stranger_gets_no_more_frames_out_of_a_mesh_than_he_sends():
+    network = Network(seed=1, key=KEY)
+    network.add_fleet(1, 24, 5, 6.0)
+    network.run_for(60.0)
+    heard = seals_heard(network)
+    sent = 0
+    for _tenth in range(600):  # frames in the names of living neighbours, 20 a second
+        for victim in (6, 7):
+            claimed = sorted(network.nodes[victim].component.get_neighbours())
+            from_ = claimed[sent // 2 % len(claimed)]
+            network.inject(victim, bytes((from_, from_, 4, victim, victim)).ljust(32, b"\7"))
+            sent += 1
+        network.run_for(0.1)
+    assert len(heard()) < sent / 4
+    assert network.all_connected()
+
+
+def test_recorded_challenges_are_answered_once():
+    network = line(2)
+    heard = seals_heard(network)
+    network.run_for(30.0)
+    challenges = [one for one in heard() if one.payload[2] == 126]
+    assert challenges
+    before = len(heard())
+    for _tenth in range(300):
+        for one in challenges:
+            network.inject(one.receiver, one.payload)
+        network.run_for(0.1)
+    answers = [one for one in heard()[before:] if one.payload[2] == 127]
+    assert len(answers) < 10
