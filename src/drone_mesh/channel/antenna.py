@@ -165,18 +165,18 @@ class PacketAntenna(IWirelessCommunication):
         """How well packets reach each neighbour. Any thread."""
         return self._quality.figures()
 
-    def _delivered(self, node: int, tries: int) -> None:
-        self._quality.packet(node, tries, delivered=True)
+    def _delivered(self, node: int, frames: int) -> None:
+        self._quality.packet(node, frames, delivered=True)
         mesh = self._mesh
         if mesh is not None and self.powered and not self._silent:
-            self._submit(lambda now_s: mesh.on_delivered(node, tries, now_s))
+            self._submit(lambda now_s: mesh.on_delivered(node, frames, now_s))
 
-    def _given_up(self, payload: bytes, tries: int) -> None:
+    def _given_up(self, payload: bytes, frames: int) -> None:
         if receiver(payload) <= MAX_NODE_ID:
-            self._quality.packet(receiver(payload), tries, delivered=False)
+            self._quality.packet(receiver(payload), frames, delivered=False)
         mesh = self._mesh
         if mesh is not None and self.powered and not self._silent:
-            self._submit(lambda now_s: mesh.on_undelivered(payload, tries, now_s))
+            self._submit(lambda now_s: mesh.on_undelivered(payload, frames, now_s))
 
     def _show(self, info: IMeshDebugInfo) -> None:
         use = self.channel_use()

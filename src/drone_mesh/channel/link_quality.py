@@ -10,7 +10,7 @@ _LEARNING = 0.1  # weight of the latest packet
 class Quality(NamedTuple):
     """Quality of one link: moving averages over recent packets."""
 
-    tries: float  # per packet, delivered or not
+    tries: float  # per packet, delivered or not; those included that the radio made by itself
     delivered: float  # share, 0..1
 
 

@@ -13,7 +13,7 @@ ALL_NODES = -1  # receiver of a broadcast
 class OutgoingPacket:
     """One packet on its way out."""
 
-    __slots__ = ("not_before_s", "payload", "priority", "queued_s", "receiver", "tries")
+    __slots__ = ("frames", "not_before_s", "payload", "priority", "queued_s", "receiver", "tries")
 
     def __init__(
         self, receiver: int, payload: bytes, priority: Priority, now_s: float, not_before_s: float
@@ -24,6 +24,7 @@ class OutgoingPacket:
         self.queued_s = now_s
         self.not_before_s = not_before_s
         self.tries = 0
+        self.frames = 0  # in all tries, those included that the radio repeated by itself
 
 
 class PacketQueue:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable, Protocol, Sequence
+from typing import Callable, NamedTuple, Protocol, Sequence
 
 from drone_mesh.channel.medium_access import MediumAccess
 from drone_mesh.channel.statistics import RadioStatistics
@@ -19,6 +19,13 @@ class Received(Protocol):
     @property
     def to_all(self) -> bool:
         """Whether it was broadcast."""
+
+
+class Try(NamedTuple):
+    """The outcome of one try to send a packet to a node."""
+
+    acknowledged: bool
+    frames: int  # sent for it, those included that the radio repeated by itself
 
 
 class PacketRadio(Protocol):
@@ -51,13 +58,14 @@ class PacketRadio(Protocol):
         again: bool,
         retransmits: int,
         delay: int,
-        following: Callable[[], bytes | None],
-    ) -> bool:
-        """Try once to send a packet to a node, and wait; True: the node acknowledged it.
+        following: Callable[[int], bytes | None],
+    ) -> Try:
+        """Try once to send a packet to a node, and wait.
 
         `again`: an earlier try failed. `retransmits`, `delay`: as `access.retransmits` returned
-        them. After an acknowledgement, `following` may return another packet for the same node,
-        which is sent at once, and so on; the result is then that of the last packet.
+        them. After an acknowledgement, `following` gets the number of frames that it took, and may
+        return another packet for the same node, which is sent at once, and so on; the result is
+        then that of the last packet.
         """
 
     def drop(self) -> None:

@@ -6,7 +6,7 @@ from typing import Callable
 
 from drone_mesh.channel.medium_access import Fate
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
-from drone_mesh.channel.radio import PacketRadio
+from drone_mesh.channel.radio import PacketRadio, Try
 from drone_mesh.channel.runtime import Runtime, Task
 from drone_mesh.channel.yielding import InTrain
 from drone_mesh.communication.packet_types import Priority
@@ -26,7 +26,7 @@ class Sender:
         on_delivered: Callable[[int, int], None],
         on_given_up: Callable[[bytes, int], None],
     ) -> None:
-        """Both functions are called in the sending thread, with the number of tries.
+        """Both functions are called in the sending thread, with the number of frames it took.
 
         `on_delivered` gets the node that received a packet, `on_given_up` a lost packet.
         """
@@ -103,11 +103,11 @@ class Sender:
     def _try(self, packet: OutgoingPacket) -> None:
         radio, access = self._radio, self._access
         if packet.receiver == ALL_NODES:
-            done = radio.broadcast(packet.payload)
+            outcome = Try(radio.broadcast(packet.payload), 1)
         else:
             retransmits, delay = access.retransmits()
 
-            def following() -> bytes | None:
+            def following(frames: int) -> bytes | None:
                 """The packet was delivered: return the next payload of its train."""
                 nonlocal packet
                 with self._lock:
@@ -115,16 +115,18 @@ class Sender:
                     more = access.following(packet, now_s)
                     if more is None:
                         return None
+                    packet.frames += frames
                     fate = access.tried(packet, True, now_s)
                 self._settle(packet, fate)
                 packet = more
                 return more.payload
 
-            done = radio.try_once(
+            outcome = radio.try_once(
                 packet.receiver, packet.payload, packet.tries > 0, retransmits, delay, following
             )
         with self._lock:
-            fate = access.tried(packet, done, self._runtime.now_s())
+            packet.frames += outcome.frames
+            fate = access.tried(packet, outcome.acknowledged, self._runtime.now_s())
         self._settle(packet, fate)
 
     def _settle(self, packet: OutgoingPacket, fate: Fate) -> None:
@@ -132,6 +134,6 @@ class Sender:
         if fate is Fate.GIVEN_UP:
             self._radio.drop()
             if not self._closed:
-                self._on_given_up(packet.payload, packet.tries)
+                self._on_given_up(packet.payload, packet.frames)
         elif fate is Fate.DELIVERED and packet.receiver != ALL_NODES and not self._closed:
-            self._on_delivered(packet.receiver, packet.tries)
+            self._on_delivered(packet.receiver, packet.frames)

@@ -34,7 +34,7 @@ class IMeshNetwork(abc.ABC):
 
     @abc.abstractmethod
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
-        """A neighbour received a queued packet, after `tries` attempts."""
+        """A neighbour received a queued packet after `tries`, the radio's own included."""
 
     @abc.abstractmethod
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:

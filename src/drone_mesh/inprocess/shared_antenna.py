@@ -142,6 +142,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
 
     def _send_frame(self, packet: OutgoingPacket) -> None:
         if packet is self._trying:
+            packet.frames += 1
             self._radio.airtime_s += self._settings.frame_s
             self._air.transmit(self, packet)
 
@@ -194,13 +195,13 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         if packet is None:
             return
         fate = self.access.tried(packet, acknowledged, now_s)
-        mesh, tries = self._mesh, packet.tries
+        mesh, frames = self._mesh, packet.frames
         if mesh is None or packet.receiver == ALL_NODES:
             pass
         elif fate is Fate.GIVEN_UP:
-            self._submit(lambda now_s: mesh.on_undelivered(packet.payload, tries, now_s))
+            self._submit(lambda now_s: mesh.on_undelivered(packet.payload, frames, now_s))
         elif fate is Fate.DELIVERED:
-            self._submit(lambda now_s: mesh.on_delivered(packet.receiver, tries, now_s))
+            self._submit(lambda now_s: mesh.on_delivered(packet.receiver, frames, now_s))
         self._plan()
 
     # Receiving -------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from typing import Callable
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.medium_access import Fate, MediumAccess
 from drone_mesh.channel.packet_queue import OutgoingPacket
+from drone_mesh.channel.radio import Try
 from drone_mesh.channel.runtime import Runtime, SystemRuntime
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
@@ -123,11 +124,11 @@ class NRF24LowLevelInterface:
         while True:
             retransmits, delay = access.retransmits()
             done = self.try_once(node_id, payload, packet.tries > 0, retransmits, delay)
-            fate = access.tried(packet, done, self._runtime.now_s())
+            fate = access.tried(packet, done.acknowledged, self._runtime.now_s())
             if fate is Fate.GIVEN_UP:
                 self.drop()
             if fate is not Fate.WAITS:
-                return done
+                return done.acknowledged
             self._pause(packet.not_before_s - self._runtime.now_s())
 
     def try_once(
@@ -137,13 +138,12 @@ class NRF24LowLevelInterface:
         again: bool,
         retransmits: int,
         delay: int,
-        following: Callable[[], bytes | None] = lambda: None,
-    ) -> bool:
-        """Try once to send a packet to a node; returns whether its chip has acknowledged it.
+        following: Callable[[int], bytes | None] = lambda _frames: None,
+    ) -> Try:
+        """Try once to send a packet to a node: see PacketRadio.
 
-        `again`: an earlier try failed. `retransmits`, `delay`: the chip's own, for this try. After
-        an acknowledgement, `following` may return another packet for the same node, which is sent
-        without listening in between, and so on; the result is then that of the last packet.
+        `retransmits`, `delay`: the chip's own. It does not listen between the packets of a train.
+        A chip that fails sends no frames.
 
         The acknowledgement returns to pipe 0, which has the receiver's address for this time. The
         program of 2019 opened pipe 3 for it, at the address of another node, so the sender received
@@ -152,25 +152,25 @@ class NRF24LowLevelInterface:
         chip, address = self._chip, self.settings.node_address(node_id)
         with self._lock:
             if not self._ready():
-                return False
+                return Try(False, 0)
             try:
                 chip.become_transmitter(address)
                 chip.load(address, payload, again=again)
                 chip.set_retries(delay, retransmits)
-                done = chip.transmit() is not None
-                while done:
-                    more = following()
+                outcome = chip.transmit()
+                while outcome.acknowledged:
+                    more = following(outcome.frames)
                     if more is None:
                         break
                     chip.load(address, more)
                     retransmits, delay = self.access.train_retransmits()
                     chip.set_retries(delay, retransmits)
-                    done = chip.transmit() is not None
+                    outcome = chip.transmit()
                 chip.listen()
             except RadioError as error:
                 self._failed(error)
-                return False
-            return done
+                return Try(False, 0)
+            return outcome
 
     def drop(self) -> None:
         """Give up the packet that was tried last: remove it from the chip."""

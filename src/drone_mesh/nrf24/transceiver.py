@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
+from drone_mesh.channel.radio import Try
 from drone_mesh.channel.runtime import Runtime
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.interfaces import PAYLOAD_BYTES
@@ -167,20 +168,17 @@ class Transceiver:
         self._loaded = (address, payload)
         self._last_sent[address] = (pid, payload)
 
-    def transmit(self) -> int | None:
-        """Send the loaded payload to a node; returns the number of the chip's retransmits.
-
-        None: it was not acknowledged, and stays in the chip for another try.
-        """
+    def transmit(self) -> Try:
+        """Send the loaded payload to a node; without an acknowledgement it stays in the chip."""
         flags = self._pulse(self._settings.acknowledged_s)
         retransmits = ARC_CNT.get(self._link.read_byte(Register.OBSERVE_TX))
         self._statistics.retries += retransmits
-        self._statistics.airtime_s += (retransmits + 1) * self._settings.frame_s
+        outcome = Try(bool(flags & TX_DS.mask), retransmits + 1)
+        self._statistics.airtime_s += outcome.frames * self._settings.frame_s
         self._link.write_byte(Register.STATUS, TX_DS.mask | MAX_RT.mask)
-        if not flags & TX_DS.mask:
-            return None
-        self._loaded = None
-        return retransmits
+        if outcome.acknowledged:
+            self._loaded = None
+        return outcome
 
     def transmit_to_all(self, payload: bytes) -> None:
         """Broadcast without acknowledgement, and listen again."""

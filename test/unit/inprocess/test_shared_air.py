@@ -107,14 +107,14 @@ def test_a_lost_acknowledgement_costs_a_frame_and_no_second_delivery():
     assert rig.meshes[0].undelivered == []
 
 
-def test_the_mesh_learns_after_how_many_tries_a_packet_was_delivered():
+def test_the_mesh_learns_after_how_many_frames_a_packet_was_delivered():
     rig = Rig(0.0, 6.0)
     lost = []
     rig.loses = lambda hop: len(lost) < 5 and not lost.append(hop)
     rig.antennas[0].broadcast_message(packet(0, 254))
     rig.antennas[0].send_message_to(packet(0, 1))
     rig.run(2.0)
-    assert rig.meshes[0].delivered == [(1, 3)]  # two frames per try
+    assert rig.meshes[0].delivered == [(1, 6)]  # two frames per try
 
 
 def test_a_receiver_that_is_gone_costs_18_frames_and_is_reported():

@@ -257,5 +257,12 @@ def test_two_damaged_frames_do_not_end_a_train(lab):
 
     lab.loses = loses
     waiting = iter(payloads[1:])
-    assert sender.try_once(2, payloads[0], False, 1, 2, lambda: next(waiting, None))
+    took = []
+
+    def following(frames):
+        took.append(frames)
+        return next(waiting, None)
+
+    assert sender.try_once(2, payloads[0], False, 1, 2, following) == (True, 1)
+    assert took == [1, 3, 1]
     assert [received.payload for received in receiver.receive(0.01)] == payloads

@@ -93,6 +93,24 @@ def test_a_packet_for_a_node_that_is_not_there_is_reported_as_undelivered(lab, n
     assert nodes[0].mesh.undelivered == [packet(9)]
 
 
+@pytest.mark.parametrize(("lost", "frames"), [(0, 1), (1, 2), (2, 3), (5, 6)])
+def test_the_quality_of_a_link_counts_the_frames_that_the_chip_repeats_by_itself(
+    lab, nodes, lost, frames
+):
+    left = iter([True] * lost)
+    lab.loses = lambda hop: hop.packet is not None and next(left, False)
+    nodes[0].antenna.send_message_to(packet(1))
+    lab.clock.sleep(5.0)
+    assert nodes[0].antenna.link_quality() == {1: (frames, 1.0)}
+    assert nodes[0].mesh.delivered == [(1, frames)]
+
+
+def test_the_quality_of_a_link_counts_the_frames_of_a_packet_that_is_given_up(lab, nodes):
+    nodes[0].antenna.send_message_to(packet(9))
+    lab.clock.sleep(12.0)
+    assert nodes[0].antenna.link_quality() == {9: (18.0, 0.0)}
+
+
 def test_a_node_that_is_not_there_does_not_delay_packets_for_others(lab, nodes):
     nodes[0].antenna.send_message_to(packet(9))
     lab.clock.sleep(0.1)  # the tries for node 9 go on for seconds

@@ -89,7 +89,8 @@ def test_sends_fail_as_often_as_was_measured(distance_m):
     packets = 2000 if distance_m >= 500 else 1000  # the rarer the loss, the less it scatters
     confirmed = 0
     for number in range(packets):
-        confirmed += sender.try_once(2, number.to_bytes(4, "little") + bytes(28), False, 15, 5)
+        payload = number.to_bytes(4, "little") + bytes(28)
+        confirmed += sender.try_once(2, payload, False, 15, 5).acknowledged
         receiver.receive(0.0)
     assert receiver.statistics().received == confirmed
     assert 1 - confirmed / packets == pytest.approx(MEASURED[distance_m], abs=0.01)

@@ -23,7 +23,7 @@ def lost(settings, distance):
 
     def send(sender, receiver, later_s, number):
         lab.clock.sleep(later_s)
-        return driver[sender].try_once(receiver, bytes((number,)) * 32, False, 0, 5)
+        return driver[sender].try_once(receiver, bytes((number,)) * 32, False, 0, 5).acknowledged
 
     failed = 0
     for number, later_s in enumerate(LATER_S):
