@@ -123,7 +123,9 @@ class AlwaysHalf(random.Random):
 class Rig:
     """A started component, its antenna and its drone, and the time they live in."""
 
-    def __init__(self, node_id=1, gateway=False, timing=None, debug=True, routing=None):
+    def __init__(
+        self, node_id=1, gateway=False, timing=None, debug=True, routing=None, repair=None
+    ):
         self.now_s = 0.0
         self.antenna = RecordingAntenna()
         self.engine = RigEngine()
@@ -143,7 +145,7 @@ class Rig:
             )
         else:
             self.mesh = MeshnetworkRouter(
-                node_id, *carried, AlwaysHalf(), timing, self.events.append, debug
+                node_id, *carried, AlwaysHalf(), timing, self.events.append, debug, repair
             )
         self.mesh.start(self.now_s)
         self.forget()

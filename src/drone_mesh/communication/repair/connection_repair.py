@@ -46,7 +46,9 @@ class ConnectionRepair(RepairViews):
     ) -> None:
         super().__init__(parts, states, control, options)
         self._strategy = strategy
-        self._lost_since_s = math.inf  # valid from LOSS_NOTICED until the router is AT_REST
+        # Valid from LOSS_NOTICED until the router is AT_REST:
+        self._lost_since_s = math.inf
+        self._emergency_s = math.inf  # when the time is up, as far as known
         self._checked_s: float | None = None  # when the first check during an election was due
         self._was_silent = False
         self._flight: RepairFlight | None = None
@@ -65,7 +67,8 @@ class ConnectionRepair(RepairViews):
             self._notice_loss(due_s)
         elif state is RepairState.LOST:
             self._was_silent = self.silent
-            if due_s >= self._emergency_s() - ROUNDING_S:
+            self._plan_emergency()
+            if due_s >= self._emergency_s - ROUNDING_S:
                 self._parts.report(MeshEventKind.EMERGENCY)
                 self._strategy.on_emergency()
         elif self._checked_s is None:
@@ -98,6 +101,7 @@ class ConnectionRepair(RepairViews):
             self._was_silent = False
             if self._states.repair is RepairState.LOST:
                 self._lost_since_s = self.now_s
+                self._plan_emergency()
         self._strategy.on_neighbour_found(node)
 
     def on_neighbour_lost(self, node: int) -> None:
@@ -145,7 +149,7 @@ class ConnectionRepair(RepairViews):
             bid_unit=strategy.bid_unit,
             place_of=strategy.bids_for if bids else NO_ROUTE,
             winner=strategy.winner if state is RepairState.WATCHING else NO_ROUTE,
-            emergency_s=self._emergency_s(),
+            emergency_s=self._emergency_s,
             silent=self.silent,
         )
 
@@ -280,15 +284,16 @@ class ConnectionRepair(RepairViews):
             return beside(step.place, origin, PITCH * self.clearance_m)
         return step.place
 
-    def _emergency_s(self) -> float:
+    def _plan_emergency(self) -> None:
         patience = self._strategy.patience(self.silent)
-        return self._lost_since_s + self.connection_lost_after_s * patience
+        self._emergency_s = self._lost_since_s + self.connection_lost_after_s * patience
 
     def _notice_loss(self, due_s: float) -> None:
         self._lost_since_s = due_s
         self._control.end(RouterEvent.LOSS_NOTICED)
         self._control.give_up_routes()
         self._strategy.on_gateway_lost()
+        self._plan_emergency()
 
     def _took_off(self) -> None:
         self._control.end(RouterEvent.TOOK_OFF)

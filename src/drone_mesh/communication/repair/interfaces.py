@@ -207,7 +207,9 @@ class IRepairStrategy(abc.ABC):
     def patience(self, silent: bool) -> float:
         """The wait before an emergency, as a multiple of `connection_lost_after`.
 
-        `silent`: see IRepairActions.silent.
+        Called after `on_gateway_lost`, at each check from then on until the emergency, and when a
+        node is heard after a silence, from which moment the time counts anew. `silent`: see
+        IRepairActions.silent.
         """
         return SILENCE_PATIENCE if silent else 1.0
 

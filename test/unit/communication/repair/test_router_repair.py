@@ -10,6 +10,7 @@ from rig import Rig, packet
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.repair.election import HOME_FAILED, TOOK_OFF, TOOK_OFF_HOME
 from drone_mesh.communication.repair.spots import own_spot
+from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 
@@ -975,6 +976,34 @@ def test_neighbours_that_it_flew_away_from_are_not_silent():
     rig.antenna.dead = {2, 3, 4}
     rig.wait_until(EMERGENCY_S + 0.1)
     assert rig.engine.goals[1:] == [NEIGHBOUR_PLACE]
+
+
+class Impatient(Thesis):
+    """Notes when it is asked for its patience."""
+
+    def __init__(self, rig):
+        self.rig = rig
+        self.asked_s = []
+
+    def patience(self, silent):
+        self.asked_s.append(self.rig[0].now_s)
+        return 0.5
+
+
+def test_a_strategy_is_asked_for_its_patience_at_the_checks_and_at_no_other_time():
+    holder = []
+    strategy = Impatient(holder)
+    rig = Rig(repair=strategy)
+    holder.append(rig)
+    rig.connect_through(2)
+    rig.hear("00 02 01 01 01 00 00 80 40", NEIGHBOUR_2_AT_0_8)
+    rig.antenna.dead = {2}
+    for _ in range(400):
+        rig.hear("03 03 04 01 01")  # a node without a gateway
+        rig.wait(0.1)
+    assert "EMERGENCY" in rig.kinds()
+    assert strategy.asked_s == pytest.approx([15.0, 25.0, 35.0])
+    assert rig.kinds().count("EMERGENCY") == 1
 
 
 # In flight -----------------------------------------------------------------------------------
