@@ -10,6 +10,7 @@ import math
 from drone_mesh.channel.access_rules import AccessRules
 from drone_mesh.channel.antenna import PacketAntenna
 from drone_mesh.channel.medium_access import MediumAccess
+from drone_mesh.channel.radio import Try
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.medium import Medium
 from drone_mesh.inprocess.interfaces import IInProcessAir, IInProcessAntenna
@@ -59,11 +60,11 @@ class SlowRadio:
     def try_once(self, node_id, payload, again, retransmits, delay, following):
         done = self._exchange(node_id, payload, again)
         while done:
-            payload = following()
+            payload = following(1)
             if payload is None:
-                return True
+                return Try(True, 1)
             done = self._exchange(node_id, payload, again=False)
-        return False
+        return Try(False, 1)
 
     def drop(self):
         """Nothing is kept for another try."""
