@@ -12,6 +12,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.autopilots import PX4, Autopilot
 from drone_mesh.drone.mavlink.pending_command import PendingCommand
 from drone_mesh.drone.mavlink.pilot_status import Phase
+from drone_mesh.errors import GoalRefused
 
 BOTH = pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4], ids=lambda a: a.name)
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
@@ -131,3 +132,20 @@ def test_on_a_line_that_loses_one_message_in_twenty_a_flight_goes_up_across_and_
     assert rig.status().ended == ""
     assert rig.place.distance_m(Location(20.0, 10.0, 0.0)) < 1.0
     assert not rig.vehicle.body.armed
+
+
+@BOTH
+def test_a_flight_that_makes_no_progress_ends_and_no_repair_follows(autopilot: Autopilot) -> None:
+    rig = Rig(autopilot).ready()
+    rig.goal(100.0, 0.0, 5.0)
+    rig.run_until("it is on its way", lambda: rig.place.latitude > 10.0)
+    rig.vehicle.body.speed_m_s = 0.0  # as at a fence, beyond which it takes no targets
+    rig.run_until("it gave up", lambda: not rig.status().is_flying, within_s=25.0)
+    assert rig.status().ended == "the drone has not moved for 20 s"
+    rig.vehicle.body.speed_m_s = 5.0
+    with pytest.raises(GoalRefused, match="the last flight made no progress"):
+        rig.repair(0.0, 0.0, 5.0)
+    assert rig.status().why_not_repair == "the last flight made no progress"
+    rig.goal(0.0, 0.0, 5.0)  # an order may try elsewhere
+    rig.reach(Phase.HOLDING)
+    assert rig.status().why_not_repair == ""

@@ -29,6 +29,9 @@ TARGETS_BEFORE_MODE_S = 1.0  # PX4 needs targets for a second before it enters O
 TAKE_OFF_M = 3.0  # our choice: above home, before the route begins
 TAKEN_OFF_WITHIN_M = 1.0  # our choice
 TAKE_OFF_WITHIN_S = 40.0  # our choice: the motors spool up first, and a climb may be slow
+NO_PROGRESS = "the last flight made no progress"
+STALLED_S = 20.0  # our choice: a flight that moves less than STALLED_M in this time has ended
+STALLED_M = 1.0  # our choice: more than the noise of a position
 _MODE_CHANGED = (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)
 
 _log = logging.getLogger(__name__)
@@ -61,6 +64,8 @@ class MavlinkPilot:
         self._ended = ""  # why the last flight ended before its goal
         self._route: Route | None = None
         self._hold: Location | None = None
+        self._stalled = False  # the last flight made no progress
+        self._moved: tuple[Location, float] | None = None  # where it last moved, and when
         self._target_due_s = -math.inf
         self._last_tick_s = -math.inf
 
@@ -88,9 +93,12 @@ class MavlinkPilot:
         reason = self._authority.why_not(now_s, self._phase, for_repair)
         if reason:
             raise GoalRefused(f"the drone cannot fly: {reason}")
+        if for_repair and self._stalled:
+            raise GoalRefused(f"the drone cannot fly: {NO_PROGRESS}")
         home = self._area.home()
         assert home is not None  # otherwise there was a reason
         self._limits.check(goal, home)
+        self._stalled = False
         self._goal, self._lands, self._for_repair = goal, lands, for_repair
         self._ended = ""
         _log.info(
@@ -131,7 +139,8 @@ class MavlinkPilot:
             location_trouble=trouble,
             home=self._area.home(),
             why_not_fly=self._authority.why_not(now_s, self._phase),
-            why_not_repair=self._authority.why_not(now_s, self._phase, for_repair=True),
+            why_not_repair=self._authority.why_not(now_s, self._phase, for_repair=True)
+            or (NO_PROGRESS if self._stalled else ""),
             ended=self._ended,
             autopilot=autopilot.name if autopilot else "",
             mode=autopilot.mode_name(telemetry.mode) if autopilot else "",
@@ -271,6 +280,7 @@ class MavlinkPilot:
             self._limits.speed_m_s,
         )
         self._commander.no_command()
+        self._moved = None
         self._enter(Phase.FLYING, now_s)
 
     def _fly_on(self, passed_s: float, now_s: float) -> None:
@@ -279,12 +289,21 @@ class MavlinkPilot:
         assert route is not None
         if not route.advance(here, passed_s):
             self._send_target(route.target, now_s)
+            self._watch_progress(here, now_s)
         elif self._lands:
             self._enter(Phase.LANDING, now_s)
         else:
             self._hold = route.end
             self._enter(Phase.HOLDING, now_s)
             _log.info("node %d: the drone has arrived and hovers", self._node_id)
+
+    def _watch_progress(self, here: Location, now_s: float) -> None:
+        """An autopilot drops targets beyond its fence without a word, and one may have crashed."""
+        if self._moved is None or here.distance_m(self._moved[0]) > STALLED_M:
+            self._moved = (here, now_s)
+        elif now_s - self._moved[1] > STALLED_S:
+            self._stalled = True
+            self._let_go(f"the drone has not moved for {STALLED_S:g} s", now_s)
 
     def _land(self, now_s: float) -> None:
         telemetry = self._telemetry
