@@ -126,7 +126,8 @@ def test_when_the_node_is_killed_the_copter_goes_home_and_the_next_node_leaves_i
         rig.start_engine()
         rig.pilot.until("heard", lambda: bool(rig.engine.status().mode), 30.0)
         rig.pilot.until("known", lambda: "RTL" in rig.engine.why_not_fly(), 30.0)
-        asked = nobody_flies_it(rig)
+        asked = rig.engine.why_not_fly()
+        nobody_flies_it(rig)
         assert rig.pilot.mode == "RTL"
         row(Failure("the node is killed", {}, "RTL"), rig, "RTL", "", asked)
 

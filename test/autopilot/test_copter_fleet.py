@@ -32,6 +32,7 @@ pytestmark = pytest.mark.timeout(1800)  # flights last
 
 RUNS = int(os.environ.get("AUTOPILOT_RUNS", "1"))
 NEAREST_M = 5.0
+SOURCE = Path(__file__).resolve().parents[2] / "src"
 HEARD_S = 12.0  # two check periods
 FIRST_INSTANCE = 10  # apart from those of other tests
 HOMES = {  # on the ground
@@ -128,6 +129,13 @@ class Fleet:
         heard = [n for n in nodes if n["next_hop"] is not None and n["heard_s_ago"] is not None]
         return {n["id"] for n in heard if n["heard_s_ago"] < HEARD_S}
 
+    def gateway_error_m(self) -> float:
+        """How far the places that the gateway shows are from those of the ground stations."""
+        shown = {n["id"]: n["place"] for n in (self.ask("mesh?after=0") or {"nodes": []})["nodes"]}
+        if any(shown.get(node) is None for node in HOMES):
+            return math.inf
+        return max(self.places[node].distance_m(Location(*shown[node])) for node in HOMES)
+
     def watch(self) -> None:
         """Read all positions once; keep the smallest distance."""
         for node, pilot in self.pilots.items():
@@ -175,7 +183,10 @@ class Fleet:
         code = f"import sys; from {module} import main; sys.exit(main())"
         with (self._folder / f"{name}.log").open("ab") as log:
             process = subprocess.Popen(
-                [sys.executable, "-c", code, *options], stdout=log, stderr=log
+                [sys.executable, "-c", code, *options],
+                env={**os.environ, "PYTHONPATH": str(SOURCE)},
+                stdout=log,
+                stderr=log,
             )
         self._stack.callback(process.wait)
         self._stack.callback(process.kill)
@@ -211,6 +222,8 @@ def test_six_copters_keep_the_mesh_together_and_apart_from_each_other(
     )
     fleet.until("all are connected", lambda: fleet.reachable() >= everybody)
     say("the layout is flown, everybody is connected")
+    fleet.until("the gateway knows the places", lambda: fleet.gateway_error_m() < 3.0)
+    say(f"gateway and ground stations agree on all places within {fleet.gateway_error_m():.1f} m")
 
     mission = [Location(-40.0, 60.0, 20.0), Location(-60.0, 30.0, 20.0), Location(-40.0, 5.0, 20.0)]
     pilot = fleet.pilots[ON_MISSION]
