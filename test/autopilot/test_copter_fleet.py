@@ -54,7 +54,6 @@ LAYOUT = {
 RELAY, TAKEN, ON_MISSION = 3, 2, 4
 NODE_OPTIONS = (
     *("--origin", "52.0907,5.1214,3", "--check-period", "5", "--connection-lost-after", "15"),
-    *("--report-period", "5"),
 )
 
 
