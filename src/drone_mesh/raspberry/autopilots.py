@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import signal
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Sequence
 
@@ -17,7 +19,6 @@ from drone_mesh.raspberry.arducopter import ArduCopter, program_from_environment
 from drone_mesh.raspberry.emulated_air import column_place
 from drone_mesh.raspberry.emulated_fleet import DEMONSTRATION_ORIGIN
 from drone_mesh.raspberry.pilot_side import PilotSide
-from drone_mesh.stopping import StopRequest
 
 MOST_COPTERS = 16  # our choice
 POLL_S = 0.5
@@ -39,7 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parsed = parser.parse_args(arguments)
     try:
         origin = Origin.parse(parsed.origin) if parsed.origin else DEMONSTRATION_ORIGIN
-        _run(parsed.copters, origin, parsed.speedup)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with contextlib.suppress(KeyboardInterrupt):
+            _run(parsed.copters, origin, parsed.speedup)
     except MeshError as error:
         print(f"scripts/autopilots: {error}", file=sys.stderr)
         return 1
@@ -50,7 +53,6 @@ def _run(copters: int, origin: Origin, speedup: float) -> None:
     program = program_from_environment()
     as_text = f"{origin.latitude_deg:g},{origin.longitude_deg:g},{origin.altitude_m:g}"
     with contextlib.ExitStack() as stack:
-        request = stack.enter_context(StopRequest())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="autopilots-")))
         fleet = []
         for node_id in range(1, copters + 1):
@@ -74,7 +76,8 @@ def _run(copters: int, origin: Origin, speedup: float) -> None:
                 flush=True,
             )
         print(f"{copters} copters are ready; their pilots' ports stay open", flush=True)
-        while not request.wait(POLL_S):
+        while True:
+            time.sleep(POLL_S)
             for pilot in pilots:
                 pilot.read(0.0)
 
