@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 
 from drone_mesh import Step, Thesis
-from drone_mesh.lab import run_sequence
+from drone_mesh.lab import measure_all, run_sequence
 
 
 class LowestId(Thesis):
@@ -25,10 +25,10 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5, help="sequences (default: %(default)s)")
     runs = parser.parse_args().runs
     for repair in ("thesis", f"{__name__}:LowestId"):
-        outcomes = [run_sequence(seed, repair) for seed in range(runs)]
-        healed = sum(outcome.healed for outcome in outcomes)
-        flown_m = sum(outcome.flown_m for outcome in outcomes)
-        print(f"{repair}: {healed} nodes connected again within 120 s, {flown_m:.0f} m flown")
+        outcomes = [measure_all(run_sequence(number, repair)) for number in range(runs)]
+        back = sum(outcome["times_back"] for outcome in outcomes)
+        flown_m = sum(outcome["distance_total_m"] for outcome in outcomes)
+        print(f"{repair}: {back:.0f} nodes connected again within 120 s, {flown_m:.0f} m flown")
 
 
 if __name__ == "__main__":

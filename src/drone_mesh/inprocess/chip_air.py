@@ -42,11 +42,19 @@ class ChipAntenna(NRF24HighLevelInterface, IInProcessAntenna):
         )
         super().__init__(driver, host.submit, runtime=clock)
         self._drone = host.drone
-        self._in_a_task = air.run
+        self._air = air
+
+    def send_message_to(self, payload: bytes) -> bool:
+        self._air.on_packet(payload)
+        return super().send_message_to(payload)
+
+    def broadcast_message(self, payload: bytes) -> None:
+        self._air.on_packet(payload)
+        super().broadcast_message(payload)
 
     def switch_power(self, on: bool) -> None:
         """Power on or off, as soon as the driver has done so."""
-        self._in_a_task(functools.partial(super().switch_power, on))
+        self._air.run(functools.partial(super().switch_power, on))
 
     def move(self) -> None:
         """Its drone is elsewhere."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Protocol
+from typing import Any, Callable, Optional, Protocol
 
 from drone_mesh.air.obstacles import NO_PATH
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath, PlanFlight
@@ -20,6 +20,10 @@ class Time(Protocol):
     def now_s(self) -> float: ...
 
     def call_at(self, at_s: float, function: Callable[[Any], None], argument: Any) -> None: ...
+
+
+OnPath = Callable[[Optional[FlightPath], FlightPath], None]
+"""Called with the path so far (None: at rest) and the new one."""
 
 
 class InProcessDrone(IDroneEngine):
@@ -40,6 +44,7 @@ class InProcessDrone(IDroneEngine):
         self._path: FlightPath | None = None
         self._on_flight = on_flight
         self.under_pilot = False  # until an order ends the pilot's flight
+        self._observers: list[OnPath] = []
         self.speed_m_s = SPEED_M_S  # of its next flight; experiments with wind change it
         # Returns None if there is no path; the drone then stays. Obstacles replace this planner.
         self.plan_flight: PlanFlight = FlightPath
@@ -66,8 +71,14 @@ class InProcessDrone(IDroneEngine):
             self._on_flight(True)
         else:
             self.flown_m += math.dist(self._path.start, here.to_vector())
-        self._path = plan
-        self._clock.call_at(self._clock.now_s + self._path.duration_s, self._arrive, self._path)
+        before, self._path = self._path, plan
+        self._clock.call_at(self._clock.now_s + plan.duration_s, self._arrive, plan)
+        for observer in self._observers:
+            observer(before, plan)
+
+    def observe(self, observer: OnPath) -> None:
+        """Tell this observer of each flight from now on."""
+        self._observers.append(observer)
 
     def put(self, place: Location) -> None:
         """A pilot has flown it there; it is not on a flight."""

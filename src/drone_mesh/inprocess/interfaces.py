@@ -52,6 +52,9 @@ class IInProcessAir(abc.ABC):
 
     clock: Clock
     max_distance_m: float  # the range, for pictures and path searches
+    on_packet: Callable[[bytes], object] = len
+    """Called with each packet that a mesh hands to its antenna, except on the disc, which has
+    `carries`; set by experiments."""
 
     @property
     @abc.abstractmethod

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import abc
 import math
-from typing import Iterable
+from typing import Callable, Iterable
 
 from drone_mesh.channel.packet_queue import ALL_NODES, OutgoingPacket
 from drone_mesh.drone.interfaces import IDroneEngine
@@ -87,6 +87,8 @@ class SharedAir(IInProcessAir):
         self.collisions = 0  # receptions that another frame destroyed
         self.payloads = 0  # that reached a mesh component
         self.airtime_s = 0.0  # of all frames together
+        # Called with the packet of each frame that begins; set by experiments.
+        self.on_frame: Callable[[OutgoingPacket], object] = id
         self._bits_per_s = settings.data_rate.value
         self._carrier_mhz = 2400 + settings.channel
         self._capture_db = CAPTURE_DB[self._bits_per_s]
@@ -138,6 +140,7 @@ class SharedAir(IInProcessAir):
         self, sender: SharedRadio, packet: OutgoingPacket, answers: SharedRadio | None = None
     ) -> None:
         """Start sending a frame now."""
+        self.on_frame(packet)
         now_s = self.clock.now_s
         duration_s = self._packet_s if answers is None else self._answer_s
         frame = Transmission(sender, packet, answers, now_s, now_s + duration_s)

@@ -83,6 +83,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
 
     def send_message_to(self, payload: bytes) -> bool:
         """Queue it for the node in byte 3."""
+        self._air.on_packet(payload)
         to = receiver(payload)
         if not self.powered or to > MAX_NODE_ID or to == self.node_id:
             return False
@@ -92,6 +93,7 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
 
     def broadcast_message(self, payload: bytes) -> None:
         """Queue one frame for all nodes."""
+        self._air.on_packet(payload)
         if self.powered:
             self.access.offer(ALL_NODES, payload, self._clock.now_s, priority(payload))
             self._plan()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Callable, Iterable
 
+from drone_mesh.air.graph import hops_from
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.inprocess.clock import Clock
@@ -38,30 +39,15 @@ class LinkMap:
 
     def hops_from(self, starts: Iterable[int]) -> dict[int, int]:
         """Hops of the shortest path from one of `starts`, by node; only nodes with a path."""
-        hops = dict.fromkeys(starts, 0)
-        edge = list(hops)
-        while edge:
-            reached = []
-            for node in edge:
-                for other in self._links(node):
-                    if other not in hops:
-                        hops[other] = hops[node] + 1
-                        reached.append(other)
-            edge = reached
-        return hops
+        return hops_from(starts, self._links)
 
     def _paths_to(self, destination: int) -> dict[int, int]:
-        next_hops: dict[int, int] = {}
-        edge = [destination]
-        while edge:
-            reached: dict[int, int] = {}
-            for node in sorted(edge):
-                for other in self._links(node):
-                    if other != destination:
-                        reached.setdefault(other, node)
-            edge = [node for node in reached if node not in next_hops]
-            next_hops.update((node, reached[node]) for node in edge)
-        return next_hops
+        hops = hops_from([destination], self._links)
+        return {
+            node: min(other for other in self._links(node) if hops.get(other) == away - 1)
+            for node, away in hops.items()
+            if away
+        }
 
 
 class ShortestPath(ChildTableTree):

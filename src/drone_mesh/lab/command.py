@@ -18,7 +18,7 @@ from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
 from drone_mesh.lab.proofs.attacks import ATTACKS
-from drone_mesh.lab.proofs.damage import KEY, keys_of, table
+from drone_mesh.lab.proofs.damage import KEY, damage_table, keys_of
 from drone_mesh.lab.proofs.fuzz import NODES, crowd, fuzz
 from drone_mesh.lab.status import describe_folder
 from drone_mesh.lab.template import write_template
@@ -105,6 +105,13 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         help="also write each figure or table as a file: png, pdf, svg, csv or latex; repeatable",
     )  # fmt: skip
     report.set_defaults(run=_report)
+
+    tables = commands.add_parser("tables", help="print the tables of the report as Markdown")
+    tables.add_argument("results", type=Path, help=_RESULTS)
+    tables.add_argument(
+        "--only", choices=("cells", "healing", "paired", "worst"), help="one of them, alone"
+    )
+    tables.set_defaults(run=_tables)
 
     show = commands.add_parser("show", help="repeat one run, with all its events")
     show.add_argument("results", type=Path, help=_RESULTS)
@@ -193,7 +200,7 @@ def _attack(options: argparse.Namespace) -> int:
     if options.runs < 1:
         raise MeshError(f"invalid --runs {options.runs}: must be 1 or more")
     logging.disable(logging.WARNING)  # an attacked mesh logs a lot
-    for line in table(options.attacks or list(ATTACKS), options.runs):
+    for line in damage_table(options.attacks or list(ATTACKS), options.runs):
         print(line, flush=True)
     return 0
 
@@ -302,6 +309,18 @@ def _report(options: argparse.Namespace) -> int:
     return 0
 
 
+def _tables(options: argparse.Namespace) -> int:
+    from drone_mesh.lab.results import load_results
+    from drone_mesh.lab.tables import all_tables
+
+    for table in all_tables(load_results(options.results)):
+        if options.only is None:
+            print(f"{table.title}. {table.caption}\n\n{table.to_markdown()}")
+        elif table.name == options.only:
+            print(table.to_markdown(), end="")
+    return 0
+
+
 def _show(options: argparse.Namespace) -> int:
     from drone_mesh.lab.show import show_run
 
@@ -316,9 +335,11 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _metrics(_options: argparse.Namespace) -> int:
-    from drone_mesh.lab.metrics import METRICS
+    from drone_mesh.communication.messages import MessageType
+    from drone_mesh.lab.metrics import listed
 
-    width = max(map(len, METRICS))
-    for name, metric in METRICS.items():
+    width = max(map(len, listed()))
+    for name, metric in listed().items():
         print(f"{name:{width}}  {metric.unit:10}  {metric.definition}")
+    print(f"TYPE: {', '.join(kind.name.lower() for kind in MessageType)}")
     return 0

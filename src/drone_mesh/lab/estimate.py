@@ -91,17 +91,7 @@ def _trial(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
 
 def _try_packets(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
     started_s = clock()
-    simulation = simulation_of(spec)
-    virtual = simulation.network.clock
-    run_until, simulating_s = virtual.run_until, 0.0
-
-    def timed(until_s: float) -> None:
-        nonlocal simulating_s
-        before_s = clock()
-        run_until(until_s)
-        simulating_s += clock() - before_s
-
-    virtual.run_until = timed  # type: ignore[method-assign]
+    simulation = simulation_of(spec, clock)
     duration_s = simulation.scenario.duration_s
     samples = [(0.0, clock() - started_s)]  # simulated seconds, processor time until then
     for now_s in simulation.samples():
@@ -111,7 +101,7 @@ def _try_packets(spec: RunSpec, most_s: float, clock: Clock) -> Trial:
     measured(simulation.record(), spec.own_metrics)
     simulation.event_hash()
     run_s = clock() - started_s
-    return Trial(run_s, run_s - simulating_s)
+    return Trial(run_s, run_s - simulation.simulating_s)
 
 
 def _extrapolated(samples: Sequence[tuple[float, float]], duration_s: float) -> float:

@@ -33,9 +33,10 @@ def check_technique(kind: str, name: str, model: str) -> None:
     """Raise ConfigurationError if there is no such routing or repair technique."""
     if kind == "repair" and model == "ideal":
         from drone_mesh.lab.ideal import IDEAL_RULES
+        from drone_mesh.lab.ideal_plans import IDEAL_PLANS
 
-        if name not in IDEAL_RULES:
-            known = ", ".join(sorted(IDEAL_RULES))
+        if name not in {**IDEAL_RULES, **IDEAL_PLANS}:
+            known = ", ".join(sorted({**IDEAL_RULES, **IDEAL_PLANS}))
             raise ConfigurationError(f"unknown rule {name!r} for model ideal: use one of {known}")
         return
     with _one_line(f"{kind} {name!r} cannot be created"):

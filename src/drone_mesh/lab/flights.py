@@ -46,10 +46,7 @@ class Flights:
         self._may_fly_m: dict[int, float] = {}
         self._on_empty: Callable[[int], None] = lambda node: None
         for node_id, node in network.nodes.items():
-            drone = node.drone
-            drone.set_goal = functools.partial(  # type: ignore[method-assign]
-                self._set_goal, node_id, drone.set_goal
-            )
+            node.drone.observe(functools.partial(self._fly, node_id))
 
     @property
     def in_the_air(self) -> list[int]:
@@ -71,22 +68,13 @@ class Flights:
             if node in self._current:
                 self._plan_end_of_battery(self._current[node])
 
-    def _set_goal(
-        self, node: int, fly: Callable[[float, float, float], None], *goal: float
-    ) -> None:
-        drone = self._network.nodes[node].drone
-        before = drone.path
-        had_path = before is None and self._has_path(node)
-        fly(*goal)
-        path = drone.path
-        if path is None or path is before:
-            return
+    def _fly(self, node: int, before: FlightPath | None, path: FlightPath) -> None:
         last = self._current.get(node)
         if last is not None:
             if before is not None:
                 last.replaced_s = path.start_s
             self._flown_m[node] = self._flown_m.get(node, 0.0) + last.metres_until(path.start_s)
-        is_false = self._decided_by_itself(node) and had_path
+        is_false = before is None and self._decided_by_itself(node) and self._has_path(node)
         leg = Leg(node, path, before is None, is_false)
         self._current[node] = leg
         self.legs.append(leg)

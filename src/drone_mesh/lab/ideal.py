@@ -12,8 +12,12 @@ from typing import Callable, NamedTuple
 
 import numpy as np
 
+from drone_mesh.air.graph import Graph, within
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.ideal_plans import IDEAL_PLANS, ROUNDING_M
 from drone_mesh.lab.metrics import METRICS, STACKED_M, covered
+from drone_mesh.lab.picking import cut_vertices_of
 from drone_mesh.lab.places import draw_places
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
@@ -131,42 +135,74 @@ def _blocks(swarm: Swarm, direction: Callable[[np.ndarray], np.ndarray]) -> np.n
     return moves
 
 
+class Flown(NamedTuple):
+    """The flights of a repair. Arrays have one row per survivor."""
+
+    places: np.ndarray  # (n, 2), m, at the end
+    metres: np.ndarray  # (n,)
+    end_s: float  # of the last step
+    touched: int  # pairs nearer than STACKED_M at some time
+
+
 def run_ideal(scenario: Scenario, streams: Streams) -> tuple[dict[str, float], str]:
     """All metrics (NaN for those undefined without packets), and a hash of the final positions.
 
-    Raises ConfigurationError unless the scenario is one kill of a random share or number.
+    Raises ConfigurationError unless the scenario is one kill of a random share or number, or of
+    cut vertices.
     """
     kill = scenario.faults[0].kill if len(scenario.faults) == 1 else None
-    if kill is None or kill.pick != "random" or kill.ids is not None:
-        raise ConfigurationError("model ideal: faults must be one random kill")
+    if kill is None or kill.pick not in ("random", "cut_vertex") or kill.ids is not None:
+        raise ConfigurationError("model ideal: faults must be one random kill or cut vertices")
     starts = draw_places(scenario.layout, scenario.range_m, streams.of("layout"))
     places = np.array([(start.x, start.y) for start in starts])
     gateways = [index for index, start in enumerate(starts) if start.gateway]
     fit = [i for i in range(len(starts)) if not (kill.spare == "gateways" and i in gateways)]
     number = kill.number if kill.number is not None else round((kill.share or 0.0) * len(fit))
-    victims = streams.of("fault 0").sample(fit, min(number, len(fit)))
+    rng = streams.of("fault 0")
+    if kill.pick == "cut_vertex":  # as in a run with packets, which draws the same victims
+        graph = Graph(within(dict(enumerate(places.tolist())), scenario.range_m))
+        order = rng.sample(range(len(starts)), len(starts))
+        victims = cut_vertices_of(graph, gateways, order, number)
+    else:
+        victims = rng.sample(fit, min(number, len(fit)))
     alive = np.array(sorted(set(range(len(starts))) - set(victims)))
     if not set(gateways) & set(alive.tolist()):
         raise ConfigurationError("model ideal: no gateway is left")
-    return _repair(scenario, places, alive, victims, gateways)
+    if scenario.repair in IDEAL_PLANS:
+        flown = _planned(scenario, places, alive, victims)
+    else:
+        flown = _stepped(scenario, places, alive, victims, gateways)
+    return _measured(scenario, places, alive, victims, gateways, flown)
 
 
-def _repair(
+def _planned(scenario: Scenario, start: np.ndarray, alive: np.ndarray, victims: list[int]) -> Flown:
+    """The flights of a rule that plans all of them at once."""
+    places = {int(node): Location.from_vector((*start[node], 0.0)) for node in alive}
+    flown: dict[int, float] = {}
+    if victims:
+        hole = Location.from_vector((*start[victims[0]], 0.0))
+        places, flown = IDEAL_PLANS[scenario.repair](places, hole, scenario.range_m)
+    end = np.array([places[int(node)].to_vector()[:2] for node in alive])
+    metres = np.array([flown.get(int(node), 0.0) for node in alive])
+    return Flown(end, metres, float(metres.max()) / scenario.speed_m_s, 0)
+
+
+def _stepped(
     scenario: Scenario,
     start: np.ndarray,
     alive: np.ndarray,
     victims: list[int],
     gateways: list[int],
-) -> tuple[dict[str, float], str]:
+) -> Flown:
+    """The flights of a rule that decides in each step."""
     rule = IDEAL_RULES[scenario.repair]
     range_m, dead = scenario.range_m, start[victims]
     places = start[alive].copy()
-    home_row = int(np.flatnonzero(alive == next(g for g in gateways if g in alive))[0])
+    home_row = _home_row(alive, gateways)
     lost_near = _near_lost(places, dead, range_m)
     before, flown = places.copy(), np.zeros(len(places))
     middle = (start.min(axis=0) + start.max(axis=0)) / 2
     near, parts = _parts(places, range_m)
-    first_parts, cut_off = int(parts.max()) + 1, int((parts != parts[home_row]).sum())
     steps, most = 0, round(scenario.duration_s / STEP_S) - 1
     pairs: set[tuple[int, int]] = set()
     while parts.max() > 0 and steps < most:
@@ -179,14 +215,32 @@ def _repair(
         steps += 1
         near, parts = _parts(places, range_m)
         pairs |= _touching(places, moves)
+    return Flown(places, flown, steps * STEP_S, len(pairs))
+
+
+def _home_row(alive: np.ndarray, gateways: list[int]) -> int:
+    return int(np.flatnonzero(alive == next(g for g in gateways if g in alive))[0])
+
+
+def _measured(
+    scenario: Scenario,
+    start: np.ndarray,
+    alive: np.ndarray,
+    victims: list[int],
+    gateways: list[int],
+    repair: Flown,
+) -> tuple[dict[str, float], str]:
+    places, flown, end_s, range_m = repair.places, repair.metres, repair.end_s, scenario.range_m
+    home_row = _home_row(alive, gateways)
+    _near, first_parts = _parts(start[alive], range_m)
+    near, parts = _parts(places, range_m)
     healed = parts.max() == 0
-    end_s = steps * STEP_S
     shifts = np.linalg.norm(places - start[alive], axis=1)
     values = dict.fromkeys(METRICS, math.nan)
     values.update(
         healed=float(healed),
-        split=float(first_parts > 1),
-        cut_off=float(cut_off),
+        split=float(first_parts.max() > 0),
+        cut_off=float((first_parts != first_parts[home_row]).sum()),
         victims=float(len(victims)),
         t_total_s=end_s if healed else math.nan,
         t_capped_s=end_s,
@@ -194,7 +248,7 @@ def _repair(
         t_decide_s=0.0 if healed else math.nan,
         t_fly_s=end_s if healed else math.nan,
         t_reroute_s=0.0 if healed else math.nan,
-        observed_s=most * STEP_S,
+        observed_s=(round(scenario.duration_s / STEP_S) - 1) * STEP_S,
         connected_share=float((parts == parts[home_row]).mean()),
         distance_total_m=float(flown.sum()),
         distance_max_m=float(flown.max()),
@@ -202,7 +256,7 @@ def _repair(
         moved=float((flown > 0).sum()),
         displacement_mean_m=float(shifts.mean()),
         displacement_max_m=float(shifts.max()),
-        collisions=float(len(pairs)),
+        collisions=float(repair.touched),
         stacked=float(len({row for pair in _close(places) for row in pair})),
         parts_before=1.0,
         parts_after=float(parts.max() + 1),
@@ -218,7 +272,7 @@ def _parts(places: np.ndarray, range_m: float) -> tuple[np.ndarray, np.ndarray]:
     from scipy.sparse.csgraph import connected_components
 
     gaps = places[:, None] - places[None]
-    near = (gaps * gaps).sum(axis=2) < range_m * range_m
+    near = (gaps * gaps).sum(axis=2) < (range_m + ROUNDING_M) ** 2
     np.fill_diagonal(near, False)
     return near, connected_components(near, directed=False)[1]
 

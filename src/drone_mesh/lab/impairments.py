@@ -9,11 +9,10 @@ from typing import Callable
 
 from drone_mesh.channel.packet_queue import OutgoingPacket
 from drone_mesh.communication import messages
-from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.radio import InProcessAir
-from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio
+from drone_mesh.inprocess.shared_air import SharedAir
 
 
 @dataclass
@@ -57,11 +56,10 @@ class Impairments:
         if isinstance(air, InProcessAir):
             air.carries = self.carries
         else:
-            for node in self.network.nodes.values():
-                self._watch(node.antenna)
+            air.on_packet = self._count
             if isinstance(air, SharedAir):
                 self.frames = {"control": 0, "data": 0}
-                self._watch_frames(air)
+                air.on_frame = self._count_frame
 
     @property
     def disc(self) -> InProcessAir:
@@ -69,33 +67,10 @@ class Impairments:
         assert isinstance(self.network.air, InProcessAir)
         return self.network.air
 
-    def _watch(self, antenna: IWirelessCommunication) -> None:
-        """Count the packets passed to an antenna of the shared channel."""
-        send, broadcast = antenna.send_message_to, antenna.broadcast_message
-
-        def counted_send(payload: bytes) -> bool:
-            self._count(payload)
-            return send(payload)
-
-        def counted_broadcast(payload: bytes) -> None:
-            self._count(payload)
-            broadcast(payload)
-
-        antenna.send_message_to = counted_send  # type: ignore[method-assign]
-        antenna.broadcast_message = counted_broadcast  # type: ignore[method-assign]
-
-    def _watch_frames(self, air: SharedAir) -> None:
-        """Count the frames on the air, tries and acknowledgements included."""
-        transmit, frames = air.transmit, self.frames
-        assert frames is not None
-
-        def counted(
-            sender: SharedRadio, packet: OutgoingPacket, answers: SharedRadio | None = None
-        ) -> None:
-            frames["data" if messages.is_data(packet.payload) else "control"] += 1
-            transmit(sender, packet, answers)
-
-        air.transmit = counted  # type: ignore[method-assign]
+    def _count_frame(self, packet: OutgoingPacket) -> None:
+        """Count a frame on the air; tries and acknowledgements are frames of their packet."""
+        assert self.frames is not None
+        self.frames["data" if messages.is_data(packet.payload) else "control"] += 1
 
     def carries(self, payload: bytes) -> bool:
         """Whether a packet is not lost."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from drone_mesh.lab.graph import Graph
+from drone_mesh.air.graph import Graph
 from drone_mesh.lab.network_sample import NetworkSample
 
 

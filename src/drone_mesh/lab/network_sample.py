@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drone_mesh.air.graph import Graph
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.inprocess import Network
-from drone_mesh.lab.graph import Graph
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import random
-from typing import Sequence
+from typing import Collection, Sequence
 
+from drone_mesh.air.graph import Graph
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
@@ -35,7 +36,7 @@ def pick_drones(
     else:
         number = len(fit)
     if pick.pick == "cut_vertex":
-        return _cut_vertices(network, order, number)
+        return cut_vertices_of(physical_graph(network), gateways, order, number)
     if pick.pick == "circle":
         fit = _in_circle(pick, network, fit, rng)
     elif pick.pick == "next_to_gateway":
@@ -46,9 +47,10 @@ def pick_drones(
     return fit[:number]
 
 
-def _cut_vertices(network: Network, order: Sequence[int], number: int) -> list[int]:
-    """Up to `number` nodes, each a cut vertex of what the previous ones leave."""
-    graph, gateways = physical_graph(network), gateways_of(network)
+def cut_vertices_of(
+    graph: Graph, gateways: Collection[int], order: Sequence[int], number: int
+) -> list[int]:
+    """Up to `number` nodes, each the first cut vertex in this order of what those before leave."""
     chosen: list[int] = []
     while len(chosen) < number:
         cuts = set(graph.cut_vertices(gateways))

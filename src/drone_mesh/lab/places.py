@@ -8,11 +8,11 @@ import random
 from pathlib import Path
 from typing import Callable, List, NamedTuple, Tuple
 
+from drone_mesh.air.graph import Graph, within
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.fleet import MAX_DRONES, plan_fleet
 from drone_mesh.drone.roles import Role
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.graph import Graph, within
 from drone_mesh.lab.scenario import Layout
 from drone_mesh.layouts import Layouts, UnknownCase
 
@@ -118,8 +118,8 @@ def _connected_points(
     draw = _clusters if layout.kind == "clusters" else _uniform
     for _ in range(MOST_DRAWS):
         points = draw(layout, range_m, rng.random)
-        if obstacles is not None and not all(obstacles.is_free((x, y, 0.0)) for x, y in points):
-            points = _moved_out(points, obstacles, layout, range_m, draw, rng)
+        if obstacles is not None or layout.least_distance_m:
+            points = _moved_apart(points, obstacles, layout, range_m, draw, rng)
         if layout.require == "nothing" or _graph(points, range_m, obstacles).is_connected():
             return points
     raise ConfigurationError(
@@ -128,27 +128,32 @@ def _connected_points(
     )
 
 
-def _moved_out(
+def _moved_apart(
     points: list[tuple[float, float]],
-    obstacles: Obstacles,
+    obstacles: Obstacles | None,
     layout: Layout,
     range_m: float,
     draw: Draw,
     rng: random.Random,
 ) -> list[tuple[float, float]]:
-    """Redraw positions in a box until there are none."""
+    """Redraw positions in a box, or too close to an earlier one, until there are none."""
     for _ in range(MOST_DRAWS):
-        inside = [i for i, (x, y) in enumerate(points) if not obstacles.is_free((x, y, 0.0))]
-        if not inside:
+        misplaced = [
+            i
+            for i, (x, y) in enumerate(points)
+            if (obstacles is not None and not obstacles.is_free((x, y, 0.0)))
+            or any(math.dist((x, y), other) < layout.least_distance_m for other in points[:i])
+        ]
+        if not misplaced:
             return points
         fresh = draw(layout, range_m, rng.random)
-        for index in inside:
+        for index in misplaced:
             points[index] = fresh[index]
-    raise ConfigurationError(f"layout {layout.kind}: the boxes leave no room for the drones")
+    raise ConfigurationError(f"layout {layout.kind}: there is no room for the drones")
 
 
 def _graph(points: list[tuple[float, float]], range_m: float, obstacles: Obstacles | None) -> Graph:
-    near = within(points, range_m)
+    near = within(dict(enumerate(points)), range_m)
     if obstacles is not None:
         near = {
             i: [

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Mapping, NamedTuple, Sequence, Tuple
 
+from drone_mesh.air.graph import Graph
 from drone_mesh.lab.flights import Leg
-from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.impairments import Traffic
 from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.network_sample import NetworkSample
@@ -62,6 +62,13 @@ class RunRecord:
     end_s: float
     airtime_s: float | None  # of all frames, on the shared channel
     frames_destroyed: int | None  # by other frames, on the shared channel
+    refused_flights: int
+    cut_offs: Sequence[ServiceGap]  # of routers without any path to a gateway right after a fault
+    in_the_air: frozenset[int]  # at the end
+    grounded: frozenset[int]  # drones that cannot fly
+    left_behind: Mapping[int, str]  # live routers that are not connected at the end -> why
+    able: frozenset[int]  # drones that can fly and know roughly where a gateway is, at the end
+    endless_packets: int  # dropped at the limit of hops
     refused_flights: int = 0
     links: LinkWatch | None = None  # of a run with motion or probes
     probes: Sequence[ProbeFate] = ()

@@ -14,7 +14,7 @@ from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.results import Results, load_results, number
 from drone_mesh.lab.show import replay
 from drone_mesh.lab.store import EXPERIMENT
-from drone_mesh.lab.tables import Table, cells_table, healing_table, paired_table, worst_table
+from drone_mesh.lab.tables import Table, all_tables
 
 _TEMPLATE = Path(__file__).resolve().parent / "report.html"
 PNG_DPI = 200
@@ -30,14 +30,7 @@ def write_report(folder: Path, out: Path | None, formats: Sequence[str]) -> list
     results = load_results(folder)
     if not results.rows:
         raise ReportError(f"{folder}: no run is finished yet")
-    tables = [
-        table
-        for table in (
-            cells_table(results), healing_table(results), paired_table(results),
-            worst_table(results),
-        )
-        if table is not None
-    ]  # fmt: skip
+    tables = all_tables(results)
     drawings = axis_drawings(results)
     drawings += [d for d in (phases_drawing(results), survival_drawing(results)) if d is not None]
     page = out or folder / "report.html"

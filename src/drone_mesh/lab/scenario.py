@@ -39,14 +39,15 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
+_RANDOM = ("drones", "width_m", "least_distance_m", "require", "gateway_at")
+
+
 class Layout(Part):
     """The start positions of the drones."""
 
     KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
-        "uniform": frozenset({"drones", "mean_degree", "width_m", "require", "gateway_at"}),
-        "clusters": frozenset(
-            {"drones", "clusters", "cluster_radius_m", "width_m", "require", "gateway_at"}
-        ),
+        "uniform": frozenset({"mean_degree", *_RANDOM}),
+        "clusters": frozenset({"clusters", "cluster_radius_m", *_RANDOM}),
         "grid": frozenset({"drones", "columns", "spacing_m"}),
         "line": frozenset({"drones", "spacing_m"}),
         "casus": frozenset({"case"}),
@@ -59,6 +60,7 @@ class Layout(Part):
     ids: Literal["in_order", "shuffled"] = "in_order"
     mean_degree: Optional[Annotated[float, Field(gt=0, le=253)]] = None  # uniform; default: 8
     width_m: Optional[Above0] = None  # of the square; uniform: instead of mean_degree
+    least_distance_m: AtLeast0 = 0.0  # between two drones
     require: Literal["connected", "nothing"] = "connected"
     gateway_at: Literal["middle", "corner", "random"] = "middle"
     clusters: Annotated[int, Field(ge=1, le=64)] = 4
@@ -360,6 +362,31 @@ class ObstacleSettings(Part):
     ceiling_m: Annotated[float, Field(gt=0, le=MAX_HEIGHT_M)] = MAX_HEIGHT_M  # of flights
 
 
+class Sequence(Part):
+    """A few random faults over a random mesh, all drawn from the seed; the run ends at rest.
+
+    It replaces layout, loss, faults and duration_s.
+    """
+
+    INCIDENTS: ClassVar[Tuple[str, ...]] = (
+        "cut_vertex_killed", "many_killed", "gateway_off", "gateway_moved",
+        "killed_in_negotiation", "killed_in_flight",
+    )  # fmt: skip
+
+    drones: Annotated[List[NodeId], Field(min_length=2, max_length=2)] = [8, 60]  # least, most
+    density: Annotated[List[Above0], Field(min_length=2, max_length=2)] = [7.0, 9.0]
+    """Least and most neighbours of a drone far from the edge."""
+    incidents: List[str] = list(INCIDENTS)
+
+    @field_validator("incidents")
+    @classmethod
+    def _are_known(cls, names: List[str]) -> List[str]:
+        for name in names:
+            if name not in cls.INCIDENTS:
+                raise ValueError(f"unknown incident {name}: use {', '.join(cls.INCIDENTS)}")
+        return names
+
+
 class Scenario(Part):
     """Everything that defines a run, except its seed."""
 
@@ -376,6 +403,8 @@ class Scenario(Part):
     positions: Positions = Positions()
     probes: Probes = Probes()
     faults: List[Fault] = []
+    sequence: Optional[Sequence] = None
+    grounded_share: Share = 0.0  # of the routers: their drones cannot fly
     duration_s: Annotated[float, Field(gt=0, le=1e6)] = 120.0
     sample_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0  # sampling period of the network
     speed_m_s: Annotated[float, Field(gt=0, le=100)] = 2.0  # of flights

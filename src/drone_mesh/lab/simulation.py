@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import math
+import time
 from dataclasses import replace
 from typing import Any, Callable, Iterator
 
 import numpy as np
 
+from drone_mesh.air.graph import Graph
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
 from drone_mesh.lab.flights import Flights
-from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.metrics import STACKED_M
@@ -29,7 +30,7 @@ from drone_mesh.lab.network_sample import (
 from drone_mesh.lab.places import StartPoint, draw_places
 from drone_mesh.lab.probes import ProbeSender
 from drone_mesh.lab.propagation import obstacles_of, put_obstacles
-from drone_mesh.lab.record import RunRecord, Topology
+from drone_mesh.lab.record import RunRecord, ServiceGap, Topology
 from drone_mesh.lab.scenario import Positions, Scenario
 from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.timeline import Timeline
@@ -39,17 +40,25 @@ from drone_mesh.state.observation import describe_obstacles
 
 FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
+ABLE_WITHIN_M = 1.0  # a place believed to be so near to the range leads to the gateway
+
 OnStatus = Callable[[MeshStatus], None]
+Stopwatch = Callable[[], float]
+"""Processor time of this process, in seconds."""
 
 
 class Simulation:
     """A run of a mesh with packets. Create it, call `run()` once, and read its record."""
 
-    def __init__(self, scenario: Scenario, streams: Streams) -> None:
+    def __init__(
+        self, scenario: Scenario, streams: Streams, stopwatch: Stopwatch = time.process_time
+    ) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self.scenario = scenario
         places = _places(scenario, streams)
         self.network = _network(scenario, streams, places)
+        self.simulating_s = 0.0  # processor time in the network, without the lab's own
+        self._stopwatch = stopwatch
         self.impairments = Impairments(self.network, streams.of, scenario.radio.loss)
         self._planner = put_obstacles(self.network, self.impairments, scenario)
         self.flights = Flights(self.network)
@@ -67,6 +76,8 @@ class Simulation:
         self._start: Topology | None = None
         self._before: Topology | None = None
         self._after_fault: Graph | None = None
+        self._cut_off: dict[int, float] = {}  # node -> since when
+        self._cut_offs: list[ServiceGap] = []  # that have ended
         self._pairs: set[tuple[int, int]] = set()
         self._min_distance_m = math.inf
 
@@ -80,21 +91,24 @@ class Simulation:
 
     def samples(self) -> Iterator[float]:
         """Let time pass until the end; yields the time (s) of each sample once it is taken."""
-        network, scenario = self.network, self.scenario
-        end_s = scenario.duration_s
-        step = 0
-        while network.clock.now_s < end_s:
+        return self.sampled_until(self.scenario.duration_s)
+
+    def sampled_until(self, end_s: float) -> Iterator[float]:
+        """Let time pass until `end_s`; yields the time of each sample."""
+        clock = self.network.clock
+        start_s, step = clock.now_s, 0
+        while clock.now_s < end_s:
             step += 1
-            self._pass_time(min(end_s, step * scenario.sample_s))
+            self._pass_time(min(end_s, start_s + step * self.scenario.sample_s))
             sample = self._take_sample()
             if self._start is None:
                 self._start = self._scene(sample)._replace(places=self._start_places)
             self.timeline.check(sample)
-            yield network.clock.now_s
+            yield clock.now_s
 
     def record(self) -> RunRecord:
         """The record, once all samples are taken."""
-        network, scenario = self.network, self.scenario
+        network, scenario, nodes = self.network, self.scenario, self.network.nodes
         assert self._start is not None  # a run has at least one sample
         return RunRecord(
             scenario=scenario,
@@ -112,13 +126,28 @@ class Simulation:
             orders=self.timeline.orders,
             collisions=len(self._pairs),
             min_distance_m=self._min_distance_m,
-            end_s=scenario.duration_s,
+            end_s=network.clock.now_s,
             airtime_s=getattr(network.air, "airtime_s", None),
             frames_destroyed=getattr(network.air, "collisions", None),
             links=self._links,
             probes=self._probes.results(),
             frames=self.impairments.frames,
             refused_flights=0 if self._planner is None else len(self._planner.refused),
+            cut_offs=[*self._cut_offs, *(ServiceGap(*gap, None) for gap in self._cut_off.items())],
+            in_the_air=frozenset(self.flights.in_the_air),
+            grounded=frozenset(n for n, node in nodes.items() if node.drone.why_not_fly()),
+            left_behind={
+                n: node.component.get_repair_status().in_words(network.clock.now_s)
+                for n, node in nodes.items()
+                if not node.is_gateway and node.antenna.powered and not network.connected(n)
+            },
+            able=frozenset(filter(self.is_able, nodes)),
+            endless_packets=sum(
+                count
+                for node in nodes.values()
+                for reason, count in node.component.complaints.counts.items()
+                if "too many hops" in reason
+            ),
         )
 
     def _move(self, flown: dict[int, Track]) -> None:
@@ -139,16 +168,32 @@ class Simulation:
         clock = self.network.clock
         while clock.now_s < until_s:
             if self.flights.in_the_air:
-                clock.run_until(min(until_s, clock.now_s + FLIGHT_SAMPLE_S))
+                self._run_until(min(until_s, clock.now_s + FLIGHT_SAMPLE_S))
                 self._watch_distances()
             else:
-                clock.run_until(until_s)
+                self._run_until(until_s)
+
+    def _run_until(self, until_s: float) -> None:
+        before_s = self._stopwatch()
+        self.network.clock.run_until(until_s)
+        self.simulating_s += self._stopwatch() - before_s
+
+    def is_able(self, node: int) -> bool:
+        """Whether a drone can fly and the gateway would be in range of its believed place."""
+        network = self.network
+        believed = network.nodes[node].component.places.gateway
+        if believed is None or network.nodes[node].drone.why_not_fly():
+            return False
+        reach_m = self.scenario.range_m - ABLE_WITHIN_M
+        return any(believed.distance_m(network.location(g)) < reach_m for g in gateways_of(network))
 
     def _take_sample(self) -> NetworkSample:
         sample = sample_of(self.network)
         self._samples.append(sample)
         if self._links is not None:
             self._links.look(sample, physical_graph(self.network), gateways_of(self.network))
+        for node in self._cut_off.keys() & sample.served:
+            self._cut_offs.append(ServiceGap(node, self._cut_off.pop(node), sample.now_s))
         return sample
 
     def before_disruption(self) -> None:
@@ -158,8 +203,13 @@ class Simulation:
 
     def after_disruption(self) -> None:
         """The fault has happened."""
+        graph = physical_graph(self.network)
         if self._after_fault is None:
-            self._after_fault = physical_graph(self.network)
+            self._after_fault = graph
+        with_path = graph.hops_from(gateways_of(self.network))
+        if with_path:  # while no gateway is on, there is nothing that a repair could do
+            for node in sorted(graph.near.keys() - with_path.keys()):
+                self._cut_off.setdefault(node, self.network.clock.now_s)
         self._take_sample()
 
     def _places(self) -> dict[int, tuple[float, float, float]]:
@@ -202,9 +252,14 @@ def _network(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> 
         max_distance_m=scenario.range_m,
         **_options(scenario),
     )
+    grounded = streams.of("grounded")
     for place in places:
-        add = network.add_gateway if place.gateway else network.add_router
-        add(place.node_id, place.x, place.y)
+        if place.gateway:
+            network.add_gateway(place.node_id, place.x, place.y)
+        else:
+            is_grounded = grounded.random() < scenario.grounded_share
+            why = "on the ground" if is_grounded else ""
+            network.add_router(place.node_id, place.x, place.y, why_not_fly=why)
     return network
 
 

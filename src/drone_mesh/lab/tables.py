@@ -46,6 +46,15 @@ class Table:
         csv.writer(text, lineterminator="\n").writerows([self.header, *self.rows])
         return text.getvalue()
 
+    def to_markdown(self) -> str:
+        """As Markdown."""
+        rows = [self.header, ["---"] * len(self.header), *self.rows]
+        return (
+            "".join(f"| {' | '.join(row)} |\n" for row in rows)
+            .replace("| --- ", "|---")
+            .replace("|--- |", "|---|")
+        )
+
     def to_latex(self) -> str:
         """As LaTeX, for the booktabs package."""
         lines = [
@@ -61,6 +70,12 @@ class Table:
             r"\end{table}",
         ]
         return "\n".join(lines) + "\n"
+
+
+def all_tables(results: Results) -> list[Table]:
+    """The tables of a report."""
+    kinds = (cells_table, healing_table, paired_table, worst_table)
+    return [table for kind in kinds if (table := kind(results)) is not None]
 
 
 def summary_of(rows: Mapping[int, Row], metric: str) -> Interval:

@@ -6,7 +6,7 @@ import contextlib
 import math
 import random
 from dataclasses import dataclass
-from typing import Callable, Iterator, NamedTuple, Protocol
+from typing import Callable, Iterator, NamedTuple, Protocol, Sequence
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.inprocess import Network
@@ -111,20 +111,24 @@ class Timeline:
         rng = self._streams.of(f"fault {index}")
         act = getattr(self, f"_{fault.action}")
         if fault.action in HEALING_STARTS_WITH:
-            with self._disruption():
-                self._note(fault.action, act(fault, rng))
+            nodes: list[int] = []
+            with self.disruption(fault.action, nodes):
+                nodes += act(fault, rng)
         else:
-            self._note(fault.action, act(fault, rng))
+            self.note(fault.action, act(fault, rng))
 
     @contextlib.contextmanager
-    def _disruption(self) -> Iterator[None]:
+    def disruption(self, action: str, nodes: Sequence[int]) -> Iterator[None]:
+        """What happens inside must be healed; it befalls these nodes."""
         if self.first_disruption_s is None:
             self.first_disruption_s = self._network.clock.now_s
         self._witness.before_disruption()
         yield
+        self.note(action, nodes)
         self._witness.after_disruption()
 
-    def _note(self, action: str, nodes: list[int]) -> None:
+    def note(self, action: str, nodes: Sequence[int]) -> None:
+        """Record what happens now."""
         self.happened.append(Happened(self._network.clock.now_s, action, tuple(nodes)))
 
     def _after(self, seconds: float | None, undo: Callable[[object], None]) -> None:
@@ -196,9 +200,8 @@ class Timeline:
 
     def _die(self, node: int) -> None:
         if self._network.nodes[node].antenna.powered:
-            with self._disruption():
+            with self.disruption("battery empty", [node]):
                 self._network.power(node, False)
-                self._note("battery empty", [node])
 
     def _churn(self, fault: Fault, rng: random.Random) -> list[int]:
         what, clock = fault.what, self._network.clock
@@ -223,9 +226,8 @@ class Timeline:
         ]
         if fit:
             chosen = fit[int(draw * len(fit))]
-            with self._disruption():
+            with self.disruption("death" if alive else "birth", [chosen]):
                 self._network.power(chosen, not alive)
-                self._note("death" if alive else "birth", [chosen])
 
     def _order(self, fault: Fault, rng: random.Random) -> list[int]:
         what = fault.what

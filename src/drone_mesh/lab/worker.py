@@ -19,7 +19,8 @@ from drone_mesh.lab.provenance import code_version
 from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Scenario
-from drone_mesh.lab.simulation import Simulation
+from drone_mesh.lab.sequence import SequenceRun
+from drone_mesh.lab.simulation import Simulation, Stopwatch
 from drone_mesh.lab.streams import Streams
 
 
@@ -88,11 +89,13 @@ def _measure(spec: RunSpec) -> tuple[dict[str, float], str, tuple[OutageRow, ...
     return measured(record, spec.own_metrics), simulation.event_hash(), gaps
 
 
-def simulation_of(spec: RunSpec) -> Simulation:
+def simulation_of(spec: RunSpec, stopwatch: Stopwatch = time.process_time) -> Simulation:
     """The run, before its start. Raises ConfigurationError for a layout that cannot be drawn."""
     if spec.search_path:
         extensions.add_search_path(spec.search_path)
-    return Simulation(scenario_of(spec.scenario), Streams(spec.seed, spec.repetition))
+    scenario = scenario_of(spec.scenario)
+    kind = Simulation if scenario.sequence is None else SequenceRun
+    return kind(scenario, Streams(spec.seed, spec.repetition), stopwatch)
 
 
 def measured(record: RunRecord, own_metrics: tuple[str, ...]) -> dict[str, float]:

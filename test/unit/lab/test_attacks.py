@@ -9,7 +9,7 @@ import pytest
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.command import main
 from drone_mesh.lab.proofs.attacks import ATTACKS, RECORDING
-from drone_mesh.lab.proofs.damage import KEY, Threat, keys_of, table, trial
+from drone_mesh.lab.proofs.damage import KEY, Threat, damage_table, keys_of, trial
 from drone_mesh.lab.proofs.fuzz import crowd, fuzz, tables
 
 # Tolerance where an attack must have no effect: the scenario alone has slightly different results
@@ -79,7 +79,7 @@ def test_the_bids_of_a_captured_node_delay_a_repair_and_do_not_prevent_it(name):
 def test_the_table_has_a_cell_for_each_case():
     name = "order replayed after 1 s"
     assert ATTACKS[name] in RECORDING
-    heading, _, row = table([name], runs=1)
+    heading, _, row = damage_table([name], runs=1)
     assert heading == "| attack | no attack | without key | with key | captured node |"
     cells = [cell.strip() for cell in row.split("|")[1:-1]]
     assert cells[0] == name

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from drone_mesh.air.graph import Graph
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.graph import Graph
 from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.metrics import measure_all
 from drone_mesh.lab.network_sample import NetworkSample

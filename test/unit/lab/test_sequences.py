@@ -2,44 +2,50 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from drone_mesh.lab.sequence import run_sequence
-from drone_mesh.lab.sequences import harm, main
+from drone_mesh.errors import ConfigurationError
+from drone_mesh.lab.experiment import load_experiment
+from drone_mesh.lab.metrics.harm import harm, left_able
+from drone_mesh.lab.plan import Plan
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.sequence import SequenceRun, run_sequence
+from drone_mesh.lab.streams import Streams
+from drone_mesh.lab.worker import execute
 
 SEQUENCES, AT_ONCE = 300, 10
-LARGEST = 14  # nodes: a second for ten sequences; the command runs meshes of up to 60
+LARGEST = 14  # drones: a second for ten sequences; the suite runs meshes of up to 60
+SUITE = Path(__file__).resolve().parents[3] / "experiments" / "sequences.yaml"
 
 
 @pytest.mark.parametrize("first", range(0, SEQUENCES, AT_ONCE))
 def test_no_sequence_ends_with_stacked_drones_or_a_needless_flight_or_a_node_given_up(first):
-    outcomes = [run_sequence(seed, largest=LARGEST) for seed in range(first, first + AT_ONCE)]
-    assert [outcome for outcome in outcomes if harm(outcome)] == []
+    numbers = range(first, first + AT_ONCE)
+    harmed = [number for number in numbers if harm(run_sequence(number, largest=LARGEST))]
+    assert harmed == []
 
 
-def test_a_drone_that_knows_where_the_gateway_moved_flies_though_another_sought_it_elsewhere():
-    moved = run_sequence(7027)
-    assert (moved.incidents, moved.unexplained, moved.stacked) == ("gateway moved", 0, 0)
+@pytest.mark.parametrize("number", range(8))
+def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
+    content = {"sequence": {"incidents": ["gateway_moved"], "drones": [8, 30]}, "sample_s": 2}
+    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    assert {item.action for item in record.happened} == {"gateway_moved"}
+    assert left_able(record) == 0
 
 
-def test_the_same_seed_gives_the_same_outcome():
-    one, other = (run_sequence(3, largest=LARGEST) for _ in range(2))
-    assert one == other
+def test_the_same_seed_gives_the_same_run_in_an_experiment():
+    loaded = load_experiment(SUITE, ["seeds=1", "base.sequence.drones=[8, 12]"])
+    dense, sparse = Plan(loaded)
+    outcome = execute(dense.spec)
+    assert (outcome.failure, outcome.values["harm"]) == ("", 0.0)
+    assert execute(dense.spec).event_hash == outcome.event_hash
+    assert execute(sparse.spec).event_hash != outcome.event_hash
 
 
-def test_the_command_continues_where_it_was_stopped(tmp_path, capsys):
-    table = tmp_path / "outcomes.csv"
-    assert main(["--runs", "2", "--csv", str(table)]) == 0
-    assert main(["--runs", "3", "--csv", str(table)]) == 0
-    lines = table.read_text(encoding="utf-8").splitlines()
-    assert [line.split(",")[0] for line in lines] == ["seed", "0", "1", "2"]
-    assert "3 sequences, seeds 0..2" in capsys.readouterr().out
-
-
-def test_a_table_that_cannot_be_used_is_refused_before_the_first_sequence(tmp_path, capsys):
-    assert main(["--runs", "1", "--csv", str(tmp_path / "none" / "table")]) == 2
-    assert capsys.readouterr().err == (f"--csv {tmp_path}/none/table: No such file or directory\n")
-    other = tmp_path / "other.csv"
-    other.write_text("a,b\n1,2\n")
-    assert main(["--runs", "1", "--csv", str(other)]) == 2
-    assert capsys.readouterr().err == f"--csv {other}: not a table of this program\n"
+def test_an_unknown_incident_is_refused(tmp_path):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\nbase:\n  sequence: {incidents: [flood]}\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"line 3.*unknown incident flood: use cut_"):
+        load_experiment(path)

@@ -2,11 +2,11 @@
 
 # The order of these imports is that of the columns of runs.csv.
 # isort: off
-from drone_mesh.lab.metrics import healing, movement, shape, motion, traffic
+from drone_mesh.lab.metrics import healing, movement, shape, motion, traffic, harm
 
 # isort: on
 from drone_mesh.lab.metrics.movement import STACKED_M
-from drone_mesh.lab.metrics.registry import METRICS, Metric, measure_all
+from drone_mesh.lab.metrics.registry import METRICS, Metric, listed, measure_all
 from drone_mesh.lab.metrics.shape import covered
 
 __all__ = [
@@ -14,7 +14,9 @@ __all__ = [
     "STACKED_M",
     "Metric",
     "covered",
+    "harm",
     "healing",
+    "listed",
     "measure_all",
     "motion",
     "movement",

@@ -109,7 +109,11 @@ def _phases(run: RunRecord) -> tuple[float, float, float, float]:
     between = [event for event in run.events if start_s <= event.stamp_s <= end_s]
     if start_s == end_s:
         return (0.0, 0.0, 0.0, 0.0)
-    noticed = _first(between, MeshEventKind.DISCONNECTED)
+    died = {(item.at_s, node) for item in run.happened for node in item.nodes}
+    noticed = _first(  # a drone that is switched off loses its own connection at that moment
+        [event for event in between if (event.stamp_s, event.node) not in died],
+        MeshEventKind.DISCONNECTED,
+    )
     decided = _first(between, MeshEventKind.FLIGHT_DECIDED)
     landings = [event.stamp_s for event in between if event.kind == MeshEventKind.LANDED.value]
     decided_s = end_s if decided is None else decided

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from drone_mesh.lab.graph import Graph
+from drone_mesh.air.graph import Graph
 from drone_mesh.lab.metrics.registry import NAN, metric
 from drone_mesh.lab.record import RunRecord, Topology
 

@@ -20,9 +20,15 @@ class Metric(NamedTuple):
     better: str = ""  # "less", "more" or neither
     is_share: bool = False  # every run yields 0 or 1
     censored: bool = False  # a time that is empty if the event did not happen
+    family: str = ""  # in lists, one entry stands for all metrics of this name
 
 
 METRICS: dict[str, Metric] = {}  # in the order of the columns
+
+
+def listed() -> dict[str, Metric]:
+    """The metrics for a list, by name; those of a family appear once, under its name."""
+    return {metric.family or name: metric for name, metric in METRICS.items()}
 
 
 def measure_all(record: RunRecord) -> dict[str, float]:

@@ -91,8 +91,9 @@ def _note_traffic() -> None:
                 return 0.0 if traffic is None else float(getattr(traffic, attribute))
 
             METRICS[f"{name}_{word}"] = Metric(
-                "packets", f"{kind.name} packets {words}, tries included", count, "less"
-            )
+                "packets", f"packets of this type {words}, tries included", count, "less",
+                family=f"{name}_TYPE",
+            )  # fmt: skip
 
 
 _note_traffic()

@@ -101,7 +101,7 @@ def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> 
     return sum(not _arrives(network, n, swallow) for n in powered) / len(powered)
 
 
-def table(names: Sequence[str], runs: int) -> Iterator[str]:
+def damage_table(names: Sequence[str], runs: int) -> Iterator[str]:
     """The lines of a Markdown table: means over the runs, and the farthest of all drones."""
     yield "| attack | " + " | ".join(threat.value for threat in Threat) + " |"
     yield "|---" * (1 + len(Threat)) + "|"

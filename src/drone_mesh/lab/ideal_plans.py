@@ -1,64 +1,55 @@
-"""The flights of `nearest` and `inward` with ideal information, after the death of one node.
+"""Where `nearest` and `inward` fly after the death of one node, with ideal information.
 
-Distances on a plane, no packets and no delays: the bound for the runs in cut_vertices.py.
+Distances on a plane, no packets and no delays: the bound for the runs of the strategies.
 """
 
 from __future__ import annotations
 
-from typing import AbstractSet, Dict, Sequence
+import functools
+from typing import AbstractSet, Callable, Dict, Mapping
 
+from drone_mesh.air.graph import Graph, within
 from drone_mesh.communication.repair.strategies.inward import MOVES
 from drone_mesh.drone.location import Location
-from drone_mesh.lab.random_layouts import Point
 
 Places = Dict[int, Location]
 Flown = Dict[int, float]  # node -> metres
 
 ROUNDING_M = 1e-9  # drones at half the range on opposite sides of a point are in range
+_ROOT = 0  # the gateway
 
 
-def without(points: Sequence[Point], dead: int) -> Places:
-    """The positions of the survivors."""
-    return {node: place(point) for node, point in enumerate(points) if node != dead}
+def cut_off(places: Places, range_m: float) -> AbstractSet[int]:
+    """The nodes without a path to the gateway, which has id 0."""
+    graph = Graph(within(places, range_m + ROUNDING_M))
+    return places.keys() - graph.hops_from([_ROOT]).keys()
 
 
-def place(point: Point) -> Location:
-    """A point (x, y) in metres, on the ground."""
-    return Location.from_vector((*point, 0.0))
-
-
-def cut_off(places: Places, range_m: float, root: int) -> frozenset[int]:
-    """The nodes that are not reachable from `root` by hops shorter than `range_m`."""
-    known, edge = {root}, [root]
-    while edge:
-        here = places[edge.pop()]
-        near = [n for n, p in places.items() if n not in known and _reach(here, p, range_m)]
-        known.update(near)
-        edge.extend(near)
-    return frozenset(places.keys() - known)
-
-
-def nearest(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
+def nearest(
+    places: Places, hole: Location, range_m: float, acting: AbstractSet[int]
+) -> tuple[Places, Flown]:
     """The nearest drone of `acting` moves into the hole; its own place is then the next hole."""
-    places = dict(places)
+    now = dict(places)
     flown: Flown = {}
-    while cut_off(places, range_m, 0):
-        free = [n for n in acting - flown.keys() if hole.distance_m(places[n]) < range_m]
+    while cut_off(now, range_m):
+        free = [n for n in acting - flown.keys() if hole.distance_m(now[n]) < range_m]
         if not free:
             break
-        mover = min(free, key=lambda n: (hole.distance_m(places[n]), n))
-        flown[mover] = hole.distance_m(places[mover])
-        places[mover], hole = hole, places[mover]
-    return flown
+        mover = min(free, key=lambda n: (hole.distance_m(now[n]), n))
+        flown[mover] = hole.distance_m(now[mover])
+        now[mover], hole = hole, now[mover]
+    return now, flown
 
 
-def inward(places: Places, hole: Location, range_m: float, acting: AbstractSet[int]) -> Flown:
+def inward(
+    places: Places, hole: Location, range_m: float, acting: AbstractSet[int]
+) -> tuple[Places, Flown]:
     """The drones of `acting` beside the dead node move towards the hole; the others follow."""
     now = dict(places)
     flown: Flown = {}
     first = [n for n in acting if hole.distance_m(places[n]) < range_m]
     for move in range(MOVES):
-        if not cut_off(now, range_m, 0):
+        if not cut_off(now, range_m):
             break
         before = dict(now)
         for node in first:
@@ -66,7 +57,7 @@ def inward(places: Places, hole: Location, range_m: float, acting: AbstractSet[i
             step_m = min(away_m, range_m / 2) if move else max(0.0, away_m - range_m / 2)
             _fly(node, now[node].towards(hole, step_m), now, flown)
         _follow(before, now, flown, acting - set(first), range_m)
-    return flown
+    return now, flown
 
 
 def _follow(
@@ -100,3 +91,26 @@ def _fly(node: int, goal: Location, now: Places, flown: Flown) -> None:
     if way_m > ROUNDING_M:
         flown[node] = flown.get(node, 0.0) + way_m
         now[node] = goal
+
+
+def _all_act(
+    rule: Callable[..., tuple[Places, Flown]], places: Places, hole: Location, range_m: float
+) -> tuple[Places, Flown]:
+    return rule(places, hole, range_m, places.keys())
+
+
+def _cut_off_act(
+    rule: Callable[..., tuple[Places, Flown]], places: Places, hole: Location, range_m: float
+) -> tuple[Places, Flown]:
+    return rule(places, hole, range_m, cut_off(places, range_m))
+
+
+IdealPlan = Callable[[Places, Location, float], "tuple[Places, Flown]"]
+"""(places after, metres flown) for the places of the survivors, the dead node's and the range."""
+
+IDEAL_PLANS: Mapping[str, IdealPlan] = {
+    "nearest": functools.partial(_cut_off_act, nearest),
+    "inward": functools.partial(_cut_off_act, inward),
+    "nearest_of_all": functools.partial(_all_act, nearest),
+    "inward_of_all": functools.partial(_all_act, inward),
+}

@@ -4,16 +4,32 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Iterable, Mapping, Sequence
-
-Adjacency = Mapping[int, Iterable[int]]
+from typing import AbstractSet, Callable, Iterable, Mapping, Sequence
 
 
-def within(points: Sequence[tuple[float, ...]], range_m: float) -> dict[int, list[int]]:
-    """Neighbours of each point, by index: nearer than `range_m`."""
-    near: dict[int, list[int]] = {index: [] for index in range(len(points))}
-    for one in range(len(points)):
-        for other in range(one):
+def hops_from(
+    sources: Iterable[int],
+    near: Callable[[int], Iterable[int]],
+    without: AbstractSet[int] = frozenset(),
+) -> dict[int, int]:
+    """Hops to the nearest source, for all nodes with a path to one that avoids `without`."""
+    hops = dict.fromkeys(sources, 0)
+    queue = deque(hops)
+    while queue:
+        node = queue.popleft()
+        for other in near(node):
+            if other not in hops and other not in without:
+                hops[other] = hops[node] + 1
+                queue.append(other)
+    return hops
+
+
+def within(points: Mapping[int, Sequence[float]], range_m: float) -> dict[int, list[int]]:
+    """Neighbours of each point: nearer than `range_m`."""
+    near: dict[int, list[int]] = {node: [] for node in points}
+    nodes = list(points)
+    for place, one in enumerate(nodes):
+        for other in nodes[:place]:
             if math.dist(points[one], points[other]) < range_m:
                 near[one].append(other)
                 near[other].append(one)
@@ -23,7 +39,7 @@ def within(points: Sequence[tuple[float, ...]], range_m: float) -> dict[int, lis
 class Graph:
     """An undirected graph of node ids."""
 
-    def __init__(self, adjacency: Adjacency) -> None:
+    def __init__(self, adjacency: Mapping[int, Iterable[int]]) -> None:
         self.near = {node: tuple(others) for node, others in adjacency.items()}
 
     def without(self, gone: Iterable[int]) -> Graph:
@@ -31,17 +47,11 @@ class Graph:
         left = self.near.keys() - set(gone)
         return Graph({n: [o for o in self.near[n] if o in left] for n in self.near if n in left})
 
-    def hops_from(self, sources: Iterable[int]) -> dict[int, int]:
-        """Hops to the nearest source, for all nodes with a path to one."""
-        hops = {node: 0 for node in sources if node in self.near}
-        queue = deque(hops)
-        while queue:
-            node = queue.popleft()
-            for other in self.near[node]:
-                if other not in hops:
-                    hops[other] = hops[node] + 1
-                    queue.append(other)
-        return hops
+    def hops_from(
+        self, sources: Iterable[int], without: AbstractSet[int] = frozenset()
+    ) -> dict[int, int]:
+        """Hops to the nearest source, for all nodes with a path to one that avoids `without`."""
+        return hops_from((n for n in sources if n in self.near), self.near.__getitem__, without)
 
     def parts(self) -> list[set[int]]:
         """Connected components, each a set of ids, ordered by their first node."""
@@ -70,15 +80,5 @@ class Graph:
             node
             for node in sorted(self.near)
             if node not in roots and len(self.near[node]) > 1
-            if self._reached_without(roots, node) < reached - 1
+            if len(self.hops_from(roots, {node})) < reached - 1
         ]
-
-    def _reached_without(self, roots: Sequence[int], gone: int) -> int:
-        seen = {*roots, gone}
-        stack = list(roots)
-        while stack:
-            for other in self.near[stack.pop()]:
-                if other not in seen:
-                    seen.add(other)
-                    stack.append(other)
-        return len(seen) - 1

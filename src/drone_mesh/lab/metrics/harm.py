@@ -1,0 +1,94 @@
+"""Metrics of what a repair must never do, and of what it leaves undone."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.repair.options import CLEARANCE_M
+from drone_mesh.lab.metrics.registry import metric
+from drone_mesh.lab.record import RunRecord
+
+ROUNDING_M = 1e-6
+PROMPT_S = 120.0  # our choice: a node that is cut off should be connected again by then
+
+
+@metric(
+    "0/1",
+    "any of resting_close, flew_connected, flew_grounded, left_able and endless_packets is above 0",
+    better="less", is_share=True,
+)  # fmt: skip
+def harm(run: RunRecord) -> float:
+    kinds = (resting_close, flew_connected, flew_grounded, left_able, endless_packets)
+    return float(any(count(run) for count in kinds))
+
+
+@metric("", "pairs of live drones at rest nearer than 0.5 m at the end", better="less")
+def resting_close(run: RunRecord) -> float:
+    at_rest = sorted(run.end.graph.near.keys() - run.in_the_air)
+    return float(
+        sum(
+            math.dist(run.end.places[one], run.end.places[other]) < CLEARANCE_M - ROUNDING_M
+            for one, other in itertools.combinations(at_rest, 2)
+        )
+    )
+
+
+@metric("", "repair flights of drones that were connected", better="less")
+def flew_connected(run: RunRecord) -> float:
+    connected: set[int] = set()
+    flights = 0
+    for event in run.events:
+        if event.kind == MeshEventKind.CONNECTED.value:
+            connected.add(event.node)
+        elif event.kind == MeshEventKind.DISCONNECTED.value:
+            connected.discard(event.node)
+        elif event.kind == MeshEventKind.FLIGHT_DECIDED.value:
+            flights += event.node in connected
+    return float(flights)
+
+
+@metric("", "repair flights of drones that cannot fly", better="less")
+def flew_grounded(run: RunRecord) -> float:
+    return float(sum(node in run.grounded for node in _repair_flights(run)))
+
+
+@metric("", "flights that repairs decided on", better="less")
+def repair_flights(run: RunRecord) -> float:
+    return float(len(_repair_flights(run)))
+
+
+def _repair_flights(run: RunRecord) -> list[int]:
+    kind = MeshEventKind.FLIGHT_DECIDED.value
+    return [event.node for event in run.events if event.kind == kind]
+
+
+@metric("drones", "live routers that are not connected at the end", better="less")
+def left_behind(run: RunRecord) -> float:
+    return float(len(run.left_behind))
+
+
+@metric("drones", "of these, the ones that can fly and know where a gateway is", better="less")
+def left_able(run: RunRecord) -> float:
+    return float(len(run.left_behind.keys() & run.able))
+
+
+@metric("", "packets that were dropped at the limit of hops", better="less")
+def endless_packets(run: RunRecord) -> float:
+    return float(run.endless_packets)
+
+
+@metric("", "times that a fault left a live router without any path to a gateway, while one was on")
+def times_cut_off(run: RunRecord) -> float:
+    return float(len(run.cut_offs))
+
+
+@metric("", "of times_cut_off: served again within 120 s", better="more")
+def times_back(run: RunRecord) -> float:
+    return float(
+        sum(
+            gap.restored_s is not None and gap.restored_s - gap.lost_s <= PROMPT_S
+            for gap in run.cut_offs
+        )
+    )
