@@ -40,6 +40,16 @@ class ServiceGap:
         return (end_s if self.restored_s is None else self.restored_s) - self.lost_s
 
 
+class AirFigures(NamedTuple):
+    """Totals of a channel that all radios share."""
+
+    airtime_s: float  # of all frames
+    destroyed: int  # receptions, by other frames
+    sent: int  # packets that request an acknowledgement
+    tries: int  # of these, by the driver
+    given_up: int  # of these packets
+
+
 @dataclass(frozen=True)
 class RunRecord:
     """A finished run. Times are simulated seconds."""
@@ -60,8 +70,7 @@ class RunRecord:
     collisions: int
     min_distance_m: float  # of two drones that were not as close at the start; inf: not measured
     end_s: float
-    airtime_s: float | None  # of all frames, on the shared channel
-    frames_destroyed: int | None  # by other frames, on the shared channel
+    air: AirFigures | None  # None: the disc, where packets never meet
     refused_flights: int
     cut_offs: Sequence[ServiceGap]  # of routers without any path to a gateway right after a fault
     in_the_air: frozenset[int]  # at the end

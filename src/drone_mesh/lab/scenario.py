@@ -95,24 +95,30 @@ class Layout(Part):
 class Radio(Part):
     """The medium."""
 
+    KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
+        "disc": frozenset({"loss", "delay_s", "jitter_s"}),
+        "shared": frozenset({"rate", "links", "loss"}),
+    }
+
     kind: Literal["disc", "shared"] = "disc"
     rate: Optional[Literal["250k", "1M", "2M"]] = None  # shared: of the air; default: 250k
-    loss: Share = 0.0  # of the packets on each link
+    links: Literal["disc", "distance"] = "disc"  # shared: power falls with it, edge at range_m
+    loss: Share = 0.0  # disc: of the packets on each link; shared: of all frames
     delay_s: AtLeast0 = 0.002
     jitter_s: AtLeast0 = 0.0
 
     @model_validator(mode="after")
     def _has_only_keys_of_its_kind(self) -> "Radio":
-        if self.kind == "disc" and self.rate is not None:
-            raise ValueError("rate is for the shared radio; the disc has delay_s")
-        if self.kind == "shared" and self.model_fields_set & {"loss", "delay_s", "jitter_s"}:
-            raise ValueError("loss, delay_s and jitter_s are for the disc; shared has rate")
+        extra = sorted(self.model_fields_set - self.KEYS[self.kind] - {"kind"})
+        if extra:
+            words = ", ".join(sorted(self.KEYS[self.kind]))
+            raise ValueError(f"radio {self.kind} has no {extra[0]}: it has {words}")
         return self
 
     @model_serializer(mode="wrap")
     def _dump_keys_of_its_kind(self, dump: Any) -> Dict[str, Any]:
-        left_out = {"rate"} if self.kind == "disc" else {"loss", "delay_s", "jitter_s"}
-        return {key: value for key, value in dump(self).items() if key not in left_out}
+        kept = self.KEYS[self.kind] | {"kind"}
+        return {key: value for key, value in dump(self).items() if key in kept}
 
 
 class MotionSettings(Part):

@@ -15,6 +15,8 @@ from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
+from drone_mesh.inprocess.shared_air import SharedAir
+from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.link_watch import LinkWatch
@@ -30,11 +32,13 @@ from drone_mesh.lab.network_sample import (
 from drone_mesh.lab.places import StartPoint, draw_places
 from drone_mesh.lab.probes import ProbeSender
 from drone_mesh.lab.propagation import obstacles_of, put_obstacles
-from drone_mesh.lab.record import RunRecord, ServiceGap, Topology
+from drone_mesh.lab.record import AirFigures, RunRecord, ServiceGap, Topology
 from drone_mesh.lab.scenario import Positions, Scenario
 from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.timeline import Timeline
 from drone_mesh.mobility import Track
+from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
+from drone_mesh.nrf24.settings import DEFAULT_RATE, data_rate
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.observation import describe_obstacles
 
@@ -127,8 +131,7 @@ class Simulation:
             collisions=len(self._pairs),
             min_distance_m=self._min_distance_m,
             end_s=network.clock.now_s,
-            airtime_s=getattr(network.air, "airtime_s", None),
-            frames_destroyed=getattr(network.air, "collisions", None),
+            air=_air_figures(network),
             links=self._links,
             probes=self._probes.results(),
             frames=self.impairments.frames,
@@ -239,6 +242,21 @@ class Simulation:
                 self._pairs.add((min(node, other), max(node, other)))
 
 
+def _air_figures(network: Network) -> AirFigures | None:
+    air = network.air
+    if not isinstance(air, SharedAir):
+        return None
+    antennas = [node.antenna for node in network.nodes.values()]
+    radios = [antenna.statistics() for antenna in antennas if isinstance(antenna, SharedAntenna)]
+    return AirFigures(
+        air.airtime_s,
+        air.collisions,
+        sent=sum(radio.sent for radio in radios),
+        tries=sum(radio.sent + radio.tries for radio in radios),
+        given_up=sum(radio.lost for radio in radios),
+    )
+
+
 def _network(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> Network:
     timing = MeshTiming(
         check_period_s=scenario.timing.check_period_s,
@@ -250,7 +268,7 @@ def _network(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> 
         timing=timing,
         routing=scenario.routing,
         max_distance_m=scenario.range_m,
-        **_options(scenario),
+        **_options(scenario, streams),
     )
     grounded = streams.of("grounded")
     for place in places:
@@ -268,7 +286,7 @@ def _places(scenario: Scenario, streams: Streams) -> list[StartPoint]:
     return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
 
 
-def _options(scenario: Scenario) -> dict[str, Any]:
+def _options(scenario: Scenario, streams: Streams) -> dict[str, Any]:
     """The arguments that differ from the network's defaults."""
     options: dict[str, Any] = {
         "repair": scenario.repair,
@@ -284,7 +302,19 @@ def _options(scenario: Scenario) -> dict[str, Any]:
         options["delay_s"] = scenario.radio.delay_s
         options["jitter_s"] = scenario.radio.jitter_s
     else:
-        options["radio"] = scenario.radio.kind
-        if scenario.radio.rate is not None:
-            options["rate"] = scenario.radio.rate
+        rate = scenario.radio.rate or DEFAULT_RATE
+        options.update(radio=scenario.radio.kind, rate=rate, links=_links(scenario, rate, streams))
     return options
+
+
+def _links(scenario: Scenario, rate: str, streams: Streams) -> LinkModel:
+    """Which frames arrive undamaged if no other frame is on the air."""
+    links: LinkModel = IdealDisc(scenario.range_m)
+    if scenario.radio.links == "distance":
+        links = LogDistance.with_edge_at(
+            scenario.range_m, streams.of("links"), bits_per_s=data_rate(rate).value
+        )
+    if scenario.radio.loss:
+        rng = streams.of("frames")
+        return ScriptedLoss(links, lambda _hop: rng.random() < scenario.radio.loss)
+    return links

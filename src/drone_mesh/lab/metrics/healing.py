@@ -84,6 +84,16 @@ def connected_s(run: RunRecord) -> float:
     return next((sample.now_s for sample in run.samples if sample.share == 1.0), NAN)
 
 
+@metric(
+    "share", "served routers, mean over the time since all were served for the first time",
+    better="more",
+)  # fmt: skip
+def steady_share(run: RunRecord) -> float:
+    first_s = connected_s(run)
+    shares = [sample.share for sample in run.samples if sample.now_s >= first_s]
+    return statistics.fmean(shares) if shares else 0.0
+
+
 @metric("share", "live routers that are served at the end", better="more")
 def connected_share(run: RunRecord) -> float:
     return run.samples[-1].share

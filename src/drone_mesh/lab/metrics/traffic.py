@@ -35,12 +35,22 @@ def payload_bytes(run: RunRecord) -> float:
     "share", "airtime of all frames per time, overlapping frames each counted; shared radio only"
 )
 def air_load(run: RunRecord) -> float:
-    return NAN if run.airtime_s is None else run.airtime_s / run.end_s
+    return NAN if run.air is None else run.air.airtime_s / run.end_s
 
 
 @metric("frames", "receptions that another frame destroyed; shared radio only", better="less")
 def frames_destroyed(run: RunRecord) -> float:
-    return NAN if run.frames_destroyed is None else float(run.frames_destroyed)
+    return NAN if run.air is None else float(run.air.destroyed)
+
+
+@metric("", "tries of the driver per packet with a receiver; shared radio only", better="less")
+def tries_per_packet(run: RunRecord) -> float:
+    return NAN if run.air is None or not run.air.sent else run.air.tries / run.air.sent
+
+
+@metric("packets", "packets that the driver gave up; shared radio only", better="less")
+def given_up(run: RunRecord) -> float:
+    return NAN if run.air is None else float(run.air.given_up)
 
 
 @metric("", "flight orders that were given")
@@ -51,6 +61,31 @@ def orders(run: RunRecord) -> float:
 @metric("share", "orders whose drone set out within 10 s; empty: no orders", better="more")
 def order_delivery(run: RunRecord) -> float:
     return sum(d is not None for d in _order_delays(run)) / len(run.orders) if run.orders else NAN
+
+
+@metric("share", "orders whose drone set out within 2 s; empty: no orders", better="more")
+def order_prompt(run: RunRecord) -> float:
+    delays = _order_delays(run)
+    return sum(d is not None and d <= 2.0 for d in delays) / len(delays) if delays else NAN
+
+
+@metric("", "orders that neither arrived nor were reported as lost by the gateway", better="less")
+def orders_unreported(run: RunRecord) -> float:
+    reported = [
+        (event.stamp_s, set(event.peers))
+        for event in run.events
+        if event.kind == MeshEventKind.NO_ROUTE.value and event.node in run.gateways
+    ]
+    return float(
+        sum(
+            delay is None
+            and not any(
+                order.node in peers and 0.0 <= stamp_s - order.at_s <= DELIVERED_WITHIN_S
+                for stamp_s, peers in reported
+            )
+            for order, delay in zip(run.orders, _order_delays(run))
+        )
+    )
 
 
 @metric("ms", "median time from an order to its drone's departure", better="less")
