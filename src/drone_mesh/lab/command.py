@@ -113,6 +113,14 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     )
     tables.set_defaults(run=_tables)
 
+    plot = commands.add_parser("plot", help="write one figure as SVG, light and dark")
+    plot.add_argument("results", type=Path, help=_RESULTS)
+    plot.add_argument("figure", help="an axis of the sweep, healed_over_time or phases")
+    plot.add_argument("out", type=Path, help="the file")
+    plot.add_argument("--cells", default="", help="only these: axis=value[,axis=value...]")
+    plot.add_argument("--metric", action="append", default=[], help="of the axis; repeatable")
+    plot.set_defaults(run=_plot)
+
     show = commands.add_parser("show", help="repeat one run, with all its events")
     show.add_argument("results", type=Path, help=_RESULTS)
     show.add_argument("run_id", metavar="RUN", help="id of the run, or the beginning of it")
@@ -318,6 +326,16 @@ def _tables(options: argparse.Namespace) -> int:
             print(f"{table.title}. {table.caption}\n\n{table.to_markdown()}")
         elif table.name == options.only:
             print(table.to_markdown(), end="")
+    return 0
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from drone_mesh.lab.figures import draw_alone
+    from drone_mesh.lab.results import load_results
+
+    results = load_results(options.results).only(options.cells, options.metric)
+    draw_alone(results, options.figure, options.out)
+    print(f"wrote {options.out}")
     return 0
 
 

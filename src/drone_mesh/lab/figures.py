@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import io
 import math
+from pathlib import Path
 from typing import Any, Literal, Mapping, NamedTuple, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import Cell, as_text
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.results import Results, is_share, number
 from drone_mesh.lab.statistics import Interval, kaplan_meier
 from drone_mesh.lab.tables import summary_of
+from drone_mesh.report.drawing import in_style, svg_of_its_own
+from drone_mesh.view.palette import LIGHT
 
 WIDTH_IN = 7.2  # the text width of A4; the page scales it
 # Okabe and Ito's palette, distinguishable for the colour-blind, without its yellow.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#444444")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", LIGHT.ink)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 PHASES = (
     ("t_detect_s", "detect", "#56B4E9"),
@@ -26,7 +30,7 @@ PHASES = (
     ("t_fly_s", "fly", "#E69F00"),
     ("t_reroute_s", "re-route", "#009E73"),
 )
-GRID = "#e4e7ec"
+HEALED, PHASES_OF_REPAIR = "healed_over_time", "phases"
 PANELS_PER_ROW = 2
 MOST_TICKS = 9
 
@@ -44,6 +48,29 @@ class Drawing(NamedTuple):
         text = io.StringIO()
         self.figure.savefig(text, format="svg", metadata={"Date": None})
         return text.getvalue().partition("<svg")[1] + text.getvalue().partition("<svg")[2]
+
+
+def draw_alone(results: Results, name: str, out: Path) -> None:
+    """Write one figure as SVG, light and dark: an axis, HEALED or PHASES_OF_REPAIR.
+
+    Raises ConfigurationError if there is no such figure, or the file cannot be written.
+    """
+    with in_style():
+        if name in results.loaded.axes:
+            series = _series_axis(results)
+            drawing = _axis_drawing(results, name, None if series == name else series)
+        elif name in (HEALED, PHASES_OF_REPAIR):
+            found = survival_drawing(results) if name == HEALED else phases_drawing(results)
+            if found is None:
+                raise ConfigurationError(f"{results.folder}: no run has a fault to heal")
+            drawing = found
+        else:
+            names = ", ".join([*results.loaded.axes, HEALED, PHASES_OF_REPAIR])
+            raise ConfigurationError(f"{results.folder}: no figure {name}; there are {names}")
+        try:
+            out.write_text(svg_of_its_own(drawing.figure), encoding="utf-8")
+        except OSError as error:
+            raise ConfigurationError(f"cannot write {out}: {error.strerror}") from error
 
 
 def axis_drawings(results: Results) -> list[Drawing]:
@@ -188,7 +215,7 @@ def phases_drawing(results: Results) -> Drawing | None:
         axes.barh(range(len(bars)), widths, left=left, color=colour, label=words, height=0.7)
         left = [a + b for a, b in zip(left, widths)]
     for row, (total, (_, _, n)) in enumerate(zip(left, bars)):
-        axes.text(total, row, f"  n = {n}", va="center", fontsize=7, color="#555555")
+        axes.text(total, row, f"  n = {n}", va="center", fontsize=7, color=LIGHT.muted)
     axes.set_yticks(range(len(bars)), [name for name, *_ in bars], fontsize=7)
     axes.invert_yaxis()
     axes.margins(x=0.1)
@@ -200,7 +227,7 @@ def phases_drawing(results: Results) -> Drawing | None:
         "decide: until the first flight; fly: until the last landing; re-route: until all are "
         "served. Without a flight everything after the first notice is re-routing."
     )
-    return Drawing("phases", "Phases of the repair", caption, figure)
+    return Drawing(PHASES_OF_REPAIR, "Phases of the repair", caption, figure)
 
 
 def survival_drawing(results: Results) -> Drawing | None:
@@ -249,7 +276,7 @@ def survival_drawing(results: Results) -> Drawing | None:
     caption = (
         "Share of runs that have healed (Kaplan-Meier): a curve below 100 % has censored runs."
     )
-    return Drawing("healed_over_time", "Healed over time", caption, figure)
+    return Drawing(HEALED, "Healed over time", caption, figure)
 
 
 def _most_common(results: Results, axes: Sequence[str]) -> dict[str, Any]:
@@ -291,6 +318,6 @@ def _file_name(axis: str) -> str:
 
 def _style(axes: Axes, grid: Literal["x", "y"] = "y") -> None:
     axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis=grid, color=GRID, lw=0.6)
+    axes.grid(axis=grid, color=LIGHT.grid, lw=0.6)
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=8)

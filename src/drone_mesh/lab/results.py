@@ -42,6 +42,34 @@ class Results(NamedTuple):
         wanted = self.loaded.experiment.metrics or DEFAULT_METRICS
         return [extensions.own_column(name) if ":" in name else name for name in wanted]
 
+    def only(self, text: str, metrics: Sequence[str] = ()) -> Results:
+        """The cells that match axis=value[,axis=value...], with these metrics if there are any.
+
+        Raises ConfigurationError if none matches.
+        """
+        wanted = self._wanted(text)
+        fit = [i for i, cell in enumerate(self.loaded.cells) if _fits(cell, wanted)]
+        if not fit:
+            raise ConfigurationError(f"{self.folder}: no cell matches {text}")
+        experiment = self.loaded.experiment
+        if metrics:
+            experiment = experiment.model_copy(update={"metrics": list(metrics)})
+        cells = [self.loaded.cells[index] for index in fit]
+        return self._replace(
+            loaded=self.loaded._replace(experiment=experiment, cells=cells),
+            by_cell={place: self.drawn(index) for place, index in enumerate(fit)},
+        )
+
+    def _wanted(self, text: str) -> dict[str, str]:
+        wanted: dict[str, str] = {}
+        for part in filter(None, text.split(",")):
+            axis, equals, value = part.partition("=")
+            if not equals or axis not in self.loaded.axes:
+                axes = ", ".join(self.loaded.axes) or "no axes"
+                raise ConfigurationError(f"cell {text}: expected axis=value with one of {axes}")
+            wanted[axis] = value
+        return wanted
+
     def of_cell(self, cell: int) -> dict[int, Row]:
         """The rows of one cell that count in the report, by repetition."""
         return {r: row for r, row in self.drawn(cell).items() if self.counts(row)}
@@ -65,13 +93,7 @@ class Results(NamedTuple):
 
     def find_cell(self, text: str) -> int:
         """The one cell that matches axis=value[,axis=value...]. Raises ConfigurationError."""
-        wanted: dict[str, str] = {}
-        for part in filter(None, text.split(",")):
-            axis, equals, value = part.partition("=")
-            if not equals or axis not in self.loaded.axes:
-                axes = ", ".join(self.loaded.axes) or "no axes"
-                raise ConfigurationError(f"cell {text}: expected axis=value with one of {axes}")
-            wanted[axis] = value
+        wanted = self._wanted(text)
         fit = [i for i, cell in enumerate(self.loaded.cells) if _fits(cell, wanted)]
         if len(fit) != 1:
             labels = [self.loaded.cells[i].label for i in fit or range(len(self.loaded.cells))]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from typing import Sequence
+from typing import ContextManager, Sequence
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from drone_mesh.view.palette import LIGHT, variable_names
+from drone_mesh.view.palette import DARK, LIGHT, Palette, variable_names
 
 WIDTH_IN = 10.0  # the page scales it
 _STYLE = {
@@ -29,11 +29,16 @@ _STYLE = {
 _VARIABLES = {colour: f"var(--{name})" for colour, name in variable_names(LIGHT).items()}
 
 
+def in_style() -> ContextManager[None]:
+    """Figures that are drawn in this context suit `svg_of` and `svg_of_its_own`."""
+    return matplotlib.rc_context(_STYLE)
+
+
 def figure_with_rows(
     height_in: float, rows: int = 1, heights: Sequence[float] = (1,)
 ) -> tuple[Figure, list[Axes]]:
     """A figure with stacked axes that share their x axis."""
-    with matplotlib.rc_context(_STYLE):
+    with in_style():
         figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
         axes = figure.subplots(
             rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
@@ -47,7 +52,7 @@ def figure_with_rows(
 
 def figure_with_columns(height_in: float, columns: int) -> tuple[Figure, list[Axes]]:
     """A figure with axes side by side that show the same area."""
-    with matplotlib.rc_context(_STYLE):
+    with in_style():
         figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
         axes = figure.subplots(1, columns, sharex=True, sharey=True)
     for one in axes:
@@ -59,9 +64,21 @@ def figure_with_columns(height_in: float, columns: int) -> tuple[Figure, list[Ax
 def svg_of(figure: Figure) -> str:
     """The figure as an SVG element, with each colour of the palette as its CSS variable."""
     text = io.StringIO()
-    with matplotlib.rc_context(_STYLE):
+    with in_style():
         figure.savefig(text, format="svg", metadata={"Date": None})
     _prologue, start, drawing = text.getvalue().partition("<svg")
     return start + re.sub(
         r"#[0-9a-f]{6}\b", lambda found: _VARIABLES.get(str(found[0]), str(found[0])), drawing
     )
+
+
+def svg_of_its_own(figure: Figure) -> str:
+    """The figure as an SVG file, which is light or dark as its viewer prefers."""
+    start, end, drawing = svg_of(figure).partition(">")
+    style = f"svg{{background:var(--card);{_css(LIGHT)}}}"
+    style += f"@media(prefers-color-scheme:dark){{svg{{{_css(DARK)}}}}}"
+    return f"{start}{end}<style>{style}</style>{drawing}"
+
+
+def _css(palette: Palette) -> str:
+    return ";".join(f"--{name}:{colour}" for colour, name in variable_names(palette).items())

@@ -133,6 +133,31 @@ def test_a_page_about_one_run_can_be_written(results_folder: Path, tmp_path: Pat
     assert "<svg" in page.read_text()
 
 
+def test_plot_writes_a_figure_that_is_light_or_dark_as_its_viewer_prefers(
+    results_folder: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "healed.svg"
+    assert main(["plot", str(results_folder), "healed_over_time", str(out)]) == 0
+    svg = out.read_text(encoding="utf-8")
+    assert svg.startswith("<svg")
+    assert "@media(prefers-color-scheme:dark)" in svg
+    assert "var(--ink)" in svg
+    assert main(["plot", str(results_folder), "phase", str(out)]) == 1
+    assert "no figure phase; there are " in capsys.readouterr().err
+    assert main(["plot", str(results_folder), "phases", str(tmp_path / "no" / "x.svg")]) == 1
+    assert "cannot write" in capsys.readouterr().err
+
+
+def test_tables_prints_the_tables_of_the_report_as_markdown(
+    results_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["tables", str(results_folder), "--only", "cells"]) == 0
+    header, rule, *rows = capsys.readouterr().out.splitlines()
+    assert header.startswith("| connection_lost_after_s | drones | n | ")
+    assert set(rule) == set("|-")
+    assert header.count("|") == rule.count("|") == rows[0].count("|")
+
+
 def test_metrics_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["metrics"]) == 0
     lines = capsys.readouterr().out.splitlines()
