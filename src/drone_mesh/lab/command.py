@@ -109,7 +109,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     tables = commands.add_parser("tables", help="print the tables of the report as Markdown")
     tables.add_argument("results", type=Path, help=_RESULTS)
     tables.add_argument(
-        "--only", choices=("cells", "healing", "paired", "worst"), help="one of them, alone"
+        "--only", nargs="+", choices=("cells", "healing", "paired", "worst"), help="these alone"
     )
     tables.set_defaults(run=_tables)
 
@@ -322,10 +322,8 @@ def _tables(options: argparse.Namespace) -> int:
     from drone_mesh.lab.tables import all_tables
 
     for table in all_tables(load_results(options.results)):
-        if options.only is None:
+        if options.only is None or table.name in options.only:
             print(f"{table.title}. {table.caption}\n\n{table.to_markdown()}")
-        elif table.name == options.only:
-            print(table.to_markdown(), end="")
     return 0
 
 

@@ -99,7 +99,7 @@ def _axis_drawing(results: Results, axis: str, series: str | None) -> Drawing:
     figure = Figure(figsize=(WIDTH_IN, 2.5 * rows + 0.5), layout="constrained")
     panels = figure.subplots(rows, PANELS_PER_ROW, squeeze=False)
     others = [name for name in results.loaded.axes if name not in (axis, series)]
-    fixed = _most_common(results, others)
+    fixed = _most_common(results, [name for name in others if not _follows(results, name, axis)])
     for place, metric in enumerate(metrics):
         panel = panels[place // PANELS_PER_ROW][place % PANELS_PER_ROW]
         _draw_metric(panel, results, metric, axis, series, fixed)
@@ -282,6 +282,13 @@ def survival_drawing(results: Results) -> Drawing | None:
 def _most_common(results: Results, axes: Sequence[str]) -> dict[str, Any]:
     """A value for each axis that a figure cannot show: the last of its list."""
     return {axis: results.loaded.cells[-1].values[axis] for axis in axes}
+
+
+def _follows(results: Results, name: str, axis: str) -> bool:
+    """Whether an axis has one value for each value of another, because they are zipped."""
+    cells = results.loaded.cells
+    pairs = {(as_text(cell.values[axis]), as_text(cell.values[name])) for cell in cells}
+    return len(pairs) == len({value for value, _ in pairs})
 
 
 def _distinct(values: Any) -> list[Any]:

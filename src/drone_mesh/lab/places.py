@@ -18,6 +18,7 @@ from drone_mesh.layouts import Layouts, UnknownCase
 
 MEAN_DEGREE = 8.0  # the published layouts have 7.3..8.8
 MOST_DRAWS = 2000  # for a random layout that must be connected
+BESIDE_M = 0.1  # between drones at the end of a line
 PLACES_HEADER = ["id", "x", "y", "role"]
 
 
@@ -45,8 +46,7 @@ def draw_places(
     if layout.kind == "casus":
         return _casus(layout)
     if layout.kind == "line":
-        drones, step_m = range(layout.drones), layout.spacing_m
-        places = [StartPoint(i, i * step_m, 0.0, i < layout.gateways) for i in drones]
+        places = _line(layout)
     elif layout.kind == "grid":
         places = _grid(layout)
     else:
@@ -103,6 +103,16 @@ def _casus(layout: Layout) -> list[StartPoint]:
         if order.node_id not in taken
     ]
     return sorted(places)
+
+
+def _line(layout: Layout) -> list[StartPoint]:
+    end = max(0, layout.drones - layout.at_end)
+    return [
+        StartPoint(
+            i, min(i, end) * layout.spacing_m, max(0, i - end) * BESIDE_M, i < layout.gateways
+        )
+        for i in range(layout.drones)
+    ]
 
 
 def _grid(layout: Layout) -> list[StartPoint]:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Mapping, NamedTuple, Sequence, Tuple
 
 from drone_mesh.air.graph import Graph
+from drone_mesh.communication.data.ticket import Ticket
+from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.lab.flights import Leg
 from drone_mesh.lab.impairments import Traffic
 from drone_mesh.lab.link_watch import LinkWatch
@@ -67,6 +69,9 @@ class RunRecord:
     legs: Sequence[Leg]
     traffic: Mapping[int, Traffic]  # by message type
     orders: Sequence[OrderAttempt]
+    tickets: Sequence[Ticket]  # users' messages
+    received: Sequence[ReceivedMessage]  # of these, at the gateways
+    messages_since_s: float  # when they were handed in
     collisions: int
     min_distance_m: float  # of two drones that were not as close at the start; inf: not measured
     end_s: float
@@ -78,10 +83,9 @@ class RunRecord:
     left_behind: Mapping[int, str]  # live routers that are not connected at the end -> why
     able: frozenset[int]  # drones that can fly and know roughly where a gateway is, at the end
     endless_packets: int  # dropped at the limit of hops
-    refused_flights: int = 0
-    links: LinkWatch | None = None  # of a run with motion or probes
-    probes: Sequence[ProbeFate] = ()
-    frames: Mapping[str, int] | None = None  # shared channel: "control" and "data"
+    links: LinkWatch | None  # of a run with motion or probes
+    probes: Sequence[ProbeFate]
+    frames: Mapping[str, int] | None  # shared channel: "control" and "data"
 
     @property
     def healed_at_s(self) -> float | None:

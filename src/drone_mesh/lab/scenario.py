@@ -15,6 +15,7 @@ from typing_extensions import Annotated, Literal
 
 from drone_mesh.air.obstacle_file import BoxRow
 from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES
 from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.communication.routing.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.timing import MeshTiming
@@ -49,7 +50,7 @@ class Layout(Part):
         "uniform": frozenset({"mean_degree", *_RANDOM}),
         "clusters": frozenset({"clusters", "cluster_radius_m", *_RANDOM}),
         "grid": frozenset({"drones", "columns", "spacing_m"}),
-        "line": frozenset({"drones", "spacing_m"}),
+        "line": frozenset({"drones", "spacing_m", "at_end"}),
         "casus": frozenset({"case"}),
         "file": frozenset({"path", "places"}),
     }
@@ -67,6 +68,7 @@ class Layout(Part):
     cluster_radius_m: Above0 = 9.0
     columns: Optional[Annotated[int, Field(ge=1, le=MAX_DRONES)]] = None  # default: a square
     spacing_m: Above0 = 6.0
+    at_end: Annotated[int, Field(ge=1, le=MAX_DRONES)] = 1  # line: so many, 0.1 m apart
     case: int = 0  # of config/casus.yaml
     path: Optional[str] = None  # file: id,x,y,role lines, beside the experiment
     places: Optional[List[List[float]]] = None  # its content: id, x, y, 1 for a gateway
@@ -299,6 +301,15 @@ class FlightOrders(Part):
         return self
 
 
+class Messages(Part):
+    """Users' messages to the first gateway, handed in at once, by these drones in turn."""
+
+    ids: Annotated[List[NodeId], Field(min_length=1)]
+    number: Annotated[int, Field(ge=1, le=10_000)]
+    size: Annotated[int, Field(ge=0, le=MAX_MESSAGE_BYTES)] = MAX_MESSAGE_BYTES
+    reliable: bool = True
+
+
 class Wind(Part):
     """Wind, which slows flights."""
 
@@ -311,7 +322,7 @@ class Fault(Part):
 
     ACTIONS: ClassVar[Tuple[str, ...]] = (
         "kill", "revive", "cut_link", "jam", "gateway_off", "loss", "battery", "churn", "order",
-        "wind",
+        "send", "wind",
     )  # fmt: skip
 
     at_s: Optional[AtLeast0] = None
@@ -325,6 +336,7 @@ class Fault(Part):
     battery: Optional[Battery] = None
     churn: Optional[Churn] = None
     order: Optional[FlightOrders] = None
+    send: Optional[Messages] = None
     wind: Optional[Wind] = None
 
     @field_validator("when")

@@ -8,6 +8,7 @@ import random
 from dataclasses import dataclass
 from typing import Callable, Iterator, NamedTuple, Protocol, Sequence
 
+from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.conditions import StartCondition, parse_condition
@@ -64,6 +65,8 @@ class Timeline:
         """Schedule the faults on the network's clock."""
         self.happened: list[Happened] = []
         self.orders: list[OrderAttempt] = []
+        self.tickets: list[Ticket] = []
+        self.messages_since_s = 0.0
         self.first_disruption_s: float | None = None
         self._network, self._impairments, self._flights = network, impairments, flights
         self._scenario, self._streams = scenario, streams
@@ -267,6 +270,15 @@ class Timeline:
         )
         taken = gateway is not None and self._network.order(node, x, y, height, gateway)
         self.orders.append(OrderAttempt(self._network.clock.now_s, node, taken))
+
+    def _send(self, fault: Fault, _rng: random.Random) -> list[int]:
+        what, gateway = fault.what, gateways_of(self._network)[0]
+        senders = [what.ids[number % len(what.ids)] for number in range(what.number)]
+        self.messages_since_s = self._network.clock.now_s
+        for node in senders:
+            payload = bytes(what.size)
+            self.tickets.append(self._network.send(node, gateway, payload, reliable=what.reliable))
+        return sorted(set(senders))
 
     def _wind(self, fault: Fault, _rng: random.Random) -> list[int]:
         drones = [node.drone for node in self._network.nodes.values()]

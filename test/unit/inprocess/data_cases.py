@@ -10,7 +10,7 @@ import random
 import sys
 
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.data_benchmark import LossyDisc
+from drone_mesh.nrf24.emulator.links import IdealDisc, ScriptedLoss
 
 SENDER = 9
 _LADDER = {  # two ways from the gateway to node 9, with rungs between them
@@ -24,7 +24,8 @@ def play(seed, radio="disc"):
     rng = random.Random(f"data {seed}")
     loss, jitter_s = rng.choice((0.0, 0.02, 0.05, 0.1)), rng.choice((0.0, 0.003))
     if radio == "shared":
-        links = LossyDisc(8.0, loss, random.Random(f"loss {seed}"))
+        frames = random.Random(f"loss {seed}")
+        links = ScriptedLoss(IdealDisc(8.0), lambda _hop: frames.random() < loss)
         network = Network(seed=seed, radio="shared", links=links, max_distance_m=8.0)
     else:
         network = Network(seed=seed, loss=loss, jitter_s=jitter_s, max_distance_m=8.0)

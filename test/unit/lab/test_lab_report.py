@@ -152,7 +152,8 @@ def test_tables_prints_the_tables_of_the_report_as_markdown(
     results_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["tables", str(results_folder), "--only", "cells"]) == 0
-    header, rule, *rows = capsys.readouterr().out.splitlines()
+    title, _, header, rule, *rows = capsys.readouterr().out.splitlines()
+    assert title.startswith("Results by cell. ")
     assert header.startswith("| connection_lost_after_s | drones | n | ")
     assert set(rule) == set("|-")
     assert header.count("|") == rule.count("|") == rows[0].count("|")

@@ -1,4 +1,4 @@
-"""Which nodes of a line may send at once: the bound of the data benchmark, against the emulator."""
+"""Which nodes of a line may send at once: the bound for users' data, against the emulator."""
 
 from __future__ import annotations
 
@@ -6,11 +6,41 @@ import pytest
 from chip_lab import Lab
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.inprocess.data_benchmark import SPACING_M, reuse_distance
+from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import IdealDisc
 from drone_mesh.nrf24.settings import DATA_RATES, RadioSettings
 
+SPACING_M = 6.0
 LATER_S = [2.5e-4 * step for step in range(8)]  # the second pair starts so much after the first
+
+
+def reuse_distance(settings):
+    """The least hops between two senders in the line that can send at once, each to its next node.
+
+    A packet and its acknowledgement count as a whole: every frame of one pair has to arrive during
+    every frame of the other, by the emulator's own rule of capture. Between the sender of one pair
+    and the receiver of the other there is one hop less than between the senders.
+    """
+    capture_db = CAPTURE_DB[settings.data_rate.value]
+
+    def power_dbm(one, other):
+        distance_m = SPACING_M * abs(one - other)
+        return IdealDisc(MAX_DISTANCE_M).received_dbm(distance_m, settings.power.value, 2400)
+
+    def undisturbed(pair, others):
+        return all(
+            power_dbm(other, receiver) <= power_dbm(sender, receiver) - capture_db
+            for sender, receiver in (pair, pair[::-1])
+            for other in others
+        )
+
+    distance = 2  # a node cannot send and receive at once
+    while not (
+        undisturbed((0, 1), (distance, distance + 1))
+        and undisturbed((distance, distance + 1), (0, 1))
+    ):
+        distance += 1
+    return distance
 
 
 def lost(settings, distance):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 
+from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.lab.metrics.registry import METRICS, NAN, Metric, metric
@@ -92,6 +93,28 @@ def orders_unreported(run: RunRecord) -> float:
 def order_delay_ms(run: RunRecord) -> float:
     delays = [delay for delay in _order_delays(run) if delay is not None]
     return 1000.0 * statistics.median(delays) if delays else NAN
+
+
+@metric(
+    "kbit/s", "users' data that arrived, from the first hand-in to the last arrival", better="more"
+)
+def data_rate(run: RunRecord) -> float:
+    if not run.received:
+        return 0.0 if run.tickets else NAN
+    seconds = max(message.received_s for message in run.received) - run.messages_since_s
+    return sum(len(message.payload) for message in run.received) * 8 / seconds / 1000
+
+
+@metric(
+    "share", "users' messages that arrived; reliable ones: as their sender knows", better="more"
+)
+def data_delivered(run: RunRecord) -> float:
+    if not run.tickets:
+        return NAN
+    if run.tickets[0].reliable:
+        known = sum(ticket.state is TicketState.DELIVERED for ticket in run.tickets)
+        return known / len(run.tickets)
+    return len(run.received) / len(run.tickets)
 
 
 def _order_delays(run: RunRecord) -> list[float | None]:
