@@ -180,7 +180,9 @@ def _draw_points(
     lows = [i.value if math.isnan(i.low) else i.low for _, i in points]
     highs = [i.value if math.isnan(i.high) else i.high for _, i in points]
     if is_numeric:
-        axes.plot(xs, means, color=colour, marker=marker, ms=4, lw=1.4, label=label)
+        axes.plot(
+            xs, means, color=colour, marker=marker, ms=4, lw=1.4, ls=_line_style(order), label=label
+        )
         axes.fill_between(xs, lows, highs, color=colour, alpha=0.16, lw=0)
         return
     shift = (order - (lines - 1) / 2) * 0.6 / max(lines, 1)
@@ -260,7 +262,7 @@ def survival_drawing(results: Results) -> Drawing | None:
             xs = [t for t, _ in curve] + [end_s]
             ys = [1 - share for _, share in curve] + [1 - curve[-1][1]]
             axes.step(xs, ys, where="post", color=COLOURS[order % len(COLOURS)], lw=1.5,
-                      label=label)  # fmt: skip
+                      ls=_line_style(order), label=label)  # fmt: skip
         words = [f"{results.axis_names[name]} = {value}" for name, value in zip(others, key)]
         axes.set_title(", ".join(words), loc="left", fontsize=8)
         axes.set_ylim(0, 1.03)
@@ -321,6 +323,11 @@ def _short(text: str) -> str:
 
 def _file_name(axis: str) -> str:
     return "".join(letter if letter.isalnum() else "_" for letter in axis)
+
+
+def _line_style(order: int) -> str:
+    """Dashed once the colours repeat."""
+    return "-" if order < len(COLOURS) else "--"
 
 
 def _style(axes: Axes, grid: Literal["x", "y"] = "y") -> None:
