@@ -1,7 +1,12 @@
-"""Draws what each repair strategy and each routing technique does: docs/pictures/*.svg."""
+"""Draws what each repair strategy and each routing technique does, and a report of the lab.
+
+They become pictures in docs/pictures.
+"""
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from pathlib import Path
 from typing import Callable
 
@@ -12,12 +17,20 @@ from matplotlib.figure import Figure
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.flight_path import FlightPath
 from drone_mesh.inprocess import Network
+from drone_mesh.lab.command import main as lab
 from drone_mesh.lab.network_sample import physical_graph
 from drone_mesh.lab.quiet import quiet_nodes
 from drone_mesh.report.drawing import in_style, svg_of_its_own
 from drone_mesh.view.palette import LIGHT
 
-PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+ROOT = Path(__file__).resolve().parents[1]
+PICTURES = ROOT / "docs" / "pictures"
+CHROMIUM_FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+PAGE = {"width": 900, "height": 1250}  # px: the first screens of a report
+REPORTED = (
+    "title=Healing of fifty drones", "seeds=8", "base.layout.drones=50",
+    "sweep.repair=[thesis,scout,home]", "sweep.faults.kill=[{share: 0.3}]",
+)  # fmt: skip
 STRATEGIES = ("thesis", "scout", "nearest", "follow", "inward", "field", "home", "oracle")
 TECHNIQUES = (
     "child_table_tree", "steady_tree", "etx_tree", "babel", "batman", "dsdv", "flooding",
@@ -42,6 +55,36 @@ def main() -> None:
             out = PICTURES / f"{name}.svg"
             out.write_text(svg_of_its_own(panels(names, draw, height_in)), encoding="utf-8")
             print(f"wrote {out}")
+    picture_of_report(PICTURES / "lab.png")
+
+
+def picture_of_report(out: Path) -> None:
+    """Run a small experiment, and photograph its report."""
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        results = str(Path(folder) / "heal")
+        experiment = str(ROOT / "experiments" / "heal.yaml")
+        lab(
+            [
+                "run",
+                experiment,
+                *REPORTED,
+                "base.layout.drones=50",
+                "--workers",
+                "0",
+                "--out",
+                results,
+            ]
+        )
+        lab(["report", results, "--out", f"{folder}/report.html"])
+        chromium = shutil.which("chromium")
+        browser = playwright.chromium.launch(executable_path=chromium, args=CHROMIUM_FLAGS)
+        page = browser.new_page(viewport=PAGE)
+        page.goto(f"file://{folder}/report.html")
+        page.screenshot(path=out)
+        browser.close()
+    print(f"wrote {out}")
 
 
 def panels(names: tuple[str, ...], draw: Callable[[Axes, str], str], height_in: float) -> Figure:

@@ -4,8 +4,8 @@ It models what decides the fate of a packet: the duration of frames, half-duplex
 acknowledgements and their loss, overlapping frames (with capture), the FIFO of three payloads, and
 the rules by which the driver uses the channel. These rules are the driver's own code
 (`nrf24.medium_access`), and the link models are the emulator's (`nrf24.emulator.links`). It omits
-the chip: registers, SPI and bits. `python3 -m drone_mesh.lab.proofs.air_validation` compares it
-with the emulator.
+the chip: registers, SPI and bits. `experiments/model.yaml` compares it with the
+emulator.
 """
 
 from __future__ import annotations

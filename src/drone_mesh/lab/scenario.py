@@ -100,12 +100,13 @@ class Radio(Part):
     KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
         "disc": frozenset({"loss", "delay_s", "jitter_s"}),
         "shared": frozenset({"rate", "links", "loss"}),
+        "chips": frozenset({"rate", "links", "loss"}),
     }
 
-    kind: Literal["disc", "shared"] = "disc"
-    rate: Optional[Literal["250k", "1M", "2M"]] = None  # shared: of the air; default: 250k
-    links: Literal["disc", "distance"] = "disc"  # shared: power falls with it, edge at range_m
-    loss: Share = 0.0  # disc: of the packets on each link; shared: of all frames
+    kind: Literal["disc", "shared", "chips"] = "disc"
+    rate: Optional[Literal["250k", "1M", "2M"]] = None  # not disc: of the air; default: 250k
+    links: Literal["disc", "distance"] = "disc"  # not disc: power falls with it, edge at range_m
+    loss: Share = 0.0  # disc: of the packets on each link; others: of all frames
     delay_s: AtLeast0 = 0.002
     jitter_s: AtLeast0 = 0.0
 
@@ -429,7 +430,7 @@ class Scenario(Part):
 
     @model_validator(mode="after")
     def _suits_its_radio(self) -> "Scenario":
-        if self.radio.kind == "shared":
+        if self.radio.kind != "disc":
             for fault in self.faults:
                 if fault.action in ("cut_link", "jam", "loss"):
                     raise ValueError(f"fault {fault.action} is for the disc radio")

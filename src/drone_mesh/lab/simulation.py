@@ -14,7 +14,9 @@ from drone_mesh.air.graph import Graph
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.chip_air import ChipAir, ChipAntenna
 from drone_mesh.inprocess.positions import PositionErrors
+from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.inprocess.shared_air import SharedAir
 from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.lab.flights import Flights
@@ -111,10 +113,10 @@ class Simulation:
             yield clock.now_s
 
     def record(self) -> RunRecord:
-        """The record, once all samples are taken."""
+        """The record, once all samples are taken. The network stops."""
         network, scenario, nodes = self.network, self.scenario, self.network.nodes
         assert self._start is not None  # a run has at least one sample
-        return RunRecord(
+        record = RunRecord(
             scenario=scenario,
             gateways=frozenset(gateways_of(network)),
             start=self._start,
@@ -155,6 +157,8 @@ class Simulation:
                 if "too many hops" in reason
             ),
         )
+        network.stop()
+        return record
 
     def _move(self, flown: dict[int, Track]) -> None:
         if self.scenario.mobility.told:
@@ -247,10 +251,11 @@ class Simulation:
 
 def _air_figures(network: Network) -> AirFigures | None:
     air = network.air
-    if not isinstance(air, SharedAir):
+    if isinstance(air, InProcessAir):
         return None
+    assert isinstance(air, (SharedAir, ChipAir))
     antennas = [node.antenna for node in network.nodes.values()]
-    radios = [antenna.statistics() for antenna in antennas if isinstance(antenna, SharedAntenna)]
+    radios = [a.statistics() for a in antennas if isinstance(a, (SharedAntenna, ChipAntenna))]
     return AirFigures(
         air.airtime_s,
         air.collisions,

@@ -144,7 +144,7 @@ def test_26_nodes_on_one_channel_connect_and_stay_connected():
 
 @pytest.mark.slow
 def test_the_fast_model_agrees_with_the_chips():
-    """A minute of 26 nodes, three seeds; drone_mesh.lab.proofs.air_validation shows more."""
+    """A minute of 26 nodes, three seeds; experiments/model.yaml shows more."""
     chips, model = Counter(), Counter()
     for seed in (1, 2, 3):
         mesh = grid(26, seed)
