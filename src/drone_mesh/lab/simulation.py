@@ -6,19 +6,17 @@ import hashlib
 import math
 import time
 from dataclasses import replace
-from typing import Any, Callable, Iterator
+from typing import Any, Callable, Iterator, Protocol, cast
 
 import numpy as np
 
 from drone_mesh.air.graph import Graph
+from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.chip_air import ChipAir, ChipAntenna
 from drone_mesh.inprocess.positions import PositionErrors
 from drone_mesh.inprocess.radio import InProcessAir
-from drone_mesh.inprocess.shared_air import SharedAir
-from drone_mesh.inprocess.shared_antenna import SharedAntenna
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.impairments import Impairments
 from drone_mesh.lab.link_watch import LinkWatch
@@ -249,13 +247,24 @@ class Simulation:
                 self._pairs.add((min(node, other), max(node, other)))
 
 
+class _Channel(Protocol):
+    """The air of radios that share a channel."""
+
+    airtime_s: float
+    collisions: int
+
+
+class _Radio(Protocol):
+    """The antenna of one of them."""
+
+    def statistics(self) -> RadioStatistics: ...
+
+
 def _air_figures(network: Network) -> AirFigures | None:
-    air = network.air
-    if isinstance(air, InProcessAir):
+    if isinstance(network.air, InProcessAir):
         return None
-    assert isinstance(air, (SharedAir, ChipAir))
-    antennas = [node.antenna for node in network.nodes.values()]
-    radios = [a.statistics() for a in antennas if isinstance(a, (SharedAntenna, ChipAntenna))]
+    air = cast(_Channel, network.air)
+    radios = [cast(_Radio, node.antenna).statistics() for node in network.nodes.values()]
     return AirFigures(
         air.airtime_s,
         air.collisions,
