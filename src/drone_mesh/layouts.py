@@ -1,4 +1,4 @@
-"""Layouts of the DroneManager: positions of drones, by case (docs/protocol.md, "Drone manager")."""
+"""Layouts of the DroneManager: positions of drones, by case (docs/ros.md, "Drone manager")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Layouts: shipped cases, built-in cases, refused files (docs/protocol.md, "Drone manager")."""
+"""Layouts: shipped cases, built-in cases, refused files (docs/ros.md, "Drone manager")."""
 
 from __future__ import annotations
 

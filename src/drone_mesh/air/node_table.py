@@ -26,7 +26,7 @@ Sees = Optional[Callable[[Position, np.ndarray], np.ndarray]]
 class NodeTable:
     """The rules of the simulated air. Not thread-safe.
 
-    docs/protocol.md, "Wireless signal simulator" and "Sources of DroneInfo".
+    docs/ros.md, "Wireless signal simulator" and "Sources of DroneInfo".
     """
 
     def __init__(self, max_distance_m: float = MAX_DISTANCE_M, sees: Sees = None) -> None:

@@ -1,12 +1,12 @@
 """The packets of the mesh: 32 bytes, little-endian, zero padded.
 
-docs/protocol.md, "Packets".
+docs/wire.md, "Packets".
 
 Each class encodes and decodes its own bytes. No other module defines an offset in them; the seals,
 which cover packets of every type, use the offsets of the header bytes below. The constructor
 arguments are those of the original encoder, in its order: creator, from, to, forward, then the
 body. Any byte value can be encoded and decoded; the receiving component decides whether an id is
-valid (docs/protocol.md, "Bad input").
+valid (docs/wire.md, "Bad input").
 """
 
 from __future__ import annotations

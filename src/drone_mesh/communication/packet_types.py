@@ -1,8 +1,8 @@
-"""The packet types of the mesh: one declaration per type (docs/protocol.md, "Packets").
+"""The packet types of the mesh: one declaration per type (docs/wire.md, "Packets").
 
 Everything that differs by type follows from here: the checks and the dispatch of a component, the
 kinds that pages show, the counters of the lab and, through `scripts/packet_tables`, the table in
-docs/protocol.md and the Wireshark dissector.
+docs/wire.md and the Wireshark dissector.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Priority(enum.IntEnum):
 
 
 class Handler(enum.Enum):
-    """Who handles a packet when it has arrived; the values are words of docs/protocol.md."""
+    """Who handles a packet when it has arrived; the values are words of docs/wire.md."""
 
     NODE = "every node"
     GATEWAY = "a gateway"

@@ -1,4 +1,4 @@
-"""A fleet: ids, roles and start positions (docs/protocol.md, "Identity", "Fleet")."""
+"""A fleet: ids, roles and start positions (docs/wire.md, "Identity", and docs/ros.md, "Fleet")."""
 
 from __future__ import annotations
 

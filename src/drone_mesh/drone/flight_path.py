@@ -1,4 +1,4 @@
-"""Geometry and timing of a flight (docs/protocol.md, "World and flights")."""
+"""Geometry and timing of a flight (docs/ros.md, "World and flights")."""
 
 from __future__ import annotations
 

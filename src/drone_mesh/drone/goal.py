@@ -1,4 +1,4 @@
-"""The goals that a drone accepts (docs/protocol.md, "Goals"); checked wherever orders pass."""
+"""The goals that a drone accepts (docs/ros.md, "Goals"); checked wherever orders pass."""
 
 from __future__ import annotations
 

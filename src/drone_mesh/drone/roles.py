@@ -18,5 +18,5 @@ class Role(enum.IntEnum):
 
     @property
     def size_m(self) -> tuple[float, float, float]:
-        """Edges of its box along x, y, z, in metres (docs/protocol.md, "World and flights")."""
+        """Edges of its box along x, y, z, in metres (docs/ros.md, "World and flights")."""
         return (0.2, 0.1, 0.2) if self is Role.GATEWAY else (0.2, 0.2, 0.1)

@@ -6,7 +6,6 @@ import math
 import random
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.inprocess.chip_air import ChipAir
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.radio import InProcessAir
@@ -38,6 +37,8 @@ def create_air(
     if radio == "shared":
         return SharedChannel(VirtualClock(), links, settings, max_distance_m)
     if radio == "chips":
+        from drone_mesh.inprocess.chip_air import ChipAir  # needs greenlet
+
         return ChipAir(links, settings, max_distance_m, random.Random(rng.random()))
     raise ConfigurationError(f"invalid radio {radio!r}: use disc, shared or chips")
 

@@ -1,6 +1,6 @@
 """StandingOrders: formations as goals, kept until each drone is at its place.
 
-docs/protocol.md, "Drone manager". An order through the mesh is lost on a drone that has no route at
+docs/ros.md, "Drone manager". An order through the mesh is lost on a drone that has no route at
 that moment, and a drone in flight has none: what has not been accepted is ordered again.
 """
 

@@ -1,4 +1,4 @@
-"""VirtualDrone and its two kinds: body and engine (docs/protocol.md, "World and flights")."""
+"""VirtualDrone and its two kinds: body and engine (docs/ros.md, "World and flights")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DroneEngine: position and flight of one drone (docs/protocol.md, "World and flights")."""
+"""DroneEngine: position and flight of one drone (docs/ros.md, "World and flights")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DroneFactory: creates a fleet in a world and changes it (docs/protocol.md, "Fleet")."""
+"""DroneFactory: creates a fleet in a world and changes it (docs/ros.md, "Fleet")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rules of the simulated air (docs/protocol.md, "Wireless signal simulator")."""
+"""The rules of the simulated air (docs/ros.md, "Wireless signal simulator")."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def test_a_type_that_is_added_is_found_everywhere(tmp_path):
             ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__")
         )
     (tmp_path / "docs").mkdir()
-    shutil.copy(ROOT / "docs" / "protocol.md", tmp_path / "docs")
+    shutil.copy(ROOT / "docs" / "wire.md", tmp_path / "docs")
     declared = tmp_path / "src" / Path(packet_types.__file__).relative_to(ROOT / "src")
     text = declared.read_text(encoding="utf-8")
     before = "    # Where a gateway was"
@@ -146,7 +146,7 @@ def test_a_type_that_is_added_is_found_everywhere(tmp_path):
     assert "dropped a packet with a number that is not finite: 0500630101" in dropped
     assert "dropped a place from a node with another or an unknown origin: 0500630101" in dropped
     run(tmp_path / "scripts" / "packet_tables")
-    page = (tmp_path / "docs" / "protocol.md").read_text(encoding="utf-8")
+    page = (tmp_path / "docs" / "wire.md").read_text(encoding="utf-8")
     row = "| 99 | WIND | `WindMessage` | float32 latitude, uint8 gust | every node |"
     assert row in page.splitlines()
     dissector = tmp_path / "src" / "drone_mesh" / "raspberry" / "drone_mesh.lua"

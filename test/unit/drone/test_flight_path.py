@@ -1,4 +1,4 @@
-"""FlightPath against the corners of a flight (docs/protocol.md, "World and flights")."""
+"""FlightPath against the corners of a flight (docs/ros.md, "World and flights")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DroneFactory: ids, roles, start places, sizes and colours (docs/protocol.md, "Fleet")."""
+"""DroneFactory: ids, roles, start places, sizes and colours (docs/ros.md, "Fleet")."""
 
 from __future__ import annotations
 

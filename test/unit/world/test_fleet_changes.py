@@ -1,4 +1,4 @@
-"""DroneFactory: adding drones to a fleet and removing them (docs/protocol.md, "Fleet")."""
+"""DroneFactory: adding drones to a fleet and removing them (docs/ros.md, "Fleet")."""
 
 from __future__ import annotations
 

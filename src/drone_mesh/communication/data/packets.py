@@ -1,4 +1,4 @@
-"""The packets of users' data: types and bodies (docs/protocol.md, "Data").
+"""The packets of users' data: types and bodies (docs/wire.md, "Data").
 
 No other module knows an offset in them. A message is cut into fragments. The type of a packet says
 which fragment it carries, so that one byte of the body, the message's id, is all the header that

@@ -1,4 +1,4 @@
-"""Transport: users' messages to and from one node (docs/protocol.md, "Data").
+"""Transport: users' messages to and from one node (docs/wire.md, "Data").
 
 The component passes in packets of users' types and the time; this class has no thread and no clock.
 Messages to send go to outboxes, one per destination; received packets go to inboxes, one per

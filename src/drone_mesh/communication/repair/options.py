@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from drone_mesh.errors import ConfigurationError
 
 DEFAULT_REPAIR = "thesis"
-RANGE_M = 9.0  # docs/protocol.md, "Wireless signal simulator": a node nearer than this is in range
+RANGE_M = 9.0  # docs/ros.md, "Wireless signal simulator": a node nearer than this is in range
 CLEARANCE_M = 0.5  # docs/protocol.md, "Negotiation": a drone nearer than this occupies a place
 
 

@@ -63,7 +63,7 @@ def flight_order(node_id: int, goal: Location) -> RequestGatewayDroneFlight:
     )
 
 
-# DroneInfo (docs/protocol.md, "Sources of DroneInfo") -------------------------------------------
+# DroneInfo (docs/ros.md, "Sources of DroneInfo") -------------------------------------------
 
 
 def engine_info(node_id: int, position: Vector) -> DroneInfo:

@@ -1,4 +1,4 @@
-"""Names in the ROS graph: those of docs/protocol.md, "ROS interface", and our additions."""
+"""Names in the ROS graph: those of docs/ros.md, "ROS interface", and our additions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""VirtualNRF24: an antenna in the simulated air (docs/protocol.md, "Virtual antenna")."""
+"""VirtualNRF24: an antenna in the simulated air (docs/ros.md, "Virtual antenna")."""
 
 from __future__ import annotations
 

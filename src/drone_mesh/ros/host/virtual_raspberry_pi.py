@@ -1,4 +1,4 @@
-"""VirtualRaspberryPi, a simulated drone's computer (docs/protocol.md, "Virtual Raspberry Pi")."""
+"""VirtualRaspberryPi, a simulated drone's computer (docs/ros.md, "Virtual Raspberry Pi")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DroneManager: orders to drones, through the gateways (docs/protocol.md, "Drone manager")."""
+"""DroneManager: orders to drones, through the gateways (docs/ros.md, "Drone manager")."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from drone_mesh.srv import (
     WithdrawLayoutResponse,
 )
 
-WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/protocol.md, "Drone manager")
+WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
 POLL_PERIOD_S = 0.05
 ORDERS_IN_QUEUE = 512  # two whole fleets

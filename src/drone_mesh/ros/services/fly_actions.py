@@ -1,4 +1,4 @@
-"""The node /fly_actions: drone flights as actions (docs/protocol.md, "Actions")."""
+"""The node /fly_actions: drone flights as actions (docs/ros.md, "Actions")."""
 
 from __future__ import annotations
 

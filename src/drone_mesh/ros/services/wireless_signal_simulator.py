@@ -1,6 +1,6 @@
 """WirelessSignalSimulator: the simulated air as a ROS node.
 
-docs/protocol.md, "Wireless signal simulator".
+docs/ros.md, "Wireless signal simulator".
 """
 
 from __future__ import annotations

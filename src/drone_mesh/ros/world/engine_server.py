@@ -1,4 +1,4 @@
-"""EngineServer: the ROS side of a drone's engine (docs/protocol.md, "World and flights")."""
+"""EngineServer: the ROS side of a drone's engine (docs/ros.md, "World and flights")."""
 
 from __future__ import annotations
 
