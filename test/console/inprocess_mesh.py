@@ -6,12 +6,15 @@ import random
 import threading
 import time
 from dataclasses import replace
+from typing import Sequence
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.inprocess.network import Network
 from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.missions import Mission
+from drone_mesh.mobility.pilot import along
 from drone_mesh.state.events import EventBatcher
 from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.packets import PacketSampler
@@ -128,6 +131,17 @@ class InProcessMesh:
             add = self._network.add_gateway if gateway else self._network.add_router
             add(node, x, y, self._network.now_s())
         return f"added {'gateway' if gateway else 'router'} {node} at x {x:g} m, y {y:g} m"
+
+    def mission(self, nodes: Sequence[int], mission: Mission) -> str:
+        with self._lock:
+            tracks = {
+                node: along(mission.waypoints, mission.speed_m_s, mission.loop) for node in nodes
+            }
+            self._network.fly(tracks)
+        return f"the mission of {len(nodes)} drones has begun"
+
+    def pilots(self, action: str) -> str:
+        raise OrderRefused("no drone has a mission")
 
     def remove(self, node: int) -> str:
         with self._lock:

@@ -266,3 +266,30 @@ def test_the_page_of_a_real_mesh_offers_only_what_its_gateway_can_carry_out(star
 def toast(page: Visit) -> str:
     """The latest one."""
     return str(page.page.evaluate("document.querySelector('#toasts').lastChild?.textContent ?? ''"))
+
+
+def test_a_mission_is_drawn_by_clicks_and_sent_to_the_selected_drone(page):
+    page.page.mouse.click(*on_screen(page, *PLACES[17]))
+    page.page.click("#mission")
+    assert page.page.inner_text("#mission-text") == "0 waypoints, drone 17"
+    assert page.page.is_disabled("#mission-send")
+    for x, y in ((20.0, 4.0), (24.0, 4.0), (24.0, 8.0)):
+        page.page.mouse.click(*on_screen(page, x, y))
+    page.page.click("#mission-back")
+    assert page.page.inner_text("#mission-text") == "2 waypoints, drone 17"
+    page.page.fill("#mission-speed", "fast")
+    page.page.click("#mission-send")
+    assert page.page.inner_text("#mission-error") == "speed must be a number from 0.01 to 20"
+    page.page.fill("#mission-speed", "0.5")
+    page.page.click("#mission-send")
+    page.wait_for("what came of it", lambda: toast(page) == "the mission of 1 drones has begun")
+    assert not page.page.is_visible("#mission-form")
+
+
+def test_missions_are_paused_and_aborted_for_all_drones(page):
+    page.page.click("#mission")
+    assert page.page.inner_text("#mission-text") == "0 waypoints, no drone: select one first"
+    page.page.click("#mission-stop")
+    page.wait_for("what came of it", lambda: toast(page) == "no drone has a mission")
+    page.page.keyboard.press("Escape")
+    assert not page.page.is_visible("#mission-form")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, Sequence
 
 from drone_mesh.errors import MeshError
+from drone_mesh.missions import Mission
 
 RECORDED = "this is a recording: it cannot be changed"
 
@@ -28,6 +29,10 @@ class MeshControls(Protocol):
 
     def remove(self, node: int) -> str: ...
 
+    def mission(self, nodes: Sequence[int], mission: Mission) -> str: ...
+
+    def pilots(self, action: str) -> str: ...
+
 
 class RecordingControls:
     """The MeshControls of a recording: nothing can be ordered."""
@@ -49,4 +54,10 @@ class RecordingControls:
         raise OrderRefused(RECORDED)
 
     def remove(self, node: int) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def mission(self, nodes: Sequence[int], mission: Mission) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def pilots(self, action: str) -> str:  # noqa: D102
         raise OrderRefused(RECORDED)

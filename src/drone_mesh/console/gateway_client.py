@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, Sequence
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.errors import MeshError
+from drone_mesh.missions import Mission
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two seconds
@@ -41,6 +42,9 @@ class GatewayClient:
             return ask_json(f"{self.url}{path}", ANSWER_WITHIN_S, self._token, method, body)
         except NoAnswer as error:
             raise GatewayGone(str(error)) from error
+
+
+OWN_AUTOPILOT = "the missions of real drones belong to their autopilots"
 
 
 class GatewayControls:
@@ -78,3 +82,11 @@ class GatewayControls:
     def remove(self, node: int) -> str:
         """Refused."""
         raise OrderRefused("a real drone leaves when it is switched off")
+
+    def mission(self, nodes: Sequence[int], mission: Mission) -> str:
+        """Refused."""
+        raise OrderRefused(OWN_AUTOPILOT)
+
+    def pilots(self, action: str) -> str:
+        """Refused."""
+        raise OrderRefused(OWN_AUTOPILOT)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Iterable, Literal, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Iterable, List, Literal, NamedTuple, Optional, Sequence, Tuple, Union
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from typing_extensions import Annotated
@@ -11,9 +11,11 @@ from typing_extensions import Annotated
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
 from drone_mesh.console.controls import MeshControls, OrderRefused
+from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.layouts import MAX_CASE, Order, read_layout
+from drone_mesh.missions import MAX_SPEED_M_S, MOST_WAYPOINTS, Mission
 
 MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here
@@ -26,6 +28,10 @@ LIMITS = {  # for the page's forms; metres, and the largest id
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
+NodeIds = Annotated[List[NodeId], Field(min_length=1, max_length=MAX_DRONES)]
+Waypoints = Annotated[
+    List[Tuple[Coordinate, Coordinate]], Field(min_length=1, max_length=MOST_WAYPOINTS)
+]
 MomentOrNone = Optional[Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]]  # simulated s
 HeardOrNone = Optional[Annotated[float, Field(allow_inf_nan=False)]]  # `at` of the last "alive"
 SwitchOrNone = Optional[bool]
@@ -132,6 +138,31 @@ class _Remove(PageOrder):
         return controls.remove(self.node)
 
 
+class _Mission(PageOrder):
+    """Let the pilots of these drones fly over waypoints; the mesh is not told."""
+
+    do: Literal["mission"]
+    nodes: NodeIds
+    waypoints: Waypoints
+    z: float = Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)
+    speed: float = Field(gt=0, le=MAX_SPEED_M_S, allow_inf_nan=False)
+    loop: bool
+
+    def carry_out(self, controls: MeshControls) -> str:
+        places = [(x, y, self.z) for x, y in self.waypoints]
+        return controls.mission(self.nodes, Mission(places, self.speed, self.loop))
+
+
+class _Pilots(PageOrder):
+    """Pause, resume or stop all missions."""
+
+    do: Literal["pilots"]
+    action: Literal["pause", "resume", "stop"]
+
+    def carry_out(self, controls: MeshControls) -> str:
+        return controls.pilots(self.action)
+
+
 class ReadPlaces(_Request):
     """The page sends a layout file and asks for the positions of its drones."""
 
@@ -201,6 +232,8 @@ _REQUESTS: TypeAdapter[Request] = TypeAdapter(
             TimeLine,
             _Add,
             _Remove,
+            _Mission,
+            _Pilots,
         ],
         Field(discriminator="do"),
     ]

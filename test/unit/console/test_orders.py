@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Sequence
 
 import pytest
 
@@ -14,6 +15,7 @@ from drone_mesh.console.orders import (
     number_of,
     parse_request,
 )
+from drone_mesh.missions import Mission
 
 
 class Notebook:
@@ -45,6 +47,44 @@ class Notebook:
     def remove(self, node: int) -> str:
         self.done.append(("remove", node))
         return "done"
+
+    def mission(self, nodes: Sequence[int], mission: Mission) -> str:
+        self.done.append(("mission", *nodes, mission))
+        return "done"
+
+    def pilots(self, action: str) -> str:
+        self.done.append(("pilots", action))
+        return "done"
+
+
+FLIGHT = {"nodes": [3, 4], "waypoints": [[0, 1], [2, 3]], "z": 2, "speed": 1.5, "loop": True}
+
+
+def test_a_mission_reaches_the_pilots_of_its_drones() -> None:
+    notebook = Notebook()
+    for request in ({"do": "mission", **FLIGHT}, {"do": "pilots", "action": "stop"}):
+        order = parse_request(json.dumps({"number": 1, **request}))
+        assert isinstance(order, PageOrder)
+        order.carry_out(notebook)
+    mission = Mission([(0.0, 1.0, 2.0), (2.0, 3.0, 2.0)], 1.5, True)
+    assert notebook.done == [("mission", 3, 4, mission), ("pilots", "stop")]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"nodes": []},
+        {"waypoints": []},
+        {"waypoints": [[0, 9000]]},
+        {"speed": 0},
+        {"speed": 21},
+        {"z": -1},
+        {"loop": 1},
+    ],
+)
+def test_an_invalid_mission_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(OrderRefused, match="invalid request"):
+        parse_request(json.dumps({"number": 1, "do": "mission", **FLIGHT, **wrong}))
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> Non
     asyncio.run(main())
 
 
-ACTIONS = ["fly", "power", "layout", "speed", "add", "remove", "demonstrate", "packets"]
+ACTIONS = ["fly", "power", "layout", "speed", "add", "remove", "mission", "demonstrate", "packets"]
 KINDS = ["heartbeat", "introduction", "position", "repair", "order", "report", "data", "other"]
 
 

@@ -8,6 +8,7 @@ import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
 import { MapView } from "./map.js";
 import { Mesh } from "./mesh.js";
+import { Missions } from "./missions.js";
 import { PacketDots } from "./packets.js";
 import { NodePanel } from "./panel.js";
 import { Story } from "./story.js";
@@ -88,6 +89,7 @@ const panel = new NodePanel(
   (id, x, y, z) => flights.hold([{ id, x, y, z }]),
 );
 const fleet = new Fleet(mesh, map, order);
+const missions = new Missions(mesh, map, order);
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
 const packets = new PacketDots(mesh, map, connection, byId("map-card"));
@@ -159,7 +161,7 @@ mesh.addEventListener("layouts", () => {
   const offers = (action) => mesh.actions.includes(action);
   byId("pause").hidden = byId("speed").parentElement.hidden = !offers("speed");
   byId("power").hidden = !offers("power");
-  for (const action of ["demonstrate", "add", "remove"]) byId(action).hidden = !offers(action);
+  for (const action of ["demonstrate", "add", "remove", "mission"]) byId(action).hidden = !offers(action);
 });
 
 // Orders
@@ -362,11 +364,12 @@ const KEYS = {
   p: () => mesh.canOrder && panel.switchPower(),
   g: () => panel.focusGoal(),
   f: () => map.fit(),
-  a: () => fleet.open(),
+  a: () => missions.close() || fleet.open(),
+  m: () => fleet.close() || missions.open(),
   Delete: () => fleet.remove(),
   z: () => undo(),
   "?": () => byId("help").showModal(),
-  Escape: () => map.cancelDrag() || fleet.close() || flights.undo() || mesh.select(null),
+  Escape: () => map.cancelDrag() || fleet.close() || missions.close() || flights.undo() || mesh.select(null),
 };
 
 document.addEventListener("keydown", (event) => {

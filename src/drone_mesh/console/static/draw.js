@@ -420,6 +420,26 @@ function drawGoal(context, camera, node, goal, colours, r, withText) {
   context.fillText(`${goal.x.toFixed(1)}, ${goal.y.toFixed(1)} m`, px, py - r - 8);
 }
 
+/** The waypoints [x, y] of a mission that is being drawn. */
+export function drawMission(context, camera, waypoints, colours) {
+  context.strokeStyle = context.fillStyle = colours.accent;
+  context.lineWidth = 2;
+  context.setLineDash([6, 4]);
+  context.beginPath();
+  for (const waypoint of waypoints) context.lineTo(...camera.toScreen(...waypoint));
+  context.stroke();
+  context.setLineDash([]);
+  context.font = "600 12px system-ui, sans-serif";
+  context.textAlign = "center";
+  for (const [number, waypoint] of waypoints.entries()) {
+    const [px, py] = camera.toScreen(...waypoint);
+    context.beginPath();
+    context.arc(px, py, 4, 0, 2 * Math.PI);
+    context.fill();
+    context.fillText(String(number + 1), px, py - 9);
+  }
+}
+
 /** Where a drone {x, y, gateway} would be added, and how far (`range`, m) its radio would reach. */
 export function drawNewDrone(context, camera, place, range, colours, r) {
   const [px, py] = camera.toScreen(place.x, place.y);

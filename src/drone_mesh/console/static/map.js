@@ -3,6 +3,7 @@
 import { Camera } from "./camera.js";
 import {
   drawMesh,
+  drawMission,
   drawNewDrone,
   drawingOrder,
   droneRadius,
@@ -35,6 +36,7 @@ export class MapView {
     this.onPlace = null; // called with the place (x, y) of a click, while the user chooses one
     this.newDrone = null; // {x, y, gateway}, where a drone would be added
     this.held = []; // [{id, x, y}] that are about to leave
+    this.mission = [];
     this.options = { known: true, ranges: false, trails: false };
     this.colours = readColours();
     this.drag = null;
@@ -106,6 +108,12 @@ export class MapView {
     this.redraw();
   }
 
+  /** Shows the waypoints [x, y] of a mission that is being drawn. */
+  showMission(waypoints) {
+    this.mission = waypoints;
+    this.redraw();
+  }
+
   fit() {
     const points = [];
     for (const node of this.mesh.nodes.values()) {
@@ -140,6 +148,7 @@ export class MapView {
     const options = { ...this.options, covered: this.#covered() };
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.#goals());
     this.radius = drawn.radius;
+    drawMission(context, this.camera, this.mission, this.colours);
     if (this.newDrone)
       drawNewDrone(
         context,

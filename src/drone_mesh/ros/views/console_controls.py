@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import logging
+from typing import Sequence
 
 from drone_mesh.console.controls import OrderRefused
+from drone_mesh.missions import Mission
+from drone_mesh.msg import Location
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.persistent_service import (
     Request,
     Response,
@@ -17,6 +21,8 @@ from drone_mesh.ros.graph.persistent_service import (
 from drone_mesh.srv import (
     AddDrone,
     AddDroneRequest,
+    FlyMission,
+    FlyMissionRequest,
     OrderLayout,
     OrderLayoutRequest,
     PowerSwitch,
@@ -87,6 +93,41 @@ class RosControls:
         if not answer.success:
             raise OrderRefused(answer.message)
         return answer.message
+
+    def mission(self, nodes: Sequence[int], mission: Mission) -> str:
+        """Let the pilots of these drones fly this mission."""
+        waypoints = [
+            Location(latitude=y, longitude=x, height=round(z)) for x, y, z in mission.waypoints
+        ]
+        request = FlyMissionRequest(
+            FlyMissionRequest.FLY, waypoints, mission.speed_m_s, mission.loop
+        )
+        for node in nodes:
+            answer = _call(names.mission_service(node), FlyMission, request)
+            if not answer.success:
+                raise OrderRefused(answer.message)
+        who = f"drone {nodes[0]}" if len(nodes) == 1 else f"{len(nodes)} drones"
+        return f"the mission of {who} has begun"
+
+    def pilots(self, action: str) -> str:
+        """Pause, resume or stop all missions."""
+        drones = drones_if_known()
+        request = FlyMissionRequest(action=_ACTIONS[action])
+        done = sum(
+            _call(names.mission_service(node), FlyMission, request).success
+            for node in (drones.roles if drones else ())
+        )
+        if not done:
+            raise OrderRefused("no drone has a mission")
+        return f"{_DONE[action]} {done} {'mission' if done == 1 else 'missions'}"
+
+
+_ACTIONS = {
+    "pause": FlyMissionRequest.PAUSE,
+    "resume": FlyMissionRequest.RESUME,
+    "stop": FlyMissionRequest.STOP,
+}
+_DONE = {"pause": "paused", "resume": "resumed", "stop": "ended"}
 
 
 def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
