@@ -7,12 +7,14 @@ import gzip
 import math
 import re
 from pathlib import Path
-from typing import Dict, Iterable, Iterator, List
+from typing import Dict, Iterable, Iterator, List, Tuple
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility.settings import Knot
 
 Knots = Dict[int, List[Knot]]  # by drone, in order of time
+
+TraceRow = Tuple[float, int, float, float, float]  # t (s), drone, x, y, z (m)
 
 CSV_HEADER = ["t", "id", "x", "y", "z"]
 _START = re.compile(r"\$node_\((\d+)\)\s+set\s+([XYZ])_\s+(\S+)")
@@ -50,6 +52,15 @@ def read_trace(path: Path) -> Knots:
     if not knots:
         raise ConfigurationError(f"trace {path}: no drone in it")
     return knots
+
+
+def write_csv(path: Path, rows: Iterable[TraceRow]) -> None:
+    """Write a trace that `read_trace` reads. Raises OSError."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(CSV_HEADER)
+        for t, node, *place in rows:
+            writer.writerow([f"{t:.3f}", node, *(f"{value:.3f}" for value in place)])
 
 
 def _csv(lines: Iterable[str]) -> Knots:

@@ -8,7 +8,7 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.mobility import Area, Mobility, tracks_of
-from drone_mesh.mobility.trace_files import read_trace
+from drone_mesh.mobility.trace_files import read_trace, write_csv
 
 
 def read(tmp_path, text, name="trace.txt"):
@@ -77,6 +77,15 @@ def test_csv_rows_may_come_in_any_order(tmp_path):
 def test_a_file_that_is_no_trace_is_named_with_the_line(tmp_path, text, words):
     with pytest.raises(ConfigurationError, match=f"trace .*trace.txt: .*{words}"):
         read(tmp_path, text)
+
+
+def test_a_written_trace_is_read_again(tmp_path):
+    path = tmp_path / "flight.csv"
+    write_csv(path, [(0.0, 3, 1.0, 2.0, 0.5), (0.0, 1, 4.0, 4.0, 0.0), (1.25, 3, 1.5, 2.0, 0.5)])
+    assert read_trace(path) == {
+        1: [(0.0, 4.0, 4.0, 0.0)],
+        3: [(0.0, 1.0, 2.0, 0.5), (1.25, 1.5, 2.0, 0.5)],
+    }
 
 
 def test_a_missing_trace_is_named(tmp_path):
