@@ -1,4 +1,4 @@
-"""Makes docs/pictures/repair.gif: the console's page while it shows a repair."""
+"""Makes repair.gif and patrol.gif in docs/pictures/: the console's page, filmed."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
+from typing import Callable
 
 from PIL import Image, ImageChops
 from playwright.sync_api import Page, sync_playwright
 
 from drone_mesh.view.palette import LIGHT
 
-GIF = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "repair.gif"
+ROOT = Path(__file__).resolve().parents[1]
+PICTURES = ROOT / "docs" / "pictures"
 MASTER_PORT = "11652"
 WIDTH, HEIGHT = 680, 760  # px: the page of a narrow window, where map and story are one column
 FRAME_S = 0.4  # wall time between two screenshots
 LAST_FRAME_S = 6.0
+PATROL_FRAMES = 50
 COLOURS = 64  # of the GIF
 LIMIT_S = 240.0
 CHROMIUM_FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
@@ -63,7 +66,19 @@ def film(page: Page) -> list[tuple[Image.Image, float]]:
     return [*frames, (take_frame(page), LAST_FRAME_S)]
 
 
-def save(frames: list[tuple[Image.Image, float]]) -> None:
+def film_patrol(page: Page) -> list[tuple[Image.Image, float]]:
+    """Drones on missions, with their trails."""
+    page.wait_for_selector("#map-note:has-text('10 drones')")
+    page.check("#show-trails")
+    page.wait_for_timeout(10_000)  # until trails can be seen
+    frames = []
+    for _ in range(PATROL_FRAMES):
+        frames.append((take_frame(page), FRAME_S))
+        page.wait_for_timeout(FRAME_S * 1000)
+    return frames
+
+
+def save(frames: list[tuple[Image.Image, float]], gif: Path) -> None:
     """Write the GIF: all frames in one palette, and padded to the size of the largest."""
     width = max(frame.width for frame, _ in frames)
     height = max(frame.height for frame, _ in frames)
@@ -78,7 +93,7 @@ def save(frames: list[tuple[Image.Image, float]]) -> None:
         whole.paste(frame, (0, 0))
         pictures.append(whole.quantize(palette=palette, dither=Image.Dither.NONE))
     pictures[0].save(
-        GIF,
+        gif,
         save_all=True,
         append_images=pictures[1:],
         duration=[round(1000 * seconds) for _frame, seconds in frames],
@@ -87,15 +102,20 @@ def save(frames: list[tuple[Image.Image, float]]) -> None:
     )
 
 
-def main() -> None:
+def record(
+    simulation: list[str],
+    console_arguments: list[str],
+    film_page: Callable[[Page], list[tuple[Image.Image, float]]],
+    gif: Path,
+) -> None:
     """Start a simulation and record its console."""
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{MASTER_PORT}"
     command = ["roslaunch", "-p", MASTER_PORT, "drone_mesh", "factory.launch"]
-    launch = subprocess.Popen([*command, "routers:=5", "seed:=1"], stdout=sys.stderr)
+    launch = subprocess.Popen([*command, "seed:=1", *simulation], stdout=sys.stderr)
     console = subprocess.Popen(
         [
             *["roslaunch", "-p", MASTER_PORT, "--wait", "drone_mesh", "console.launch"],
-            *["port:=0", "demo:=repair"],
+            *["port:=0", *console_arguments],
         ],
         stdout=subprocess.PIPE,
         text=True,
@@ -111,13 +131,24 @@ def main() -> None:
             )
             page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
             page.goto(url)
-            save(film(page))
+            save(film_page(page), gif)
             browser.close()
     finally:
         for process in (console, launch):
             process.send_signal(signal.SIGINT)
             process.wait(timeout=30)
-    print(GIF)
+    print(gif)
+
+
+def main() -> None:
+    """Film a repair and a patrol; with names of pictures as arguments, only those."""
+    wanted = sys.argv[1:] or ["repair", "patrol"]
+    if "repair" in wanted:
+        record(["routers:=5"], ["demo:=repair"], film, PICTURES / "repair.gif")
+    if "patrol" in wanted:
+        fleet = ["routers:=9", "gridsize:=3", "spacing:=6"]
+        missions = f"missions:={ROOT / 'config' / 'patrol.yaml'}"
+        record([*fleet, missions], [], film_patrol, PICTURES / "patrol.gif")
 
 
 if __name__ == "__main__":
