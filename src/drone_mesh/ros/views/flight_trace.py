@@ -8,15 +8,11 @@ from typing import Iterator
 
 import rospy
 
-from drone_mesh.errors import MeshError
 from drone_mesh.mobility.trace_files import TraceRow, write_csv
 from drone_mesh.ros.graph.command_line import run_tool
 from drone_mesh.ros.views.bag import no_states, read_states
+from drone_mesh.ros.views.report import CannotWrite
 from drone_mesh.state.model import position_is_known
-
-
-class CannotWrite(MeshError):
-    """The trace could not be written; the message is the reason."""
 
 
 def main() -> None:
