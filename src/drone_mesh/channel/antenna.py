@@ -22,7 +22,7 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import priority, readdressed, receiver, sender
+from drone_mesh.communication.messages import is_answered, priority, readdressed, receiver, sender
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import PacketInbox
 
@@ -147,6 +147,9 @@ class PacketAntenna(IWirelessCommunication):
             packet = readdressed(payload, BROADCAST)
             self._sender.offer(ALL_NODES, packet, priority(payload))
 
+    def limit_tries(self, most: int) -> None:
+        self._sender.limit_tries(most)
+
     def data_room(self) -> int:
         return self._sender.data_room()
 
@@ -210,7 +213,8 @@ class PacketAntenna(IWirelessCommunication):
             return
         self._note(payload)
         train = place_in_train(payload, self._radio.node_id)
-        self._sender.heard(sender(payload), broadcast=received.to_all, train=train)
+        answered = received.to_all and is_answered(payload)
+        self._sender.heard(sender(payload), broadcast=answered, train=train)
         if received.to_all:
             payload = readdressed(payload, self._radio.node_id)
         if self._on_payload is not None:

@@ -31,6 +31,7 @@ from __future__ import annotations
 import enum
 import math
 import random
+from dataclasses import replace
 from typing import Any
 
 from drone_mesh.channel.access_rules import AccessRules
@@ -98,6 +99,10 @@ class MediumAccess:
         self._queue.add(OutgoingPacket(receiver, payload, priority, now_s, not_before_s))
         return True
 
+    def limit_tries(self, most: int) -> None:
+        """Give up a packet after so many tries at most."""
+        self.rules = replace(self.rules, tries=min(self.rules.tries, most))
+
     def data_room(self) -> int:
         """How many packets of priority DATA it would take now."""
         return self.rules.data_queue_length - self._queue.data
@@ -105,7 +110,10 @@ class MediumAccess:
     def heard(
         self, sender: int, now_s: float, *, broadcast: bool, train: InTrain = InTrain.NO
     ) -> None:
-        """A packet came in; `train`: what it shows about its train."""
+        """A packet came in; `train`: what it shows about its train.
+
+        `broadcast`: to several nodes, which may now all send answers.
+        """
         self._silent.discard(sender)
         self._heard_s[sender] = now_s
         if train is not InTrain.NO:

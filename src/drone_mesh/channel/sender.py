@@ -63,6 +63,11 @@ class Sender:
         self._wake()
         return taken
 
+    def limit_tries(self, most: int) -> None:
+        """See MediumAccess."""
+        with self._lock:
+            self._access.limit_tries(most)
+
     def data_room(self) -> int:
         """The number of packets of priority DATA that it would accept now."""
         with self._lock:

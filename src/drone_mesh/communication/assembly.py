@@ -7,17 +7,17 @@ import random
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
+from drone_mesh.communication.named_techniques import (
+    DEFAULT_ROUTING,
+    create_routing_technique,
+)
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
 from drone_mesh.communication.router import MeshnetworkRouter
-from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.routing.named_techniques import (
-    DEFAULT_ROUTING,
-    create_routing_technique,
-)
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.interfaces import IDroneEngine
 
 
@@ -28,7 +28,7 @@ def assemble_component(
     rng: random.Random,
     *,
     internet: IInternetConnection | None = None,
-    routing: str | IRoutingTechnique = DEFAULT_ROUTING,
+    routing: str | ITechnique = DEFAULT_ROUTING,
     timing: MeshTiming | None = None,
     observer: MeshObserver = ignore_events,
     debug: bool = True,
@@ -56,5 +56,14 @@ def assemble_component(
             repair_options,
         )
     return MeshnetworkGateway(
-        node_id, antenna, engine, technique, internet, rng, timing, observer, debug
+        node_id,
+        antenna,
+        engine,
+        technique,
+        internet,
+        rng,
+        timing,
+        observer,
+        debug,
+        (repair_options or RepairOptions()).range_m,
     )

@@ -13,8 +13,9 @@ from __future__ import annotations
 import abc
 from typing import Callable
 
-from drone_mesh.communication.router_states import RouterEvent
-from drone_mesh.communication.ways import IDelivery, IRoutes
+from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.router_states import RouterEvent, RouterStates
+from drone_mesh.communication.ways import IDelivery, IRoutes, ITechnique
 
 Learn = Callable[[int, int, int, bytes], bool]
 Forward = Callable[[bytes, int, int, int, int, float], None]
@@ -146,3 +147,13 @@ class IControlPlane(abc.ABC):
     @abc.abstractmethod
     def give_up_routes(self) -> None:
         """Forget every route to the preferred gateway."""
+
+
+class IControlTechnique(ITechnique):
+    """A way to decide neighbours, connection and routes that may be chosen by name."""
+
+    @abc.abstractmethod
+    def control_plane(
+        self, basics: NodeBasics, host: IControlHost, states: RouterStates | None
+    ) -> IControlPlane:
+        """The control plane of one node. `states` are those of a router; a gateway has none."""

@@ -23,7 +23,11 @@ class CommonFrame:
 
     def heard(self, neighbour: int, present: bytes) -> bool:
         """Record a neighbour's PRESENT; returns whether its frame is this node's."""
-        self._of[neighbour] = digest = frame_digest(present)
+        return self.heard_digest(neighbour, frame_digest(present))
+
+    def heard_digest(self, neighbour: int, digest: int) -> bool:
+        """Record a neighbour's digest; returns whether its frame is this node's."""
+        self._of[neighbour] = digest
         return digest == self.digest
 
     def refuses(self, from_: int) -> bool:

@@ -24,9 +24,10 @@ from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
 from drone_mesh.communication.orders.messages import OrderReply
+from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
-from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
@@ -43,15 +44,18 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         node_id: int,
         antenna: IWirelessCommunication,
         engine: IDroneEngine,
-        routing: IRoutingTechnique,
+        routing: ITechnique,
         internet: IInternetConnection,
         rng: random.Random,
         timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
+        range_m: float = RANGE_M,
     ) -> None:
         """Like MeshnetworkComponent; orders arrive through `internet`."""
-        super().__init__(node_id, antenna, engine, routing, rng, timing, observer, debug)
+        super().__init__(
+            node_id, antenna, engine, routing, rng, timing, observer, debug, None, range_m
+        )
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
         self._reports = ReportBook()

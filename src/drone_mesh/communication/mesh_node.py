@@ -11,7 +11,11 @@ import random
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.complaints import Complaints
-from drone_mesh.communication.control_plane import IControlHost, IControlPlane
+from drone_mesh.communication.control_plane import (
+    IControlHost,
+    IControlPlane,
+    IControlTechnique,
+)
 from drone_mesh.communication.data.transport import Transport
 from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.flight import Pilot
@@ -33,11 +37,13 @@ from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.packet_types import DATA_TYPES
 from drone_mesh.communication.parts import NodeBasics, NodeParts
 from drone_mesh.communication.places import KnownPlaces
+from drone_mesh.communication.repair.options import RANGE_M
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.reports.node_reports import NodeReporter
 from drone_mesh.communication.router_states import RouterStates
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.interfaces import IDroneEngine
 
 
@@ -49,16 +55,17 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         node_id: int,
         antenna: IWirelessCommunication,
         engine: IDroneEngine,
-        routing: IRoutingTechnique,
+        routing: ITechnique,
         rng: random.Random,
         timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
         states: RouterStates | None = None,
+        range_m: float = RANGE_M,
     ) -> None:
         """`rng` spreads simultaneous actions of many nodes; `debug`: the antenna displays the node.
 
-        `states` are those of a router; a gateway has none.
+        `states` are those of a router; a gateway has none. `range_m`: of the radio, about.
 
         Raises ValueError for a node id outside 0..253.
         """
@@ -92,6 +99,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
             self.complaints,
             self._frame,
             rng,
+            range_m,
         )
         self.control = control = self._control_plane(basics, routing, states)
         self._learn, self._forward = control.learn, control.forward  # called for each packet
@@ -102,8 +110,15 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway, room)
 
     def _control_plane(
-        self, basics: NodeBasics, routing: IRoutingTechnique, states: RouterStates | None
+        self,
+        basics: NodeBasics,
+        routing: ITechnique,
+        states: RouterStates | None,
     ) -> IControlPlane:
+        if isinstance(routing, IControlTechnique):
+            return routing.control_plane(basics, self, states)
+        if not isinstance(routing, IRoutingTechnique):
+            raise TypeError(f"{type(routing).__name__} is no technique")
         if states is None:
             return GatewayHeartbeats(basics, routing, self)
         return RouterHeartbeats(basics, routing, self, states)

@@ -22,6 +22,7 @@ from drone_mesh.communication.packet_types import (
     ABOUT,
     DATA_TYPES,
     TYPES_WITH_FLOATS,
+    UNANSWERED,
     MessageType,
     Priority,
 )
@@ -333,6 +334,11 @@ type_of: Callable[[bytes], int] = operator.itemgetter(TYPE_AT)
 
 addressee: Callable[[bytes], int] = operator.itemgetter(FORWARD_AT)
 """The final addressee of a packet, or BROADCAST."""
+
+
+def is_answered(payload: bytes) -> bool:
+    """Whether several nodes send at once when they hear a broadcast of this type."""
+    return payload[TYPE_AT] not in UNANSWERED
 
 
 def is_data(payload: bytes) -> bool:

@@ -55,6 +55,7 @@ class PacketType(NamedTuple):
     body: str = ""  # its fields in their order, as "uint8 name" or "bytes[10] name"
     made_of: str = "Message"  # the class that encodes it
     priority: Priority = Priority.CONTROL
+    answered: bool = True  # whether a broadcast of it makes several nodes send
 
     @property
     def floats(self) -> int:
@@ -83,6 +84,11 @@ _REPORT = (
     "uint8 neighbours, uint8 hopsUntilGateway, uint8 nextHop, int16 latitudeSteps, "
     "int16 longitudeSteps, int16 heightSteps, uint8 battery, uint8 flags, uint8 tries"
 )
+_BEACON = (
+    "uint8 flags, uint8 interval, uint8 gateway, uint8 number, uint8 hops, uint8 parent, "
+    "bytes[3] ancestors"
+)
+_SEARCH = "uint8 node, uint16 number, uint8 hopsLeft"
 _WORDS = "uint8 part, bytes[13] text"
 _GATEWAY_PLACE = f"uint16 agePlusOne, uint8 gateway, {_PLACE}"
 
@@ -115,6 +121,12 @@ class MessageType(enum.IntEnum):
         7,
         PacketType(PacketKind.REPAIR, _NODE, "float32 cost", "MovementNegotiationMessage"),
     )
+    # The technique beacon: how a node stands to its gateway, neighbours and the nodes below it
+    BEACON = 40, PacketType(PacketKind.INTRODUCTION, _CONTROL, _BEACON, "Beacon", answered=False)
+    # It looks for a node; that or a neighbour of it answers; a question for a sign of life
+    SEARCH = 41, PacketType(PacketKind.REPORT, _CONTROL, _SEARCH, "Search")
+    FOUND = 42, PacketType(PacketKind.REPORT, _CONTROL, "uint8 node", "Found")
+    PROBE = 43, PacketType(PacketKind.HEARTBEAT, _CONTROL)
     # A drone's reply to a numbered order, and the question for it
     ORDER_REPLY = 64, PacketType(PacketKind.ORDER, _GATEWAY, _REPLY, "OrderReply")
     ORDER_QUERY = 65, PacketType(PacketKind.ORDER, _NODE, "uint16 order", "OrderQuery")
@@ -157,6 +169,8 @@ HANDLER_NAMES = tuple(map(_handler_name, range(256)))
 
 TYPES_WITH_FLOATS = {number: ABOUT[number].floats for number in range(256) if ABOUT[number].floats}
 """The numbers of the types whose bodies start with floats, and how many."""
+
+UNANSWERED = frozenset(number for number in range(256) if not ABOUT[number].answered)
 
 TYPES_WITH_PLACES = frozenset(number for number in range(256) if ABOUT[number].has_place)
 

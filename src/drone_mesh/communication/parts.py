@@ -33,6 +33,7 @@ class NodeBasics:
     complaints: Complaints
     frame: CommonFrame
     rng: random.Random  # spreads simultaneous actions of many nodes
+    range_m: float  # of the radio, as far as the node knows
 
     @property
     def now_s(self) -> float:

@@ -26,8 +26,8 @@ from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.router_states import RepairState, RouterStates
-from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 
@@ -43,7 +43,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         node_id: int,
         antenna: IWirelessCommunication,
         engine: IDroneEngine,
-        routing: IRoutingTechnique,
+        routing: ITechnique,
         rng: random.Random,
         timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
@@ -52,16 +52,26 @@ class MeshnetworkRouter(MeshnetworkComponent):
         repair_options: RepairOptions | None = None,
     ) -> None:
         """Like MeshnetworkComponent; the default of `repair` is Thesis."""
+        options = repair_options or RepairOptions()
         self._states = RouterStates()
         super().__init__(
-            node_id, antenna, engine, routing, rng, timing, observer, debug, self._states
+            node_id,
+            antenna,
+            engine,
+            routing,
+            rng,
+            timing,
+            observer,
+            debug,
+            self._states,
+            options.range_m,
         )
         self._repair = ConnectionRepair(
             self._parts,
             self._states,
             self.control,
             repair or Thesis(),
-            repair_options or RepairOptions(),
+            options,
         )
         self._repair_status = NOTHING_TO_REPAIR  # replaced whole: any thread reads it
 

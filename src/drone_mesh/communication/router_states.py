@@ -46,6 +46,7 @@ class RouterEvent(enum.Enum):
 
     HEARTBEAT_SENT = "a heartbeat to the gateway leaves"
     ANSWER_MISSED = "the gateway did not answer in time, or the heartbeat could not be sent"
+    ROUTE_LOST = "no neighbour leads to a gateway any longer"
     GATEWAY_ANSWERED = "a heartbeat of the gateway arrives"
     LOSS_NOTICED = "a check finds the router unconnected"
     ASKED_FOR_PLACES = "the time is up, or a neighbour bids: it asks where its neighbours are"
@@ -83,6 +84,7 @@ CONNECTION_TRANSITIONS: Mapping[RouterEvent, Mapping[ConnectionState, Connection
         ConnectionState.AWAITING_FIRST_ANSWER: ConnectionState.SEARCHING,
         ConnectionState.AWAITING_ANSWER: ConnectionState.SEARCHING,
     },
+    RouterEvent.ROUTE_LOST: _ALL_TO_SEARCHING,
     RouterEvent.GATEWAY_ANSWERED: {state: ConnectionState.CONNECTED for state in ConnectionState},
     RouterEvent.LOSS_NOTICED: {
         ConnectionState.SEARCHING: ConnectionState.SEARCHING,

@@ -7,6 +7,10 @@ import abc
 from drone_mesh.communication.interfaces import NO_ROUTE
 
 
+class ITechnique(abc.ABC):  # noqa: B024 (what each kind must do differs)
+    """What `routing:=` names: an IRoutingTechnique or an IControlTechnique."""
+
+
 class IDelivery(abc.ABC):
     """Sends the packets of one node."""
 

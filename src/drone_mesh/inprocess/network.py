@@ -17,15 +17,15 @@ from drone_mesh.communication.interfaces import (
     NO_ROUTE,
     IWirelessCommunication,
 )
+from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.observer import MeshEvent
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
-from drone_mesh.communication.routing.interfaces import IRoutingTechnique
-from drone_mesh.communication.routing.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.seals.keys import Keys
 from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.fleet import (
     DEFAULT_GRIDSIZE,
     DEFAULT_ROUTERS,
@@ -199,7 +199,7 @@ class Network:
         rng = random.Random(f"{self._seed} position {node_id}")
         return PositionReceiver(node.drone, self.clock, self._positions, rng)
 
-    def _technique(self, node_id: int) -> str | IRoutingTechnique:
+    def _technique(self, node_id: int) -> str | ITechnique:
         if self._routing == SHORTEST_PATH:
             return ShortestPath(self._link_map, node_id)
         return self._routing

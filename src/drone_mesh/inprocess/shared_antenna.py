@@ -12,7 +12,7 @@ from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo, IMeshNetwork
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import priority, readdressed, receiver
+from drone_mesh.communication.messages import is_answered, priority, readdressed, receiver
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import Host, IInProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
@@ -97,6 +97,9 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         if self.powered:
             self.access.offer(ALL_NODES, payload, self._clock.now_s, priority(payload))
             self._plan()
+
+    def limit_tries(self, most: int) -> None:
+        self.access.limit_tries(most)
 
     def data_room(self) -> int:
         return self.access.data_room()
@@ -244,7 +247,8 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
             return
         broadcast = packet.receiver == ALL_NODES
         train = place_in_train(packet.payload, self.node_id)
-        self.access.heard(sender_id, self._clock.now_s, broadcast=broadcast, train=train)
+        answered = broadcast and is_answered(packet.payload)
+        self.access.heard(sender_id, self._clock.now_s, broadcast=answered, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.payloads += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))

@@ -16,8 +16,8 @@ from typing_extensions import Annotated, Literal
 from drone_mesh.air.obstacle_file import BoxRow
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES
+from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
-from drone_mesh.communication.routing.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_HEIGHT_M

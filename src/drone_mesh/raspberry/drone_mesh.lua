@@ -19,6 +19,10 @@ local types = {
   [5] = "MISSING",
   [6] = "MOVE_TO_LOCATION",
   [7] = "MOVEMENT_NEGOTIATION",
+  [40] = "BEACON",
+  [41] = "SEARCH",
+  [42] = "FOUND",
+  [43] = "PROBE",
   [64] = "ORDER_REPLY",
   [65] = "ORDER_QUERY",
   [66] = "NODE_REPORT",
@@ -54,6 +58,23 @@ local bodies = { -- name, form, bytes
   },
   [7] = {
     { "cost", "float", 4 },
+  },
+  [40] = {
+    { "flags", "uint8", 1 },
+    { "interval", "uint8", 1 },
+    { "gateway", "uint8", 1 },
+    { "number", "uint8", 1 },
+    { "hops", "uint8", 1 },
+    { "parent", "uint8", 1 },
+    { "ancestors", "string", 3 },
+  },
+  [41] = {
+    { "node", "uint8", 1 },
+    { "number", "uint16", 2 },
+    { "hopsLeft", "uint8", 1 },
+  },
+  [42] = {
+    { "node", "uint8", 1 },
   },
   [64] = {
     { "order", "uint16", 2 },

@@ -10,15 +10,15 @@ from typing import Mapping, Sequence
 
 from drone_mesh.arguments import whole
 from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.named_techniques import (
+    ROUTING_TECHNIQUES,
+    create_routing_technique,
+)
 from drone_mesh.communication.repair.named_strategies import (
     REPAIR_STRATEGIES,
     create_repair_strategy,
 )
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
-from drone_mesh.communication.routing.named_techniques import (
-    ROUTING_TECHNIQUES,
-    create_routing_technique,
-)
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey, NodeKeys
 from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S, MeshTiming

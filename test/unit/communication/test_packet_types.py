@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from drone_mesh.communication import messages, packet_types
+from drone_mesh.communication.beacon.plane import BeaconPlane
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.heartbeats.gateway_plane import GatewayHeartbeats
@@ -55,8 +56,8 @@ def test_who_handles_a_type_has_a_method_for_it(kind):
         assert all(handles.values())
     elif kind.about.handler is Handler.CONTROL:
         assert not any(handles.values())
-        assert hasattr(RouterHeartbeats, name)
-        assert hasattr(GatewayHeartbeats, name)
+        by_heartbeats = {hasattr(plane, name) for plane in (RouterHeartbeats, GatewayHeartbeats)}
+        assert by_heartbeats == {not hasattr(BeaconPlane, name)}
     elif kind.about.handler is Handler.GATEWAY:
         assert handles == {MeshnetworkRouter: False, MeshnetworkGateway: True}
     elif kind.about.handler is Handler.NOBODY:
@@ -66,7 +67,13 @@ def test_who_handles_a_type_has_a_method_for_it(kind):
 def test_each_handler_is_for_a_declared_type():
     handlers = {
         name
-        for cls in (MeshnetworkComponent, MeshnetworkGateway, MeshnetworkRouter, HeartbeatPlane)
+        for cls in (
+            MeshnetworkComponent,
+            MeshnetworkGateway,
+            MeshnetworkRouter,
+            HeartbeatPlane,
+            BeaconPlane,
+        )
         for name in vars(cls)
         if name.startswith("receive_")
     }

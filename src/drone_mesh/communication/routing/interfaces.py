@@ -12,7 +12,7 @@ from typing import ClassVar, Sequence
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import UNDISTURBED, Medium
 from drone_mesh.communication.packet_types import MessageType
-from drone_mesh.communication.ways import IRoutes
+from drone_mesh.communication.ways import IRoutes, ITechnique
 from drone_mesh.drone.location import Location
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
@@ -76,7 +76,7 @@ class IRoutingEssentials(abc.ABC):
         """The last reported place of `node`, or None."""
 
 
-class IRoutingTechnique(IRoutes):
+class IRoutingTechnique(ITechnique, IRoutes):
     """Decides by heartbeats which neighbour leads to which node.
 
     A node in direct reach is a "child"; nodes behind it are its "grandchildren".

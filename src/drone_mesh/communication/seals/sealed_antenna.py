@@ -35,7 +35,7 @@ FOREIGN_FORGOTTEN_S = 60.0  # our choice: then the count starts again, as some p
 FOREIGN_PACKETS = 3
 
 _CHALLENGE, _ANSWER = int(MessageType.SEAL_CHALLENGE), int(MessageType.SEAL_ANSWER)
-_PRESENT = int(MessageType.PRESENT)
+_INTRODUCTIONS = (int(MessageType.PRESENT), int(MessageType.BEACON))
 _ORDER = int(MessageType.MOVE_TO_LOCATION)
 _NO_SEAL = bytes(SEAL_BYTES)
 
@@ -110,6 +110,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def patience(self) -> float:
         return self._antenna.patience()
 
+    def limit_tries(self, most: int) -> None:
+        self._antenna.limit_tries(most)
+
     def data_room(self) -> int:
         return self._antenna.data_room()
 
@@ -138,7 +141,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def broadcast_message(self, payload: bytes) -> None:
         payload = self._end_to_end.seal(payload, self._clock()) or payload
-        if payload[TYPE_AT] == _PRESENT:
+        if payload[TYPE_AT] in _INTRODUCTIONS:
             self._present = payload
         self._antenna.broadcast_message(self._seal.seal(payload))
 
@@ -192,7 +195,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def on_undelivered(self, payload: bytes, tries: int, now_s: float) -> None:
         kind = payload[TYPE_AT]
-        if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, _PRESENT):
+        if self._mesh is not None and kind not in (_CHALLENGE, _ANSWER, *_INTRODUCTIONS):
             self._mesh.on_undelivered(payload[:SEAL_AT] + _NO_SEAL, tries, now_s)
 
     def on_antenna_power(self, on: bool, now_s: float) -> None:

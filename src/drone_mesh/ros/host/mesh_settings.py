@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.communication.named_techniques import create_routing_technique
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.routing.named_techniques import create_routing_technique
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.timing import MeshTiming

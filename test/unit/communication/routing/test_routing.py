@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.routing.named_techniques import (
+from drone_mesh.communication.named_techniques import (
     ROUTING_TECHNIQUES,
     create_routing_technique,
 )
+from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.errors import ConfigurationError
 
 

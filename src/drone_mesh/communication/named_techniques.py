@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from typing import Callable
 
+from drone_mesh.communication.beacon.plane import BeaconTechnique
 from drone_mesh.communication.by_name import create_by_name
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
-from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.routing.techniques.babel import Babel
 from drone_mesh.communication.routing.techniques.batman import Batman
 from drone_mesh.communication.routing.techniques.dsdv import Dsdv
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
 from drone_mesh.communication.routing.techniques.flooding import Flooding
 from drone_mesh.communication.routing.techniques.steady_tree import SteadyTree
+from drone_mesh.communication.ways import ITechnique
 
 DEFAULT_ROUTING = "child_table_tree"
-ROUTING_TECHNIQUES: dict[str, Callable[[], IRoutingTechnique]] = {
+ROUTING_TECHNIQUES: dict[str, Callable[[], ITechnique]] = {
     DEFAULT_ROUTING: ChildTableTree,
     "steady_tree": SteadyTree,
     "etx_tree": EtxTree,
@@ -23,12 +24,13 @@ ROUTING_TECHNIQUES: dict[str, Callable[[], IRoutingTechnique]] = {
     "batman": Batman,
     "dsdv": Dsdv,
     "flooding": Flooding,
+    "beacon": BeaconTechnique,
 }
 
 
-def create_routing_technique(name: str) -> IRoutingTechnique:
+def create_routing_technique(name: str) -> ITechnique:
     """A new technique: a name in ROUTING_TECHNIQUES, or "package.module:Class" for your own.
 
     Raises ConfigurationError, with the known names, for anything else.
     """
-    return create_by_name("routing technique", name, ROUTING_TECHNIQUES, IRoutingTechnique)
+    return create_by_name("routing technique", name, ROUTING_TECHNIQUES, ITechnique)

@@ -1,0 +1,48 @@
+"""OwnMotion: where this node is, and its velocity over the last seconds."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Callable
+
+from drone_mesh.communication.beacon.packets import Motion
+from drone_mesh.drone.location import Location
+
+OVER_S = 2.0  # our choice: noise of a receiver and turns of a drone cancel out
+AGAIN_S = 0.1  # our choice: a receiver for satellites gives ten positions per second
+
+
+class OwnMotion:
+    """Samples the position of one node whenever it is asked."""
+
+    def __init__(self, locate: Callable[[], Location | None]) -> None:
+        self._locate = locate
+        self._samples: deque[tuple[float, Location]] = deque()
+        self._motion: Motion | None = None
+        self._asked_s = -AGAIN_S
+
+    def at(self, now_s: float) -> Motion | None:
+        """Position and velocity now; None while the position is unknown."""
+        if now_s - self._asked_s < AGAIN_S:
+            return self._motion
+        self._asked_s = now_s
+        place = self._locate()
+        if place is None:
+            self._samples.clear()
+            self._motion = None
+            return None
+        samples = self._samples
+        samples.append((now_s, place))
+        while now_s - samples[1][0] >= OVER_S if len(samples) > 1 else False:
+            samples.popleft()
+        since_s, before = samples[0]
+        seconds = max(now_s - since_s, OVER_S / 2)  # a short time would exaggerate the noise
+        self._motion = Motion(
+            place,
+            (
+                (place.latitude - before.latitude) / seconds,
+                (place.longitude - before.longitude) / seconds,
+                (place.height - before.height) / seconds,
+            ),
+        )
+        return self._motion

@@ -1,0 +1,223 @@
+"""The packets of the technique `beacon` (docs/protocol.md, "Beacons")."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import NamedTuple, Tuple
+
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.location import Location
+
+Velocity = Tuple[float, float, float]  # m/s: north, east, up, as in a Location
+
+ANCESTORS = 3  # beyond the parent; more do not fit, fewer leave loops among moving nodes
+SEQUENCE_NUMBERS = 256
+_INTERVAL_S = 0.05  # unit of an interval
+_PLACE_M = 0.1  # unit of a place
+_WRAP = 2**16
+_FASTEST_M_S = 50.0  # a velocity is coded by its square root, so slow ones are precise
+
+_END = b"\xff"  # of the new nodes below, if they do not fill the packet
+_COUNT, _HAS_PLACE, _HAS_DIGEST, _HAS_GATEWAY_PLACE, _LOOKS = 0x0F, 0x10, 0x20, 0x40, 0x80
+_PLACE = struct.Struct("<3H3b")
+_GATEWAY_PLACE = struct.Struct("<3H")
+_DIGEST = struct.Struct("<H")
+_HEAD = struct.Struct(f"<BBBBBB{ANCESTORS}s")  # what follows may be absent
+_SEARCH = struct.Struct("<BHB")
+_FOUND = struct.Struct("<B")
+
+Units = Tuple[int, int, int]  # a place in units of _PLACE_M, modulo 65,536: within 3.2 km of here
+
+
+class Motion(NamedTuple):
+    """Where a node is and how it moves."""
+
+    place: Location
+    velocity: Velocity
+
+    def after(self, seconds: float) -> Location:
+        """Where it will be."""
+        north, east, up = self.velocity
+        place = self.place
+        return Location(
+            place.latitude + north * seconds,
+            place.longitude + east * seconds,
+            place.height + up * seconds,
+        )
+
+
+class Below(NamedTuple):
+    """Some of the nodes that a node leads to, in circular order of their ids.
+
+    None of those between `after` and the last of `listed` is left out. So who hears a part of the
+    list also learns who is no longer in it.
+    """
+
+    after: int  # the last one of the part before
+    listed: tuple[int, ...]
+    new: tuple[int, ...] = ()  # since the last beacon, wherever their turn is
+
+    def covers(self, node: int) -> bool:
+        """Whether `node` would be listed if it were below."""
+        if not self.listed:
+            return False
+        return (node - self.after - 1) % 256 <= (self.listed[-1] - self.after - 1) % 256
+
+
+NONE_BELOW = Below(0, ())
+
+
+class Beacon(NamedTuple):
+    """One beacon."""
+
+    gateway: int  # the preferred one; NO_ROUTE: none
+    number: int  # of the gateway's beacon on which this route stands
+    hops: int
+    parent: int  # next hop to the gateway
+    ancestors: tuple[int, ...]  # the parent's parent and so on; NO_ROUTE: none
+    interval_s: float  # until the next beacon, about
+    motion: Motion | None = None
+    gateway_place: Location | None = None
+    digest: int = 0  # of the origin of its places; see CommonFrame
+    looks: bool = False  # asks for the beacons of its neighbours
+    below: Below = NONE_BELOW
+
+    def to_body(self, room: int) -> bytes:
+        """Its `room` bytes. It has to fit: see `room_below`."""
+        flags = _LOOKS if self.looks else 0
+        body = b""
+        if self.motion is not None:
+            flags |= _HAS_PLACE
+            body += _PLACE.pack(*_units(self.motion.place), *map(_speed_code, self.motion.velocity))
+        if self.digest:
+            flags |= _HAS_DIGEST
+            body += _DIGEST.pack(self.digest)
+        if self.gateway_place is not None:
+            flags |= _HAS_GATEWAY_PLACE
+            body += _GATEWAY_PLACE.pack(*_units(self.gateway_place))
+        interval = max(1, min(255, math.ceil(self.interval_s / _INTERVAL_S)))
+        head = _HEAD.pack(
+            flags | len(self.below.listed),
+            interval,
+            self.gateway,
+            self.number,
+            self.hops,
+            self.parent,
+            bytes(self.ancestors),
+        )
+        body += bytes((self.below.after, *self.below.listed, *self.below.new))
+        return (head + body).ljust(room, _END)
+
+    def room_below(self, room: int) -> int:
+        """How many nodes below fit into `room` bytes with the rest; negative: that does not fit."""
+        used = _HEAD.size + 1
+        used += 0 if self.motion is None else _PLACE.size
+        used += _DIGEST.size if self.digest else 0
+        used += 0 if self.gateway_place is None else _GATEWAY_PLACE.size
+        return min(_COUNT, room - used)
+
+    @classmethod
+    def from_body(cls, body: bytes, here: Location | None) -> Beacon | None:
+        """Decode the bytes of `to_body`; None if they are damaged.
+
+        Places are the nearest to `here` that fit the bytes; without a `here` they are left out.
+        """
+        flags, interval, gateway, number, hops, parent, ancestors = _HEAD.unpack_from(body)
+        parts = (_HAS_PLACE, _PLACE), (_HAS_DIGEST, _DIGEST), (_HAS_GATEWAY_PLACE, _GATEWAY_PLACE)
+        sizes = sum(part.size for flag, part in parts if flags & flag)
+        if _HEAD.size + sizes + 1 + (flags & _COUNT) > len(body):
+            return None
+        at, motion, gateway_place, digest = _HEAD.size, None, None, 0
+        if flags & _HAS_PLACE:
+            *units, v, w, up = _PLACE.unpack_from(body, at)
+            at += _PLACE.size
+            if here is not None:
+                velocity = _speed(v), _speed(w), _speed(up)
+                motion = Motion(_place(units, here), velocity)
+        if flags & _HAS_DIGEST:
+            (digest,) = _DIGEST.unpack_from(body, at)
+            at += _DIGEST.size
+        if flags & _HAS_GATEWAY_PLACE:
+            units = list(_GATEWAY_PLACE.unpack_from(body, at))
+            at += _GATEWAY_PLACE.size
+            if here is not None:
+                gateway_place = _place(units, here)
+        after, end = at, at + 1 + (flags & _COUNT)
+        new = body[end:].split(_END, 1)[0]
+        return cls(
+            gateway,
+            number,
+            hops,
+            parent,
+            tuple(ancestors),
+            max(1, interval) * _INTERVAL_S,
+            motion,
+            gateway_place,
+            digest,
+            bool(flags & _LOOKS),
+            Below(body[after], tuple(body[after + 1 : end]), tuple(new)),
+        )
+
+
+def newer(number: int, than: int) -> int:
+    """By how much a sequence number is newer, -128..127 (RFC 1982)."""
+    return (number - than + 128) % SEQUENCE_NUMBERS - 128
+
+
+class Search(NamedTuple):
+    """A search for a node; every node repeats it once."""
+
+    node: int
+    number: int  # of the search
+    hops_left: int
+
+    def to_body(self) -> bytes:
+        """Its bytes."""
+        return bytes(_SEARCH.pack(*self))
+
+    @classmethod
+    def from_body(cls, body: bytes) -> Search:
+        """Decode."""
+        return cls(*_SEARCH.unpack_from(body))
+
+
+class Found(NamedTuple):
+    """Its creator, and every node that forwards it, leads to `node`."""
+
+    node: int
+
+    def to_body(self) -> bytes:
+        """Its bytes."""
+        return bytes(_FOUND.pack(*self))
+
+    @classmethod
+    def from_body(cls, body: bytes) -> Found:
+        """Decode."""
+        return cls(*_FOUND.unpack_from(body))
+
+
+NO_ANCESTORS = (NO_ROUTE,) * ANCESTORS
+
+
+def _units(place: Location) -> Units:
+    latitude, longitude, height = (round(value / _PLACE_M) % _WRAP for value in place)
+    return latitude, longitude, height
+
+
+def _place(units: list[int], here: Location) -> Location:
+    return Location(*(_nearest(unit, value) for unit, value in zip(units, here)))
+
+
+def _nearest(unit: int, near_m: float) -> float:
+    off = (unit - round(near_m / _PLACE_M) + _WRAP // 2) % _WRAP - _WRAP // 2
+    return (round(near_m / _PLACE_M) + off) * _PLACE_M
+
+
+def _speed_code(speed_m_s: float) -> int:
+    code = min(127, round(127 * math.sqrt(abs(speed_m_s) / _FASTEST_M_S)))
+    return code if speed_m_s >= 0 else -code
+
+
+def _speed(code: int) -> float:
+    return math.copysign(_FASTEST_M_S * (code / 127) ** 2, code)

@@ -1,0 +1,421 @@
+"""BeaconPlane: the control plane of one node by beacons (docs/protocol.md, "Beacons")."""
+
+from __future__ import annotations
+
+import math
+
+from drone_mesh.communication import messages
+from drone_mesh.communication.beacon.own_motion import OwnMotion
+from drone_mesh.communication.beacon.packets import Beacon, Found, Search
+from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.search import Searches
+from drone_mesh.communication.beacon.trickle import Trickle
+from drone_mesh.communication.control_plane import IControlHost, IControlPlane, IControlTechnique
+from drone_mesh.communication.courier import DROP, HOLD, Courier, Transit
+from drone_mesh.communication.deadlines import Due
+from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
+from drone_mesh.communication.observer import MeshEventKind, in_hops
+from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.router_states import RouterEvent, RouterStates
+from drone_mesh.drone.location import Location
+
+HELD_S = 2.5  # our choice: a packet without a next hop waits this long
+RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
+CHECK_S = 1.0  # our choice: how often a router without a gateway considers its repair
+LATE = 1.3  # intervals: then the parent has to acknowledge a probe
+GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
+DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
+NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
+SEALED_ROOM = 20  # bytes of a beacon with a seal
+DRIVER_TRIES = 6  # per hop: more delay the packets behind, and another neighbour may do better
+
+
+class BeaconPlane(IControlPlane):
+    """Neighbours, connection and routes of one node by beacons."""
+
+    def __init__(self, basics: NodeBasics, host: IControlHost, states: RouterStates | None) -> None:
+        self._basics, self._host, self._states = basics, host, states
+        self._me, self._antenna = basics.node_id, basics.antenna
+        self._deadlines = basics.deadlines
+        self._room = messages.BODY_BYTES - basics.seals.reserved_bytes(MessageType.BEACON)
+        self._routes = self.routes = BeaconRoutes(
+            self._me, states is None, basics.range_m, basics.neighbours.place_of
+        )
+        self._motion = OwnMotion(basics.pilot.place)
+        self._courier = self.delivery = Courier(
+            self._me,
+            self._antenna,
+            self._deadlines,
+            basics.timing.send_attempts,
+            self._verdict,
+            self._routes.alive,
+            self._failed,
+            lambda from_, node: self._routes.leads_not_to(node, from_),
+        )
+        self._trickle = Trickle(self._antenna.medium, basics.rng)
+        self._searches = Searches(self._me, self._routes, self._broadcast)
+        self._sent = 0  # beacons
+        self._probed_s = self._retry_s = self._check_s = -math.inf
+        self._asks = True  # whether its next beacon asks for those of the neighbours
+        self._was_connected = self._told = False
+        self.learn = self._learn
+        self.forward = self._courier.forward
+
+    # Time and surroundings -------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Send the first beacon, each node at another moment."""
+        self._set_time()
+        self._antenna.limit_tries(DRIVER_TRIES)
+        self._trickle.start(self._routes.now_s)
+        self._plan()
+
+    def on_time(self, now_s: float) -> None:
+        """Do what is due."""
+        if now_s < self._deadlines.get(Due.ROUTING):
+            return
+        self._set_time()
+        self._look_round()
+        if self._courier.holds and now_s >= self._retry_s:
+            self._retry(now_s)
+        if now_s >= self._trickle.due_s:
+            self._send_beacon()
+        self._plan()
+
+    def check(self, due_s: float) -> None:
+        """Everything is checked at its own time."""
+
+    def on_power(self, on: bool) -> None:
+        """Ask for the beacons of the neighbours; forget them when the antenna is off."""
+        self._set_time()
+        if on:
+            self._asks = True
+            self._trickle.start(self._routes.now_s)
+        else:
+            self._routes.neighbours.clear()
+            self._look_round()
+        self._plan()
+
+    def on_registered(self) -> None:
+        """Ask for the beacons of the neighbours."""
+        if self._antenna.on():
+            self.on_power(True)
+
+    def introduce(self) -> None:
+        """Send a beacon soon."""
+        self._set_time()
+        self._trickle.hurry(self._routes.now_s)
+        self._plan()
+
+    def neighbour_leaves(self, neighbour: int) -> None:
+        """Its places and velocity show this in time."""
+
+    def gateway_sent_place(self) -> None:
+        """Nothing depends on it."""
+
+    def _look_round(self) -> None:
+        """Forget who is silent, choose the parent, tell the node what has changed."""
+        routes, now_s = self._routes, self._routes.now_s
+        for node in routes.expired():
+            self._trickle.reset(now_s)
+            self._lost(node)
+        parent = routes.neighbours.get(routes.parent)
+        if parent is not None and parent.usable:
+            late_s = parent.alive_s + LATE * parent.beacon.interval_s
+            if now_s >= late_s and now_s - self._probed_s > parent.beacon.interval_s:
+                self._probed_s = now_s
+                me, to = self._me, parent.node
+                self._courier.send(messages.packet(MessageType.PROBE, me, me, to, to), to)
+        self._choose()
+        states = self._states
+        if states is not None and not states.connected and now_s >= self._check_s:
+            self._check_s = now_s + CHECK_S
+            if self._antenna.on() and self._host.may_connect(NO_ROUTE, False):
+                self._host.on_unconnected_check(now_s)
+
+    def _choose(self) -> None:
+        before = self._routes.gateway, self._routes.hops
+        if not self._routes.choose():
+            if not self._told and self._was_connected:
+                self._tell()
+            return
+        now_s, gateway = self._routes.now_s, self._routes.gateway
+        if (gateway, self._routes.hops) != before:
+            self._trickle.hurry(now_s)
+        else:
+            self._trickle.reset(now_s)
+        if before[0] not in (gateway, NO_ROUTE):
+            self._basics.report(MeshEventKind.GATEWAY_CHANGED, gateway)
+            self._basics.places.forget_gateway()
+        self._show()
+
+    def _show(self) -> None:
+        """Tell the node whether a gateway is reached."""
+        states, parent = self._states, self._routes.parent
+        connected = parent != NO_ROUTE
+        if states is None:
+            return
+        if connected:
+            neighbour = self._routes.neighbours[parent]
+            if neighbour.motion is not None:
+                place, seen_s = neighbour.motion.place, neighbour.reported_s
+                self._basics.places.update_next_hop(parent, place, seen_s)
+        if connected == self._was_connected:
+            return
+        self._was_connected = connected
+        if connected:
+            states.happened(RouterEvent.GATEWAY_ANSWERED)
+            self._basics.report(
+                MeshEventKind.CONNECTED, self._routes.gateway, in_hops(self._routes.hops)
+            )
+            self._told = False
+            self._tell()
+        else:
+            states.happened(RouterEvent.ROUTE_LOST)
+            self._basics.report(MeshEventKind.DISCONNECTED, self._routes.gateway)
+            self._check_s = self._routes.now_s
+
+    def _tell(self) -> None:
+        """Tell the repair of a connection; during some of its flights it wants to hear of none."""
+        if self._host.may_connect(self._routes.parent, True):
+            self._told = True
+            self._host.on_connected()
+
+    def _set_time(self) -> None:
+        self._routes.now_s = now_s = self._deadlines.now_s
+        self._routes.motion = self._motion.at(now_s)
+
+    def _plan(self) -> None:
+        """Schedule the next call of `on_time`."""
+        due_s = self._trickle.due_s
+        routes = self._routes
+        for neighbour in routes.neighbours.values():
+            due_s = min(due_s, neighbour.until_s() + 1e-3)
+        parent = routes.neighbours.get(routes.parent)
+        if parent is not None:
+            late_s = parent.alive_s + LATE * parent.beacon.interval_s
+            due_s = min(due_s, max(late_s, self._probed_s + parent.beacon.interval_s + 1e-3))
+        if self._courier.holds:
+            due_s = min(due_s, self._retry_s)
+        if self._states is not None and not self._states.connected:
+            due_s = min(due_s, self._check_s)
+        self._deadlines.set(Due.ROUTING, due_s)
+
+    # Beacons ---------------------------------------------------------------------------------
+
+    def _send_beacon(self) -> None:
+        routes, basics, now_s = self._routes, self._basics, self._routes.now_s
+        self._trickle.sent(now_s)
+        self._sent += 1
+        if self._states is None:
+            routes.number = (routes.number + 1) % 256
+        beacon = Beacon(
+            routes.gateway if routes.hops != NO_ROUTE else NO_ROUTE,
+            routes.number,
+            routes.hops,
+            routes.parent,
+            routes.ancestors,
+            self._trickle.interval_s,
+            routes.motion,
+            self._gateway_place(),
+            basics.frame.digest if self._asks or self._sent % DIGEST_EVERY == 0 else 0,
+            self._asks or (self._states is not None and routes.hops == NO_ROUTE),
+        )
+        self._asks = False
+        if beacon.room_below(self._room) < 0:  # a seal leaves room for one of the two
+            beacon = beacon._replace(motion=None)
+        elif beacon.room_below(self._room) < len(routes.below()) and self._sent % 2 == 0:
+            beacon = beacon._replace(motion=beacon.motion if self._room > SEALED_ROOM else None)
+        below = routes.to_announce(beacon.room_below(self._room))
+        body = beacon._replace(below=below).to_body(self._room)
+        self._broadcast(MessageType.BEACON, self._me, body)
+
+    def _gateway_place(self) -> Location | None:
+        """The gateway's place, if it is this beacon's turn to spread it."""
+        if self._states is None or self._sent % GATEWAY_PLACE_EVERY:
+            return None
+        return self._basics.places.gateway
+
+    def _broadcast(self, kind: int, creator: int, body: bytes) -> None:
+        self._antenna.broadcast_message(
+            messages.packet(kind, creator, self._me, BROADCAST, BROADCAST, body)
+        )
+
+    def receive_beacon(self, payload: bytes, creator: int, from_: int) -> None:
+        """A neighbour's beacon."""
+        if creator != from_:
+            return
+        self._set_time()
+        routes, now_s = self._routes, self._routes.now_s
+        here = None if routes.motion is None else routes.motion.place
+        beacon = Beacon.from_body(messages.body(payload)[: self._room], here)
+        if beacon is None:
+            self._basics.complaints.dropped("a damaged beacon", payload, now_s)
+            return
+        if beacon.digest:
+            self._basics.frame.heard_digest(creator, beacon.digest)
+        if self._basics.frame.refuses(creator):
+            beacon = beacon._replace(motion=None, gateway_place=None)
+        if routes.heard(creator, beacon):
+            self._trickle.reset(now_s)
+        self._take_places(creator, beacon)
+        self._choose()
+        if creator == routes.parent:
+            self._show()
+        if beacon.looks and routes.hops != NO_ROUTE:
+            self._trickle.answer(now_s)
+        if self._courier.holds:
+            self._courier.retry()
+        self._plan()
+
+    def _take_places(self, node: int, beacon: Beacon) -> None:
+        neighbours, places, now_s = self._basics.neighbours, self._basics.places, self._routes.now_s
+        neighbours.set_hops(node, beacon.hops)
+        if beacon.gateway <= MAX_NODE_ID:
+            neighbours.set_gateway(node, beacon.gateway)
+        if beacon.motion is not None:
+            neighbours.set_place(node, beacon.motion.place, now_s)
+            if node == self._routes.gateway:
+                places.update_gateway(beacon.motion.place, now_s)
+        here, place = self._routes.motion, beacon.gateway_place
+        if here is not None and place is not None and node == self._routes.parent:
+            farthest_m = (beacon.hops + 1) * self._basics.range_m
+            if here.place.distance_m(place) <= farthest_m:
+                places.update_gateway(place, now_s)
+
+    def receive_probe(self, payload: bytes, creator: int, from_: int) -> None:
+        """The radio has acknowledged it."""
+
+    # Packets ---------------------------------------------------------------------------------
+
+    def _learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
+        routes = self._routes
+        routes.now_s = self._deadlines.now_s
+        routes.alive(from_)
+        if creator != from_:
+            routes.led_to(creator, from_)
+        return True
+
+    def own_came_back(self, from_: int) -> None:
+        """The courier sends it another way."""
+        self._routes.now_s = self._deadlines.now_s
+        self._routes.alive(from_)
+
+    def on_delivered(self, neighbour: int, tries: int) -> None:
+        """It is alive."""
+        self._routes.now_s = self._deadlines.now_s
+        self._routes.alive(neighbour)
+
+    def on_undelivered(self, payload: bytes, tries: int) -> None:
+        """Send it another way."""
+        self._set_time()
+        self._courier.undelivered(payload)
+        self._plan()
+
+    def _failed(self, node: int) -> None:
+        """A neighbour did not take a packet: do without it until it is heard again."""
+        self._routes.now_s = self._deadlines.now_s
+        self._routes.failed(node)
+        if node == self._routes.parent:
+            self._choose()
+
+    def _lost(self, node: int) -> None:
+        if self._basics.neighbours.lost(node, self._routes.now_s):
+            self._basics.report(MeshEventKind.NEIGHBOUR_LOST, node)
+        self._host.on_neighbour_lost(node)
+
+    def _verdict(self, transit: Transit) -> int:
+        """The next hop of a packet, HOLD or DROP."""
+        routes = self._routes
+        routes.now_s = now_s = self._deadlines.now_s
+        for to, shown_s in routes.next_hops(transit.addressee, transit.came_from):
+            if to == transit.came_from or shown_s <= transit.sent_s.get(to, -math.inf):
+                continue
+            failed_s = transit.failed_s.get(to)
+            if failed_s is None or routes.neighbours[to].alive_s > failed_s:
+                return to
+        if now_s - transit.seen_s >= HELD_S or transit.kind in NOT_HELD:
+            return DROP
+        if transit.addressee != routes.gateway:
+            if transit.came_from != NO_ROUTE:
+                return self._back(transit)
+            self._searches.search(transit.addressee)
+        self._retry_s = min(max(self._retry_s, now_s), now_s + RETRY_S)
+        return HOLD
+
+    def _back(self, transit: Transit) -> int:
+        """A packet that no neighbour leads to returns: its sender may know another way."""
+        to = transit.came_from
+        neighbour = self._routes.neighbours.get(to)
+        if neighbour is None or to in transit.sent_s or to in transit.failed_s:
+            return DROP
+        return to
+
+    def _retry(self, now_s: float) -> None:
+        self._retry_s = now_s + RETRY_S
+        self._courier.retry()
+
+    # Searches --------------------------------------------------------------------------------
+
+    def search(self, node: int) -> bool:
+        """A packet for a node without a route is held, and searched for by itself."""
+        return False
+
+    def receive_search(self, payload: bytes, creator: int, from_: int) -> None:
+        """Another node looks for one."""
+        self._set_time()
+        if self._searches.heard(creator, from_, messages.body(payload)):
+            me, found = self._me, Found(Search.from_body(messages.body(payload)).node)
+            body = found.to_body()
+            self._courier.send_own(
+                messages.packet(MessageType.FOUND, me, me, creator, creator, body)
+            )
+
+    def receive_found(self, payload: bytes, creator: int, from_: int) -> None:
+        """A node that was looked for is that way."""
+        self._set_time()
+        self._routes.led_to(Found.from_body(messages.body(payload)).node, from_)
+        self._courier.retry()
+        self._plan()
+
+    # The connection --------------------------------------------------------------------------
+
+    @property
+    def gateway(self) -> int:
+        """The preferred gateway."""
+        return self._routes.gateway
+
+    @property
+    def hops(self) -> int:
+        """Hops to it."""
+        return self._routes.hops
+
+    def next_hop(self) -> int:
+        """The parent."""
+        return self._routes.parent
+
+    def may_use(self, gateway: int) -> bool:
+        """Whether it is the preferred one."""
+        return gateway == self._routes.gateway
+
+    def end(self, event: RouterEvent) -> None:
+        """A flight or an election begins or ends: the connection is what the beacons say."""
+        if self._states is None:
+            return
+        self._states.happened(event)
+        if self._routes.parent != NO_ROUTE and event is not RouterEvent.ANTENNA_OFF:
+            self._states.happened(RouterEvent.GATEWAY_ANSWERED)
+
+    def give_up_routes(self) -> None:
+        """There are none."""
+
+
+class BeaconTechnique(IControlTechnique):
+    """The technique `beacon`, by name."""
+
+    def control_plane(
+        self, basics: NodeBasics, host: IControlHost, states: RouterStates | None
+    ) -> BeaconPlane:
+        """The control plane of one node."""
+        return BeaconPlane(basics, host, states)

@@ -1,0 +1,329 @@
+"""BeaconRoutes: the neighbours of one node, its parent, and the nodes below it.
+
+docs/protocol.md, "Beacons", describes the rules.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Callable, Iterator, NamedTuple
+
+from drone_mesh.communication.beacon.packets import (
+    ANCESTORS,
+    NO_ANCESTORS,
+    Beacon,
+    Below,
+    Motion,
+    newer,
+)
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.neighbours import HeardPlace
+from drone_mesh.communication.ways import IRoutes
+
+FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
+BACK = 2  # sequence numbers: a route that stands on an older one is not used
+STALE = 5.0  # intervals: a gateway without a new number for longer is lost
+REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
+WRONG = 1.15  # of the range: a neighbour heard from further away, or this node, errs in its place
+LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
+ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
+LINGERS = 4.0  # intervals: a node that has left is still announced for so long
+SEEN_S = 10.0  # our choice: an older place of a node does not tell the way to it
+HINT_S = 3.0  # a packet that came from a node shows the way to it for this long
+
+
+class Way(NamedTuple):
+    """A neighbour that may lead to a node, and when it showed that."""
+
+    neighbour: int
+    shown_s: float
+
+
+class Neighbour:
+    """What is known of one neighbour."""
+
+    __slots__ = (
+        "alive_s", "announced_s", "apart_m", "beacon", "failed_s", "heard_s", "listed_s", "motion",
+        "node", "reported_s",
+    )  # fmt: skip
+
+    def __init__(self, node: int) -> None:
+        self.node = node
+        self.beacon: Beacon
+        self.heard_s = self.alive_s = self.failed_s = -math.inf
+        self.motion: Motion | None = None  # the last one that it reported
+        self.reported_s = -math.inf
+        self.apart_m = 0.0  # then
+        self.announced_s: dict[int, float] = {}  # the nodes below it, and since when
+        self.listed_s: dict[int, float] = {}  # and when it listed them last
+
+    @property
+    def usable(self) -> bool:
+        """Whether it was alive since a packet to it failed."""
+        return self.alive_s > self.failed_s
+
+    def heard(self, beacon: Beacon, own: Motion | None, now_s: float) -> None:
+        """Its beacon arrived, while this node was where `own` says."""
+        self.beacon, self.heard_s, self.alive_s = beacon, now_s, now_s
+        if beacon.motion is not None:
+            self.motion, self.reported_s = beacon.motion, now_s
+            self.apart_m = 0.0 if own is None else own.place.distance_m(beacon.motion.place)
+        below = beacon.below
+        before = dict(self.announced_s)
+        for node in filter(below.covers, before):
+            del self.announced_s[node]
+        for node in (*below.listed, *below.new):
+            self.announced_s[node] = before.get(node, now_s)
+            self.listed_s[node] = now_s
+
+    def until_s(self) -> float:
+        """Until when it counts as a neighbour without a further sign of life."""
+        return self.alive_s + FRESH * self.beacon.interval_s
+
+
+class BeaconRoutes(IRoutes):
+    """All that one node knows about the others. Belongs to its component's thread."""
+
+    def __init__(
+        self,
+        node_id: int,
+        is_gateway: bool,
+        range_m: float,
+        place_of: Callable[[int], HeardPlace | None],
+    ) -> None:
+        """`place_of`: where a node was seen last."""
+        self._node_id = node_id
+        self._is_gateway = is_gateway
+        self._range_m = range_m
+        self.neighbours: dict[int, Neighbour] = {}
+        self.gateway = node_id if is_gateway else NO_ROUTE
+        self.hops = 0 if is_gateway else NO_ROUTE
+        self.parent = NO_ROUTE
+        self.ancestors = NO_ANCESTORS
+        self.number = 0
+        self.motion: Motion | None = None  # this node's own
+        self.now_s = 0.0
+        self._newest: dict[int, tuple[int, float]] = {}  # by gateway: number, when it came
+        self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
+        self._announced: set[int] = set()  # of the nodes below
+        self._announced_last = 0
+        self._place_of = place_of
+        self._below_s: dict[int, float] = {}  # the nodes below, and when they were last
+
+    # What it learns ----------------------------------------------------------------------------
+
+    def heard(self, node: int, beacon: Beacon) -> bool:
+        """A beacon of a neighbour. Returns whether it is a new one."""
+        neighbour = self.neighbours.get(node)
+        is_new = neighbour is None
+        if neighbour is None:
+            neighbour = self.neighbours[node] = Neighbour(node)
+        neighbour.heard(beacon, self.motion, self.now_s)
+        gateway = beacon.gateway
+        if gateway not in (NO_ROUTE, self._node_id):
+            number, _at_s = self._newest.get(gateway, (beacon.number - 1, 0.0))
+            by = newer(beacon.number, number)
+            if by > 0 or (by < -BACK and self._is_stale(gateway)):  # it may have been restarted
+                self._newest[gateway] = beacon.number, self.now_s
+        return is_new
+
+    def alive(self, node: int) -> None:
+        """A sign of life of a node: a packet of it, or an acknowledgement."""
+        neighbour = self.neighbours.get(node)
+        if neighbour is not None:
+            neighbour.alive_s = self.now_s
+
+    def failed(self, node: int) -> None:
+        """A neighbour did not take a packet."""
+        neighbour = self.neighbours.get(node)
+        if neighbour is not None:
+            neighbour.failed_s = self.now_s
+
+    def leads_not_to(self, node: int, neighbour: int) -> None:
+        """A neighbour returned a packet for `node`."""
+        known = self.neighbours.get(neighbour)
+        if known is not None:
+            known.announced_s.pop(node, None)
+
+    def led_to(self, node: int, neighbour: int) -> None:
+        """A packet of `node` came through this neighbour."""
+        self._hints[node] = neighbour, self.now_s
+
+    def expired(self) -> list[int]:
+        """Forget the neighbours that were silent for too long; returns them."""
+        old = [n.node for n in self.neighbours.values() if self.now_s > n.until_s()]
+        for node in old:
+            del self.neighbours[node]
+        return old
+
+    # The way up --------------------------------------------------------------------------------
+
+    def choose(self) -> bool:
+        """Choose the parent; returns whether parent, gateway or hops have changed."""
+        if self._is_gateway:
+            return False
+        before = self.gateway, self.parent, self.hops
+        best = min(map(self._rank, self._candidates()), default=None)
+        if best is None:
+            self.parent = self.hops = NO_ROUTE
+            self.ancestors = NO_ANCESTORS
+        else:
+            parent = self.neighbours[best[-1]]
+            beacon = parent.beacon
+            self.parent, self.gateway = parent.node, beacon.gateway
+            self.hops, self.number = beacon.hops + 1, beacon.number
+            self.ancestors = (beacon.parent, *beacon.ancestors)[:ANCESTORS]
+        return before != (self.gateway, self.parent, self.hops)
+
+    def _candidates(self) -> Iterator[Neighbour]:
+        """The neighbours that lead to a gateway without leading through this node."""
+        me = self._node_id
+        for neighbour in self.neighbours.values():
+            beacon = neighbour.beacon
+            if beacon.gateway in (NO_ROUTE, me) or beacon.hops >= NO_ROUTE - 1:
+                continue
+            if beacon.parent == me or me in beacon.ancestors or not neighbour.usable:
+                continue
+            if newer(self._newest[beacon.gateway][0], beacon.number) > BACK:
+                continue
+            if not self._is_stale(beacon.gateway):
+                yield neighbour
+
+    def _is_stale(self, gateway: int) -> bool:
+        slowest_s = max((n.beacon.interval_s for n in self.neighbours.values()), default=0.0)
+        return self.now_s - self._newest[gateway][1] > STALE * slowest_s
+
+    def _rank(self, neighbour: Neighbour) -> tuple[float, bool, float, int]:
+        """The lowest is the best way up: few hops over links that last; if equal, the present."""
+        beacon, node = neighbour.beacon, neighbour.node
+        other = self.gateway not in (NO_ROUTE, beacon.gateway)
+        cost = beacon.hops + self.risk(neighbour) + (ANOTHER_GATEWAY if other else 0.0)
+        return cost, node != self.parent, -neighbour.heard_s, node
+
+    def risk(self, neighbour: Neighbour) -> float:
+        """What the expected end of the link to a neighbour costs, in hops (Su et al. 2001)."""
+        own, other = self.motion, neighbour.motion
+        if own is None or other is None or neighbour.apart_m > WRONG * self._range_m:
+            return 0.0
+        reach_m, age_s = REACH * self._range_m, self.now_s - neighbour.reported_s
+        if own.place.distance_m(other.after(age_s)) > reach_m:
+            return GONE
+        soon_s = neighbour.beacon.interval_s
+        if own.after(soon_s).distance_m(other.after(age_s + soon_s)) > reach_m:
+            return LEAVES
+        return 0.0
+
+    # Any way -----------------------------------------------------------------------------------
+
+    def next_hops(self, node: int, came_from: int) -> list[Way]:
+        """The neighbours to try for a packet to `node`, the best first."""
+        if node == self.gateway and not self._is_gateway:
+            ranks = sorted(map(self._rank, self._candidates()))
+            return [Way(rank[-1], self.neighbours[rank[-1]].heard_s) for rank in ranks]
+        found: dict[int, Way] = {}  # in order
+        direct, last = self.neighbours.get(node), []
+        if direct is not None:
+            way = Way(node, direct.alive_s)
+            if direct.usable and self.risk(direct) < GONE:
+                found[node] = way
+            else:
+                last.append(way)
+        hint, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
+        if hint in self.neighbours and self.now_s - at_s < HINT_S:
+            found.setdefault(hint, Way(hint, at_s))
+        for _rank, way in sorted(self._announcements(node)):
+            found.setdefault(way.neighbour, way)
+        if self.parent != NO_ROUTE and self._comes_from_below(came_from):
+            found.setdefault(self.parent, Way(self.parent, self.neighbours[self.parent].heard_s))
+        for way in (*self._nearer(node), *last):
+            found.setdefault(way.neighbour, way)
+        return list(found.values())
+
+    def _announcements(self, node: int) -> Iterator[tuple[tuple[bool, float], Way]]:
+        """The neighbours that announce `node` below them; a child, and the latest, first."""
+        for neighbour in filter(lambda one: one.usable, self.neighbours.values()):
+            at_s = neighbour.announced_s.get(node)
+            if at_s is not None:
+                is_child = neighbour.beacon.parent == self._node_id
+                age_s = self.now_s - at_s + self.risk(neighbour)
+                yield (not is_child, age_s), Way(neighbour.node, neighbour.listed_s[node])
+            elif node == neighbour.beacon.parent or node in neighbour.beacon.ancestors:
+                yield (True, math.inf), Way(neighbour.node, neighbour.heard_s)
+
+    def _comes_from_below(self, came_from: int) -> bool:
+        """Whether a packet for an unknown node goes up: from this node or one below it."""
+        if came_from == NO_ROUTE:
+            return True
+        neighbour = self.neighbours.get(came_from)
+        return neighbour is not None and neighbour.beacon.parent == self._node_id
+
+    def _nearer(self, node: int) -> list[Way]:
+        """The neighbours that are nearer to the last known place of `node`, the nearest first."""
+        seen = self._place_of(node)
+        if seen is None or self.motion is None or self.now_s - seen.heard_s > SEEN_S:
+            return []
+        goal = seen.place
+        own_m = self.motion.place.distance_m(goal)
+        nearer_ones = []
+        for neighbour in self.neighbours.values():
+            motion = neighbour.motion
+            if motion is not None and neighbour.usable and self.risk(neighbour) < GONE:
+                off_m = motion.place.distance_m(goal)
+                if off_m < own_m:
+                    nearer_ones.append((off_m, Way(neighbour.node, neighbour.heard_s)))
+        return [way for _off_m, way in sorted(nearer_ones)]
+
+    # The nodes below ---------------------------------------------------------------------------
+
+    def below(self) -> set[int]:
+        """The nodes that this one leads to, as its children announce them.
+
+        A node that has left is mostly still near, and its new way is not known further up yet.
+        """
+        below_s, now_s, period_s = self._below_s, self.now_s, 0.0
+        for child in self.neighbours.values():
+            period_s = max(period_s, child.beacon.interval_s)
+            if child.beacon.parent == self._node_id:
+                below_s[child.node] = now_s
+                below_s.update(dict.fromkeys(child.announced_s, now_s))
+        for node in (self._node_id, *self.ancestors, self.parent):
+            below_s.pop(node, None)
+        for node in [n for n, at_s in below_s.items() if now_s - at_s > LINGERS * period_s]:
+            del below_s[node]
+        return set(below_s)
+
+    def to_announce(self, most: int) -> Below:
+        """The next part of the nodes below, at most so many, and those that came to it."""
+        below, after = self.below(), self._announced_last
+        self._announced &= below
+        new = sorted(below - self._announced)[: most - 1] if len(below) > most else []
+        turn = sorted(below.difference(new), key=lambda node: (node - after - 1) % 256)
+        listed = tuple(turn[: most - len(new)])
+        if listed:
+            self._announced_last = listed[-1]
+        if len(listed) == len(turn):
+            after = self._announced_last  # once round
+        self._announced.update(listed, new)
+        return Below(after, listed, tuple(new))
+
+    # IRoutes -----------------------------------------------------------------------------------
+
+    def get_direction_to_node(self, node: int) -> int:
+        """The best next hop for a packet of this node, or NO_ROUTE."""
+        ways = self.next_hops(node, NO_ROUTE)
+        return ways[0].neighbour if ways else NO_ROUTE
+
+    def may_reach(self, node: int) -> bool:
+        """A packet waits for a next hop, as long as there is anybody to search through."""
+        return bool(self.neighbours)
+
+    def get_table_size(self) -> int:
+        """Neighbours, and what each has announced."""
+        return sum(1 + len(n.announced_s) for n in list(self.neighbours.values()))
+
+    def get_set_of_children(self) -> frozenset[int]:
+        """Ids of the nodes in direct reach."""
+        return frozenset(self.neighbours)
+
+    def node_moved_location(self) -> None:
+        """Nothing to forget: the next beacons show where everybody is."""

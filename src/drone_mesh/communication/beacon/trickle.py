@@ -1,0 +1,60 @@
+"""Trickle: when the next beacon is due (RFC 6206: rarer and rarer while nothing changes)."""
+
+from __future__ import annotations
+
+import math
+import random
+
+from drone_mesh.communication.medium import Medium
+
+HOPS_PER_BEACON = 400  # our choice: a beacon takes half a hop, and ten neighbours send as many
+LEAST_S = 0.5  # our choice: of an interval
+RARER = 1.3  # our choice: factor between one interval and the next
+AT_REST_S = 1.6  # our choice: a dead parent is noticed in 1.3 of it, and another one chosen
+JITTER = 0.2  # our choice: part of an interval by which a beacon may be early or late
+SOON_HOPS = 12  # our choice: an urgent beacon waits for up to so many hops, as others wait too
+
+
+class Trickle:
+    """The times of one node's beacons."""
+
+    def __init__(self, medium: Medium, rng: random.Random) -> None:
+        self._rng = rng
+        self._least_s = max(LEAST_S, HOPS_PER_BEACON * medium.hop_s)
+        self._most_s = max(AT_REST_S, 1.5 * self._least_s)
+        self._soon_s = SOON_HOPS * medium.hop_s
+        self._sent_s = -math.inf
+        self._changed = True  # during this interval
+        self.interval_s = self._least_s
+        self.due_s = math.inf
+
+    def start(self, now_s: float) -> None:
+        """Begin, at a random moment."""
+        self.interval_s = self._least_s
+        self.due_s = now_s + self._rng.random() * 4 * self._soon_s
+
+    def sent(self, now_s: float) -> None:
+        """A beacon leaves now."""
+        if not self._changed:
+            self.interval_s = min(RARER * self.interval_s, self._most_s)
+        self._changed = False
+        self._sent_s = now_s
+        self.due_s = now_s + self.interval_s * (1.0 + JITTER * (2.0 * self._rng.random() - 1.0))
+
+    def reset(self, now_s: float) -> None:
+        """Something has changed: the interval is the shortest again."""
+        self._changed = True
+        if self.interval_s > self._least_s:
+            self.interval_s = self._least_s
+            self.due_s = min(self.due_s, now_s + self._least_s * self._rng.random())
+
+    def hurry(self, now_s: float) -> None:
+        """Others must know of a change soon."""
+        self.reset(now_s)
+        not_before_s = max(now_s, self._sent_s + 0.2 * self._least_s)
+        self.due_s = min(self.due_s, not_before_s + self._soon_s * self._rng.random())
+
+    def answer(self, now_s: float) -> None:
+        """A neighbour asks for a beacon."""
+        if now_s - self._sent_s > 0.2 * self._least_s:
+            self.due_s = min(self.due_s, now_s + 4 * self._soon_s * self._rng.random())

@@ -1,0 +1,97 @@
+"""The bytes of the packets of the technique beacon."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.communication.beacon.packets import (
+    NO_ANCESTORS,
+    NONE_BELOW,
+    Beacon,
+    Below,
+    Found,
+    Motion,
+    Search,
+    newer,
+)
+from drone_mesh.drone.location import Location
+
+HERE = Location(0.0, 0.0, 0.0)
+FULL = "13 14 00 07 02 04 09 00 ff 0a 00 f6 ff 14 00 0a f6 00 05 06 08 0b 0c ff ff ff ff"
+ROUTER = Beacon(
+    gateway=0,
+    number=7,
+    hops=2,
+    parent=4,
+    ancestors=(9, 0, 255),
+    interval_s=1.0,
+    motion=Motion(Location(1.0, -1.0, 2.0), (0.31, -0.31, 0.0)),
+    below=Below(5, (6, 8, 11), (12,)),
+)
+
+
+def test_a_beacon_has_these_bytes():
+    assert ROUTER.to_body(27) == bytes.fromhex(FULL)
+
+
+def test_a_beacon_is_decoded_relative_to_the_place_of_its_receiver():
+    decoded = Beacon.from_body(bytes.fromhex(FULL), HERE)
+    assert decoded._replace(motion=None) == ROUTER._replace(motion=None)
+    assert decoded.motion.place == pytest.approx(ROUTER.motion.place)
+    assert decoded.motion.velocity == pytest.approx((0.31, -0.31, 0.0), abs=0.01)
+
+
+def test_places_wrap_and_the_nearest_one_counts():
+    far = Location(100_000.0, -50_000.0, 300.0)
+    there = Location(100_250.3, -50_100.7, 290.0)
+    body = ROUTER._replace(motion=Motion(there, (0.0, 0.0, 0.0))).to_body(27)
+    assert Beacon.from_body(body, far).motion.place == pytest.approx(there, abs=0.051)
+
+
+def test_a_receiver_without_a_place_takes_the_rest():
+    decoded = Beacon.from_body(bytes.fromhex(FULL), None)
+    assert decoded.motion is None
+    assert decoded.below == ROUTER.below
+
+
+def test_a_beacon_with_everything_leaves_room_for_a_seal():
+    assert ROUTER.room_below(20) == 1
+    body = ROUTER._replace(below=Below(5, (6,))).to_body(20)
+    assert len(body) == 20
+    assert Beacon.from_body(body, HERE).below == Below(5, (6,))
+
+
+@pytest.mark.parametrize("body", ["1f" + 26 * "00", "ff" * 27])
+def test_a_beacon_that_claims_more_than_it_holds_is_damaged(body):
+    assert Beacon.from_body(bytes.fromhex(body), HERE) is None
+
+
+@pytest.mark.parametrize(
+    ("number", "than", "by"), [(7, 5, 2), (1, 255, 2), (255, 1, -2), (128, 0, -128), (5, 5, 0)]
+)
+def test_sequence_numbers_go_round(number, than, by):
+    assert newer(number, than) == by
+
+
+def test_a_part_of_the_list_covers_all_ids_since_the_part_before():
+    part = Below(200, (250, 3))
+    assert [node for node in (200, 201, 250, 255, 0, 3, 4) if part.covers(node)] == [
+        201, 250, 255, 0, 3,
+    ]  # fmt: skip
+
+
+def test_a_complete_list_covers_every_id():
+    assert all(Below(8, (2, 8)).covers(node) for node in range(256))
+    assert not NONE_BELOW.covers(0)
+
+
+def test_a_search_and_its_answer_have_these_bytes():
+    assert Search(9, 0x0102, 12).to_body() == bytes.fromhex("09 02 01 0c")
+    assert Search.from_body(bytes.fromhex("09 02 01 0c")) == Search(9, 0x0102, 12)
+    assert Found(9).to_body() == b"\x09"
+    assert Found.from_body(b"\x09" + bytes(26)) == Found(9)
+
+
+def test_a_router_without_a_gateway_says_so():
+    alone = Beacon(255, 0, 255, 255, NO_ANCESTORS, 1.0, looks=True)
+    assert alone.to_body(27)[:9] == bytes.fromhex("80 14 ff 00 ff ff ff ff ff")

@@ -1,0 +1,188 @@
+"""BeaconRoutes: the parent, the nodes below and the ways to try."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.communication.beacon.packets import (
+    NO_ANCESTORS,
+    NONE_BELOW,
+    Beacon,
+    Below,
+    Motion,
+)
+from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.drone.location import Location
+
+STILL = (0.0, 0.0, 0.0)
+
+
+@pytest.fixture
+def routes():
+    return BeaconRoutes(9, False, 10.0, lambda _node: None)
+
+
+def beacon(hops=1, parent=0, number=5, gateway=0, x=None, east=0.0, below=NONE_BELOW, others=()):
+    ancestors = (*others, *NO_ANCESTORS)[:3]
+    motion = None if x is None else Motion(Location(0.0, x, 0.0), (0.0, east, 0.0))
+    return Beacon(gateway, number, hops, parent, ancestors, 1.0, motion, below=below)
+
+
+def ways(routes, node, came_from=255):
+    return [way.neighbour for way in routes.next_hops(node, came_from)]
+
+
+def test_the_parent_has_the_fewest_hops(routes):
+    routes.heard(1, beacon(hops=3, parent=2))
+    routes.heard(2, beacon(hops=1))
+    assert routes.choose()
+    assert (routes.parent, routes.hops, routes.gateway) == (2, 2, 0)
+
+
+def test_the_present_parent_stays_while_no_other_is_nearer(routes):
+    routes.heard(2, beacon())
+    routes.choose()
+    routes.heard(1, beacon())
+    assert not routes.choose()
+    assert routes.parent == 2
+
+
+@pytest.mark.parametrize("generation", range(4))
+def test_a_neighbour_that_stands_on_this_node_is_no_parent(routes, generation):
+    line = [4, 5, 6, 0]
+    line[generation] = 9
+    routes.heard(1, beacon(hops=5, parent=line[0], others=line[1:]))
+    assert not routes.choose()
+    assert routes.parent == 255
+
+
+def test_two_numbers_back_is_still_a_route_and_three_is_none(routes):
+    routes.heard(1, beacon(number=5, hops=2, parent=3))
+    routes.heard(2, beacon(number=8, hops=4, parent=3))
+    routes.choose()
+    assert routes.parent == 2
+    routes.heard(1, beacon(number=6, hops=2, parent=3))
+    routes.choose()
+    assert routes.parent == 1
+
+
+def test_a_gateway_without_a_new_number_for_five_intervals_is_lost(routes):
+    routes.heard(1, beacon())
+    routes.now_s = 4.9
+    routes.heard(1, beacon())
+    routes.choose()
+    assert routes.parent == 1
+    routes.now_s = 5.1
+    routes.heard(1, beacon())
+    routes.choose()
+    assert routes.parent == 255
+
+
+def test_a_failed_hop_is_replaced_at_once_and_back_when_it_is_heard_again(routes):
+    routes.heard(1, beacon())
+    routes.heard(2, beacon(hops=2, parent=3))
+    routes.choose()
+    routes.now_s = 0.1
+    routes.failed(1)
+    assert routes.choose()
+    assert routes.parent == 2
+    routes.now_s = 0.2
+    routes.heard(1, beacon())
+    routes.choose()
+    assert routes.parent == 1
+
+
+def test_a_link_that_will_break_costs_but_does_not_exclude(routes):
+    routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
+    routes.heard(1, beacon(hops=1, x=9.0, east=2.0))
+    routes.choose()
+    assert routes.parent == 1
+    routes.heard(2, beacon(hops=1, x=-5.0))
+    routes.choose()
+    assert routes.parent == 2
+
+
+def test_a_neighbour_heard_from_out_of_reach_errs_and_is_judged_without_places(routes):
+    routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
+    routes.heard(1, beacon(hops=1, x=50.0, east=2.0))
+    assert routes.risk(routes.neighbours[1]) == 0.0
+
+
+def test_a_neighbour_silent_for_two_and_a_half_intervals_is_forgotten(routes):
+    routes.heard(1, beacon())
+    routes.now_s = 2.4
+    assert routes.expired() == []
+    routes.now_s = 2.6
+    assert routes.expired() == [1]
+
+
+def test_a_sign_of_life_is_as_good_as_a_beacon(routes):
+    routes.heard(1, beacon())
+    routes.now_s = 2.0
+    routes.alive(1)
+    routes.now_s = 4.0
+    assert routes.expired() == []
+
+
+def test_children_and_what_they_announce_are_below(routes):
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(30, (20, 30))))
+    routes.heard(2, beacon(hops=3, parent=8, below=Below(40, (40,))))
+    assert routes.below() == {1, 20, 30}
+
+
+def test_a_node_that_its_child_lists_no_longer_is_soon_not_below(routes):
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(30, (20, 30))))
+    routes.below()
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(30, (30,))))
+    routes.now_s = 1.9
+    assert routes.below() == {1, 20, 30}
+    routes.now_s = 2.1
+    assert 20 not in routes.below()
+
+
+def test_announcements_go_round_and_new_nodes_do_not_wait(routes):
+    ids = tuple(range(20, 28))
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(27, ids)))
+    listed = set()
+    for _ in range(6):
+        part = routes.to_announce(4)
+        listed.update(part.listed, part.new)
+    assert listed == {1, *ids}
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(99, (*ids, 99))))
+    assert 99 in routes.to_announce(4).new
+
+
+def test_a_packet_down_follows_the_child_that_announced_the_node_last(routes):
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (20,))))
+    routes.now_s = 0.5
+    routes.heard(2, beacon(hops=3, parent=9, below=Below(20, (20,))))
+    assert ways(routes, 20) == [2, 1]
+
+
+def test_a_packet_for_an_unknown_node_goes_up_only_if_it_came_from_below(routes):
+    routes.heard(1, beacon())
+    routes.heard(2, beacon(hops=3, parent=9))
+    routes.choose()
+    assert ways(routes, 50) == [1]
+    assert ways(routes, 50, came_from=2) == [1]
+    assert ways(routes, 50, came_from=1) == []
+
+
+def test_a_neighbour_whose_ancestor_a_node_is_leads_to_it(routes):
+    routes.heard(1, beacon(hops=4, parent=7, others=(50, 3)))
+    assert ways(routes, 50) == [1]
+
+
+def test_a_node_is_looked_for_where_it_was_seen():
+    seen = {50: (Location(0.0, 20.0, 0.0), 0.0)}
+
+    class Heard:
+        place, heard_s = seen[50]
+
+    routes = BeaconRoutes(9, True, 10.0, lambda _node: Heard)
+    routes.motion = Motion(Location(0.0, 0.0, 0.0), STILL)
+    routes.heard(1, beacon(hops=1, x=5.0, parent=9))
+    routes.heard(2, beacon(hops=1, x=-5.0, parent=9))
+    assert ways(routes, 50) == [1]
+    routes.now_s = 11.0
+    assert ways(routes, 50) == []

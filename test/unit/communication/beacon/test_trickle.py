@@ -1,0 +1,58 @@
+"""Trickle: beacons are rare while nothing changes, and frequent when something does."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from drone_mesh.communication.beacon.trickle import AT_REST_S, Trickle
+from drone_mesh.communication.medium import Medium
+
+FAST = Medium.for_hop(0.0011)
+
+
+@pytest.fixture
+def trickle():
+    made = Trickle(FAST, random.Random(1))
+    made.start(0.0)
+    return made
+
+
+def test_the_interval_grows_to_a_bound_that_still_shows_a_dead_parent_in_time(trickle):
+    for _ in range(10):
+        trickle.sent(trickle.due_s)
+    assert trickle.interval_s == AT_REST_S
+
+
+def test_a_change_makes_the_interval_short_again(trickle):
+    for _ in range(10):
+        trickle.sent(trickle.due_s)
+    now_s = trickle.due_s - 1.0
+    trickle.reset(now_s)
+    assert trickle.interval_s == 0.5
+    assert now_s <= trickle.due_s <= now_s + 0.5
+
+
+def test_no_two_intervals_are_equal(trickle):
+    times = []
+    for _ in range(20):
+        trickle.reset(trickle.due_s)
+        trickle.sent(trickle.due_s)
+        times.append(trickle.due_s)
+    steps = [after - before for before, after in zip(times, times[1:])]
+    assert len({round(step, 6) for step in steps}) == len(steps)
+    assert all(0.4 <= step <= 0.6 for step in steps)
+
+
+def test_an_urgent_beacon_leaves_within_milliseconds_but_not_at_once_after_another(trickle):
+    trickle.sent(10.0)
+    trickle.hurry(10.3)
+    assert 10.3 <= trickle.due_s <= 10.32
+    trickle.sent(20.0)
+    trickle.hurry(20.0)
+    assert 20.1 <= trickle.due_s <= 20.12
+
+
+def test_a_slow_radio_sends_beacons_less_often():
+    assert Trickle(Medium.for_hop(0.1), random.Random(1)).interval_s == pytest.approx(40.0)

@@ -1,0 +1,231 @@
+"""Whole networks with the technique beacon, at rest and in motion."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pytest
+
+from drone_mesh.communication.data.ticket import TicketState
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.inprocess import Network
+from drone_mesh.mobility import Area, Mobility, tracks_of
+
+CHANNEL = {"routing": "beacon", "radio": "shared", "rate": "1M"}
+
+
+def grid(seed=1, side=4, **kwargs):
+    network = Network(seed=seed, **{**CHANNEL, **kwargs})
+    network.add_fleet(gateways=1, routers=side * side - 1, gridsize=side, spacing=6.0)
+    return network
+
+
+def moving(seed=1, nodes=20, **kwargs):
+    """Random waypoints; a link lives half a minute, a node has ten neighbours."""
+    network = Network(seed=seed, **{**CHANNEL, **kwargs})
+    side_m = 9.0 * math.sqrt(math.pi * nodes / 10)
+    places = {0: (side_m / 2, side_m / 2, 0.0)}
+    for node in range(1, nodes):
+        places[node] = (node * 7.3 % side_m, node * 4.1 % side_m, 0.0)
+    network.add_gateway(0, *places[0][:2])
+    for node in range(1, nodes):
+        network.add_router(node, *places[node][:2])
+    mobility = Mobility(kind="random_waypoint", speed_m_s=(0.3, 0.3))
+    network.fly(tracks_of(mobility, places, [0], Area(0.0, 0.0, side_m, side_m), seed))
+    return network
+
+
+def arrivals(network, seconds):
+    """Per second one echo to a drone with a path: the shares answered within 2 s, and served."""
+    answered, served, asked, seen, last = 0, 0, 0, 0, 0
+
+    def answer(echo):
+        nonlocal answered
+        answered += echo.round_trip_s < 2.0
+
+    network.run_for(3.0)
+    for _ in range(seconds):
+        reachable = network.shortest_hops()
+        last = next(n for n in (*range(last + 1, len(network.nodes)), *reachable) if n in reachable)
+        if last:
+            asked += 1
+            network.echo(0, last, answer)
+        for other in reachable:
+            seen += 1
+            served += network.path_to_gateway(other) is not None
+        network.run_for(1.0)
+    network.run_for(2.0)
+    return answered / asked, served / seen
+
+
+@pytest.mark.parametrize("radio", ["shared", "disc"])
+def test_everybody_is_connected_within_two_seconds(radio):
+    network = grid(radio=radio, side=5)
+    assert network.run_until(network.all_connected, within_s=2.0)
+
+
+def test_a_hundred_nodes_are_connected_within_three_seconds():
+    network = grid(side=10, rate="250k")
+    assert network.run_until(network.all_connected, within_s=3.0)
+
+
+def test_there_are_no_heartbeats_and_no_introductions():
+    network = grid(radio="disc")
+    kinds = set()
+    network.air.carries = lambda payload: bool(kinds.add(payload[2])) or True
+    network.run_for(30.0)
+    assert kinds <= {MessageType.BEACON, MessageType.PROBE}
+
+
+def test_beacons_become_rarer_while_nothing_changes():
+    network = grid(radio="disc")
+    sent = []
+    network.nodes[5].antenna.broadcast_message = sent.append
+    network.run_for(20.0)
+    sent.clear()
+    network.run_for(16.0)
+    assert 9 <= len(sent) <= 13
+
+
+def test_a_drone_that_others_fly_stays_reachable():
+    echoes, served = arrivals(moving(), 30)
+    assert echoes >= 0.95
+    assert served >= 0.99
+
+
+def test_it_works_without_positions():
+    network = moving(radio="disc")
+    for node in network.nodes.values():
+        node.component.control._motion._locate = lambda: None
+    echoes, served = arrivals(network, 30)
+    assert echoes >= 0.8
+    assert served >= 0.95
+
+
+def test_wrong_positions_cost_little():
+    network = moving(radio="disc")
+    for number, node in network.nodes.items():
+        locate, count = node.drone.get_location, itertools.count(number)
+
+        def wrong(locate=locate, count=count):
+            """One in ten is 18 m off, the others up to 0.2 m."""
+            turn, place = next(count), locate()
+            off_m = 18.0 if turn % 10 == 0 else 0.1 * (turn % 5 - 2)
+            return place._replace(latitude=place.latitude + off_m)
+
+        node.component.control._motion._locate = wrong
+    echoes, served = arrivals(network, 30)
+    assert echoes >= 0.9
+    assert served >= 0.97
+
+
+def test_with_a_key_beacons_are_sealed_and_everything_arrives():
+    network = moving(key=MeshKey(bytes(range(16))))
+    echoes, served = arrivals(network, 30)
+    assert echoes >= 0.9
+    assert served >= 0.97
+
+
+def test_a_stranger_without_the_key_is_no_neighbour_of_those_who_have_it():
+    key = MeshKey(bytes(range(16)))
+    network = Network(seed=1, key=lambda node: None if node == 2 else key, **CHANNEL)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.add_router(2, 6.0, 5.0)
+    network.run_for(20.0)
+    assert network.connected(1)
+    assert [2 in network.nodes[node].component.control.routes.neighbours for node in (0, 1)] == [
+        False, False,
+    ]  # fmt: skip
+
+
+def test_after_the_death_of_a_relay_the_others_take_another_way_within_three_seconds():
+    network = grid(side=4)
+    network.run_for(10.0)
+    routes = {node: network.path_to_gateway(node) for node in network.nodes}
+    relay = max(range(1, 16), key=lambda node: sum(node in path for path in routes.values()))
+    network.power(relay, False)
+    alive = [node for node in network.nodes if node != relay]
+
+    def all_have_a_path():
+        paths = [network.path_to_gateway(node) for node in alive]
+        return all(path is not None and relay not in path for path in paths)
+
+    assert network.run_until(all_have_a_path, within_s=3.0)
+
+
+def test_a_dead_gateway_is_noticed_and_another_one_is_taken():
+    network = Network(seed=1, **CHANNEL)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_gateway(9, 18.0, 0.0)
+    for node, x in ((1, 6.0), (2, 12.0)):
+        network.add_router(node, x, 0.0)
+    network.run_for(5.0)
+    assert network.nodes[1].component.get_preferred_gateway() == 0
+    network.power(0, False)
+    assert network.run_until(
+        lambda: network.nodes[1].component.get_preferred_gateway() == 9, within_s=12.0
+    )
+    assert network.run_until(lambda: network.path_to_gateway(1) == [1, 2, 9], within_s=2.0)
+
+
+def test_a_router_that_is_cut_off_knows_it_within_four_seconds():
+    network = Network(seed=1, **CHANNEL)
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 6.0, 0.0)
+    network.run_for(5.0)
+    network.power(0, False)
+    assert network.run_until(lambda: not network.connected(1), within_s=4.0)
+
+
+def test_an_ordered_flight_does_not_end_the_membership():
+    network = grid(side=3, radio="disc")
+    network.run_for(10.0)
+    network.order(8, 14.0, 10.0)
+    connected = []
+    while network.nodes[8].drone.path is not None or not connected:
+        network.run_for(0.5)
+        connected.append(network.connected(8))
+    assert len(connected) > 3
+    assert all(connected)
+    assert [e for e in network.events if e.kind is MeshEventKind.ORDER_ACCEPTED]
+    network.run_for(10.0)
+    assert [e for e in network.events if e.kind is MeshEventKind.ORDER_ARRIVED]
+
+
+def test_a_reliable_message_reaches_a_router_and_another_one():
+    network = grid(side=4)
+    network.run_for(5.0)
+    tickets = [network.send(0, 15, b"down" * 40), network.send(3, 12, b"across" * 30)]
+    assert network.run_until(
+        lambda: all(ticket.state is TicketState.DELIVERED for ticket in tickets), within_s=20.0
+    )
+
+
+def test_a_message_for_a_node_that_nobody_announces_is_searched_for():
+    network = grid(side=4, radio="disc")
+    network.run_for(10.0)
+    for node in network.nodes.values():
+        for neighbour in node.component.control.routes.neighbours.values():
+            neighbour.announced_s.clear()
+    ticket = network.send(0, 15, b"found")
+    assert network.run_until(lambda: ticket.state is TicketState.DELIVERED, within_s=3.0)
+
+
+def test_pilots_who_fly_the_fleet_cause_no_repair_flight():
+    network = moving(nodes=12, radio="disc")
+    network.run_for(300.0)
+    assert not [e for e in network.events if e.kind is MeshEventKind.FLIGHT_DECIDED]
+
+
+def test_a_repair_brings_back_a_group_behind_a_dead_relay():
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    for node in (1, 2, 3):
+        network.add_router(node, 8.0 * node, 0.0)
+    network.run_for(10.0)
+    network.power(1, False)
+    assert network.run_until(lambda: network.connected(2) and network.connected(3), within_s=60.0)
