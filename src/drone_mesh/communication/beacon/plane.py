@@ -23,7 +23,8 @@ from drone_mesh.drone.location import Location
 HELD_S = 2.5  # our choice: a packet without a next hop waits this long
 RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
 CHECK_S = 1.0  # our choice: how often a router without a gateway considers its repair
-LATE = 1.3  # intervals: then the parent has to acknowledge a probe
+LATE = 1.3  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
+LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
 GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
 DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
@@ -122,7 +123,7 @@ class BeaconPlane(IControlPlane):
             self._lost(node)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None and parent.usable:
-            late_s = parent.alive_s + LATE * parent.beacon.interval_s
+            late_s = parent.alive_s + _late_after_s(parent.beacon.interval_s)
             if now_s >= late_s and now_s - self._probed_s > parent.beacon.interval_s:
                 self._probed_s = now_s
                 me, to = self._me, parent.node
@@ -194,7 +195,7 @@ class BeaconPlane(IControlPlane):
             due_s = min(due_s, neighbour.until_s() + 1e-3)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None:
-            late_s = parent.alive_s + LATE * parent.beacon.interval_s
+            late_s = parent.alive_s + _late_after_s(parent.beacon.interval_s)
             due_s = min(due_s, max(late_s, self._probed_s + parent.beacon.interval_s + 1e-3))
         if self._courier.holds:
             due_s = min(due_s, self._retry_s)
@@ -409,6 +410,11 @@ class BeaconPlane(IControlPlane):
 
     def give_up_routes(self) -> None:
         """There are none."""
+
+
+def _late_after_s(interval_s: float) -> float:
+    """After how long a silence the parent has to acknowledge a probe."""
+    return max(LATE * interval_s, min(2.0 * interval_s, LATE_S))
 
 
 class BeaconTechnique(IControlTechnique):

@@ -125,7 +125,7 @@ class Outboxes:
 
     def _may_reach(self, outbox: Outbox, now_s: float) -> bool:
         """Whether there is a route. If not, retry later and give up unreliable messages."""
-        if self._parts.antenna.on() and self._direction(outbox.to) != NO_ROUTE:
+        if self._parts.antenna.on() and self._parts.routing.may_reach(outbox.to):
             return True
         outbox.not_before_s = now_s + ROUTE_PERIOD_S
         outbox.blocked(self.unreachable(outbox.to))
