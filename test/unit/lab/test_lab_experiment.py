@@ -134,7 +134,7 @@ def test_a_default_that_is_written_out_is_the_same_run(tmp_path: Path) -> None:
         ("radio.loss: [0, 0.2, 0.4]", "radio.loss: 1", 13, "sweep.radio.loss: input should be a"),
         ("radio.loss: [0, 0.2, 0.4]", "routing: [no_such]", 13, "routing technique 'no_such'"),
         ("radio.loss: [0, 0.2, 0.4]", "routing: [no.such:X]", 13, "cannot be loaded"),
-        ("radio.loss: [0, 0.2, 0.4]", "routing: ['json:JSONDecoder']", 13, "IRoutingTechnique"),
+        ("radio.loss: [0, 0.2, 0.4]", "routing: ['json:JSONDecoder']", 13, "ITechnique"),
     ],
 )
 def test_each_mistake_is_one_line_with_file_line_and_key(

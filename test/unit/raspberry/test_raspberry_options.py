@@ -191,7 +191,7 @@ def test_emulated_nodes_need_no_id():
         ("--id 3 --connection-lost-after x", "invalid float value: 'x'"),
         (
             "--id 3 --routing gossip",
-            "technique 'gossip': use one of babel, batman, child_table_tree",
+            "technique 'gossip': use one of babel, batman, beacon, child_table_tree",
         ),
         ("--id 3 --repair hope", "unknown repair strategy 'hope': use one of field, follow, home"),
         ("--id 3 --clearance 0", "invalid clearance 0.0: must be above 0 metres"),
