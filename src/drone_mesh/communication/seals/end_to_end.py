@@ -79,6 +79,7 @@ class _Form:
 
 
 _OF_PAIR = _Form(TAG_BYTES, by_authority=False)
+_OF_ROUTER = _Form(TAG_BYTES, by_authority=False)  # a heartbeat to a gateway
 _FORMS = {
     _HEARTBEAT: _Form(TAG_BYTES, by_authority=True),
     _ORDER: _Form(ORDER_TAG_BYTES, by_authority=True),
@@ -128,13 +129,15 @@ class EndToEnd:
         self._rng = rng
         self._nonces = deque([_Nonce(rng.getrandbits(32))], maxlen=NONCES)
         self._changed_s = 0.0
-        self._heard: dict[int, int] = {}  # the nonces of others
+        self._heard: dict[int, int] = {}  # the nonces of others; any node can claim one
+        self._proved: dict[int, int] = {}  # those that came with a proof
+        self._orders: dict[int, int] = {}  # by addressee: orders sealed since then
         self._sequences: dict[int, int] = {}  # by addressee: the number used last
         self._gateways: set[int] = set()  # nodes that proved to be one
         # By the addressee or, if the key is that of a pair, by the other node. A state is copied
         # for each proof, which saves hashing the key.
         self._states: dict[_Form, dict[int, hashlib.blake2s]] = {
-            form: {} for form in _FORMS.values()
+            form: {} for form in (*_FORMS.values(), _OF_ROUTER)
         }
         self._is_gateway = False
         self._last: _Sealed | None = None
@@ -153,30 +156,49 @@ class EndToEnd:
                 self._nonces.appendleft(_Nonce(self._rng.getrandbits(32)))
                 self._changed_s = now_s
             payload = _with_nonce(payload, self._nonces[0].value)
-            if gateway != self._node_id:
+            if gateway != self._node_id and forward != gateway:
                 return payload
         elif kind == _REQUEST:
             return _with_nonce(payload, self._nonces[0].value)
-        form = _FORMS.get(kind)
+        form = self._form(payload)
         if form is None or forward > MAX_NODE_ID:
             return payload
         state = self._states[form].get(forward) or self._state(form, forward)
         if state is None:
             return payload
-        if kind == _HEARTBEAT:
+        if kind == _HEARTBEAT and form is not _OF_ROUTER:
             self._is_gateway = True
-        nonce = self._heard.get(forward)
-        if nonce is None:
+        if forward not in self._heard:
             # Heartbeats are sent even without a proof, because they find neighbours.
             return payload if kind == _HEARTBEAT else None
-        what, last = messages.identity(payload)[: form.at - 2], self._last
+        what, last = _what(payload, form), self._last
         if last is not None and last.what == what and now_s - last.at_s <= SAME_PACKET_S:
             # another try, or a copy for another neighbour
             return form.with_proof(payload, last.tag, last.sequence)
         sequence = self._next_sequence(forward)
-        tag = _tag(state, nonce, sequence, what)
+        tag = _tag(state, self._nonce_for(kind, form, forward), sequence, what)
         self._last = _Sealed(what, tag, sequence, now_s)
         return form.with_proof(payload, tag, sequence)
+
+    def _nonce_for(self, kind: int, form: _Form, forward: int) -> int:
+        """The nonce of an addressee that this packet is valid for.
+
+        A claimed nonce is that of the packet to answer, if it was not forged. An order answers
+        none: a claim, which a restarted drone cannot prove yet, counts for every second try only.
+        """
+        claimed = self._heard[forward]
+        if kind == _ORDER:
+            tries = self._orders[forward] = self._orders.get(forward, 0) + 1
+            return self._proved.get(forward, claimed) if tries % 2 else claimed
+        if form is _OF_ROUTER or kind in _REPORTS:
+            return self._proved.get(forward, claimed)
+        return claimed
+
+    def _form(self, payload: bytes) -> _Form | None:
+        kind = payload[TYPE_AT]
+        if kind == _HEARTBEAT and payload[CREATOR_AT] != messages.preferred_gateway(payload):
+            return _OF_ROUTER
+        return _FORMS.get(kind)
 
     def _next_sequence(self, forward: int) -> int:
         before = self._sequences.get(forward)
@@ -205,10 +227,7 @@ class EndToEnd:
             return _without_nonce(payload)
         for_one = payload[FORWARD_AT] <= MAX_NODE_ID and creator <= MAX_NODE_ID
         if kind == _HEARTBEAT:
-            if for_one and creator == messages.preferred_gateway(payload):
-                self._check(payload, _FORMS[kind])
-                self._gateways.add(creator)
-            self._heard[creator] = _nonce_of(payload)[0]
+            self._open_heartbeat(payload, creator, for_one)
             return _without_nonce(payload)
         form = _FORMS.get(kind)
         if form is not None and for_one:
@@ -220,6 +239,24 @@ class EndToEnd:
             raise NotProven("a relayed MISSING")  # only sent to gateways, about orders
         return payload
 
+    def _open_heartbeat(self, payload: bytes, creator: int, for_one: bool) -> None:
+        """Learn the nonce. Raises NotProven if it claims to be a gateway's and is not."""
+        nonce = _nonce_of(payload)[0]
+        form = self._form(payload)
+        assert form is not None, "heartbeats have a form"
+        if for_one:
+            try:
+                self._check(payload, form)
+            except NotProven:
+                if form is not _OF_ROUTER:
+                    raise
+            else:
+                self._proved[creator] = nonce
+                self._orders[creator] = 0
+                if form is not _OF_ROUTER:
+                    self._gateways.add(creator)
+        self._heard[creator] = nonce
+
     def _check(self, payload: bytes, form: _Form) -> None:
         """Raises NotProven unless the proof is valid."""
         creator = payload[CREATOR_AT]
@@ -227,7 +264,7 @@ class EndToEnd:
         state = self._states[form].get(node) or self._state(form, node)
         assert state is not None, "a node has its own keys"
         tag, sequence = form.proof(payload)
-        what = messages.identity(payload)[: form.at - 2]
+        what = _what(payload, form)
         for nonce in self._nonces:
             if compare_digest(_tag(state, nonce.value, sequence, what), tag):
                 if not _use(nonce.windows, creator, sequence):
@@ -251,6 +288,14 @@ class EndToEnd:
         state = hashlib.blake2s(key=key, digest_size=form.tag_bytes, person=b"end2end")
         self._states[form][node] = state
         return state
+
+
+def _what(payload: bytes, form: _Form) -> bytes:
+    """What the proof of a packet covers; a router's heartbeat has one for its nonce."""
+    what = messages.identity(payload)[: form.at - 2]
+    if form is _OF_ROUTER:
+        return what + payload[_NONCE_AT : _NONCE_AT + _NONCE_BYTES]
+    return what
 
 
 def _tag(state: hashlib.blake2s, nonce: int, sequence: int, what: bytes) -> bytes:

@@ -157,3 +157,48 @@ def test_users_data_and_bids_are_not_changed(pair):
         packet("00 00 07 05 05 00 00 80 3f"),
     ):
         assert drone.open(gateway.seal(made, 0.0)) == made
+
+
+BEAT = packet("05 05 04 03 00 01 00 00")  # heartbeat of drone 5 to gateway 0
+
+
+def beats(gateway, drone, now_s):
+    """A heartbeat of the drone, and the gateway's answer."""
+    gateway.open(relayed(drone.seal(BEAT, now_s), to=0))
+    drone.open(relayed(gateway.seal(ANSWER, now_s)))
+
+
+def test_a_nonce_that_somebody_claims_in_the_drones_name_silences_no_order(pair):
+    gateway, drone = pair
+    for round_ in range(24):
+        now_s = 10.0 * round_
+        beats(gateway, drone, now_s)
+        if round_:  # the first heartbeat has no proof yet: the drone does not know the gateway
+            for forger in range(10):
+                gateway.open(
+                    end(5, KEY.for_node(7), seed=f"{round_} {forger}").seal(PRESENT, now_s)
+                )
+            claimed = end(5, KEY.for_node(5), seed=round_).seal(BEAT, now_s)  # without a proof
+            gateway.open(relayed(claimed, to=0))
+            assert drone.open(relayed(gateway.seal(ORDER, now_s + 1.0)))
+
+
+def test_the_proof_of_a_heartbeat_covers_its_nonce(pair):
+    gateway, drone = pair
+    beats(gateway, drone, 0.0)
+    beats(gateway, drone, 10.0)
+    changed = bytearray(relayed(drone.seal(BEAT, 20.0), to=0))
+    changed[15] ^= 1
+    gateway.open(bytes(changed))
+    assert drone.open(relayed(gateway.seal(ORDER, 21.0)))
+
+
+def test_a_restarted_drone_takes_the_second_try_of_an_order(pair):
+    gateway, drone = pair
+    beats(gateway, drone, 0.0)
+    beats(gateway, drone, 10.0)
+    restarted = end(5, KEY.for_node(5), seed=1)
+    gateway.open(relayed(restarted.seal(BEAT, 20.0), to=0))
+    with pytest.raises(NotProven):
+        restarted.open(relayed(gateway.seal(ORDER, 21.0)))
+    assert restarted.open(relayed(gateway.seal(ORDER, 23.0)))
