@@ -10,7 +10,9 @@ from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.inprocess.shared_antenna import SharedChannel
-from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel
+from drone_mesh.nrf24.emulator.fading import Fading
+from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
+from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.settings import RadioSettings, data_rate
 
 
@@ -23,6 +25,8 @@ def create_air(
     jitter_s: float,
     rate: str,
     links: LinkModel | None,
+    fading: str,
+    rician_k_db: float,
 ) -> IInProcessAir:
     """The air for a radio, "disc", "shared" or "chips"; the other arguments as for Network.
 
@@ -30,17 +34,37 @@ def create_air(
     """
     _check_numbers(max_distance_m, loss, delay_s, jitter_s)
     if radio == "disc":
+        if fading != "none":
+            raise ConfigurationError("fading needs the radio shared or chips")
         own_rng = random.Random(rng.random())
         return InProcessAir(VirtualClock(), own_rng, max_distance_m, loss, delay_s, jitter_s)
     settings = RadioSettings(data_rate=data_rate(rate))
+    if links is None and fading != "none":
+        links = LogDistance.with_edge_at(
+            max_distance_m,
+            random.Random(rng.random()),
+            bits_per_s=settings.data_rate.value,
+        )
     links = links or IdealDisc(max_distance_m)
     if radio == "shared":
-        return SharedChannel(VirtualClock(), links, settings, max_distance_m)
+        shared = SharedChannel(VirtualClock(), links, settings, max_distance_m)
+        _fade(shared.space, fading, rician_k_db, rng)
+        return shared
     if radio == "chips":
         from drone_mesh.inprocess.chip_air import ChipAir  # needs greenlet
 
-        return ChipAir(links, settings, max_distance_m, random.Random(rng.random()))
+        chips = ChipAir(links, settings, max_distance_m, random.Random(rng.random()))
+        _fade(chips.space, fading, rician_k_db, rng)
+        return chips
     raise ConfigurationError(f"invalid radio {radio!r}: use disc, shared or chips")
+
+
+def _fade(space: Space, kind: str, k_db: float, rng: random.Random) -> None:
+    if kind != "none":
+        links = space.links
+        scale = links.metres_per_metre if isinstance(links, LogDistance) else 1.0
+        own_rng = random.Random(rng.random())
+        space.fading = Fading(kind, own_rng, k_db=k_db, metres_per_metre=scale)
 
 
 def _check_numbers(max_distance_m: float, loss: float, delay_s: float, jitter_s: float) -> None:

@@ -17,6 +17,7 @@ from drone_mesh.inprocess.task_clock import TaskClock
 from drone_mesh.nrf24.emulator.air import Air
 from drone_mesh.nrf24.emulator.chip import EmulatedChip
 from drone_mesh.nrf24.emulator.links import LinkModel
+from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.low_level import NRF24LowLevelInterface
 from drone_mesh.nrf24.settings import RadioSettings
@@ -74,7 +75,6 @@ class ChipAir(IInProcessAir):
         self.air = Air(self.clock.tasks, links, rng)
         self.settings = settings
         self.max_distance_m = max_distance_m
-        self._links = links
         self.antennas: dict[int, ChipAntenna] = {}  # by node
         self._flying: set[int] = set()
         self._stepping = False
@@ -83,6 +83,11 @@ class ChipAir(IInProcessAir):
     @property
     def delivered(self) -> int:
         return sum(antenna.statistics().received for antenna in self.antennas.values())
+
+    @property
+    def space(self) -> Space:
+        """What lies between the antennas, and what else sends there."""
+        return self.air.space
 
     @property
     def frames(self) -> int:
@@ -127,11 +132,14 @@ class ChipAir(IInProcessAir):
 
     def _reaches(self, one: ChipAntenna, other: ChipAntenna) -> bool:
         settings = self.settings
-        distance_m = math.dist(one.chip.position, other.chip.position)
-        power_dbm = self._links.received_dbm(
+        here, there = one.chip.position, other.chip.position
+        distance_m, links = math.dist(here, there), self.space.links
+        power_dbm = links.received_dbm(
             distance_m, float(settings.power.value), 2400 + settings.channel
+        ) - self.space.lost_db(here, there)
+        return power_dbm > -math.inf and links.reaches(
+            distance_m, power_dbm, settings.data_rate.value
         )
-        return self._links.reaches(distance_m, power_dbm, settings.data_rate.value)
 
     def flight(self, node: int, started: bool) -> None:
         """A drone took off (True) or stopped (False)."""

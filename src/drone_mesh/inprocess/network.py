@@ -74,6 +74,8 @@ class Network:
         radio: str | IInProcessAir = "disc",
         rate: str = DEFAULT_RATE,
         links: LinkModel | None = None,
+        fading: str = "none",
+        rician_k_db: float = 10.0,
         repair: str | Callable[[], IRepairStrategy] = DEFAULT_REPAIR,
         repair_options: RepairOptions | None = None,
         key: Keys | Callable[[int], Keys | None] | None = None,
@@ -88,7 +90,9 @@ class Network:
         `radio`: "disc", on which packets never meet; "shared", a fast model of nRF24L01+ radios on
         one channel; "chips", the driver on emulated chips; or an air of your own. For "shared" and
         "chips": `rate` (250k, 1M or 2M) and `links`, the space between the radios (default: an
-        ideal disc); for the disc: `loss`, `delay_s` and `jitter_s`. Raises ConfigurationError.
+        ideal disc), whose power may fade ("rayleigh" or "rician"; then the default is a power that
+        falls with distance). For the disc: `loss`, `delay_s` and `jitter_s`. Raises
+        ConfigurationError.
 
         `key`: the key of the mesh, for every node, or a function that returns the keys of each
         node. None: no seals, of that node or of all.
@@ -106,7 +110,16 @@ class Network:
         self.air: IInProcessAir
         if isinstance(radio, str):
             self.air = create_air(
-                radio, self._rng, max_distance_m, loss, delay_s, jitter_s, rate, links
+                radio,
+                self._rng,
+                max_distance_m,
+                loss,
+                delay_s,
+                jitter_s,
+                rate,
+                links,
+                fading,
+                rician_k_db,
             )
         else:
             self.air = radio

@@ -21,7 +21,10 @@ from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.air import CAPTURE_DB
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
+from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.settings import RadioSettings
+
+MOST_GAIN_DB = 10.0  # our choice: Rayleigh fading exceeds it once in 22,000 blocks
 
 
 class Transmission:
@@ -80,7 +83,7 @@ class SharedAir(IInProcessAir):
     ) -> None:
         """`max_distance_m`: the range for pictures and path searches."""
         self.clock = clock
-        self.links = links
+        self.space = Space(links)
         self.settings = settings
         self.max_distance_m = max_distance_m
         self.frames = 0  # frames sent so far
@@ -99,7 +102,7 @@ class SharedAir(IInProcessAir):
         self._radios: dict[int, SharedRadio] = {}
         self._active: list[Transmission] = []
         self._power_dbm: dict[tuple[int, int], float] = {}  # sender, receiver; of standing pairs
-        self._reached: dict[int, list[SharedRadio]] = {}  # by a standing sender
+        self._reached: dict[tuple[int, bool], list[SharedRadio]] = {}  # by a standing sender
         self._flying: set[int] = set()
 
     # The radios on the air -------------------------------------------------------------------
@@ -128,7 +131,7 @@ class SharedAir(IInProcessAir):
         """The radios that a node could reach on an undisturbed channel, by id."""
         if node not in self._radios:
             return {}
-        return {radio.node_id: radio for radio in self._in_reach(node)}
+        return {radio.node_id: radio for radio in self._in_reach(node, faded=False)}
 
     @property
     def delivered(self) -> int:
@@ -162,7 +165,7 @@ class SharedAir(IInProcessAir):
             if receiver is not None:
                 self._arrive(frame, receiver)
         else:
-            for receiver in self._in_reach(frame.sender.node_id):
+            for receiver in self._in_reach(frame.sender.node_id, faded=True):
                 self._arrive(frame, receiver)
 
     def _arrive(self, frame: Transmission, receiver: SharedRadio) -> None:
@@ -171,6 +174,8 @@ class SharedAir(IInProcessAir):
             return
         sender_id, receiver_id = frame.sender.node_id, receiver.node_id
         power_dbm = self._power(sender_id, receiver_id)
+        if power_dbm == -math.inf:
+            return  # obstacles block it
         hop = Hop(
             sender_id,
             receiver_id,
@@ -181,8 +186,11 @@ class SharedAir(IInProcessAir):
             frame.packet if frame.answers is None else None,
             round(frame.start_s * NS_PER_S),
         )
-        errors = self.links.bit_errors(hop)
+        errors = self.space.links.bit_errors(hop)
         if errors is None:
+            return
+        if self.space.noises and self._noise_exceeds(power_dbm - self._capture_db, frame, receiver):
+            self.collisions += 1
             return
         if frame.others:
             strongest_dbm = power_dbm - self._capture_db
@@ -206,6 +214,20 @@ class SharedAir(IInProcessAir):
         return math.dist(radios[one].drone.get_location(), radios[other].drone.get_location())
 
     def _power(self, sender: int, receiver: int) -> float:
+        """The power of a frame between two radios now."""
+        power_dbm = self._mean_power(sender, receiver)
+        fading = self.space.fading
+        if fading is None or power_dbm == -math.inf:
+            return power_dbm
+        radios = (self._radios[sender], self._radios[receiver])
+        places = (
+            radios[0].drone.get_location().to_vector(),
+            radios[1].drone.get_location().to_vector(),
+        )
+        now_ns = round(self.clock.now_s * NS_PER_S)
+        return power_dbm + fading.gain_db((sender, receiver), places, self._carrier_mhz, now_ns)
+
+    def _mean_power(self, sender: int, receiver: int) -> float:
         power_dbm = self._power_dbm.get((sender, receiver))
         if power_dbm is not None:
             return power_dbm
@@ -214,24 +236,43 @@ class SharedAir(IInProcessAir):
         distance_m = self._distance_m(sender, receiver)
         if distance_m == math.inf:
             return -math.inf
-        power_dbm = self.links.received_dbm(
+        power_dbm = self.space.links.received_dbm(
             distance_m, float(self.settings.power.value), self._carrier_mhz
         )
+        if self.space.obstacles is not None:
+            places = (
+                self._radios[node].drone.get_location().to_vector() for node in (sender, receiver)
+            )
+            power_dbm -= self.space.lost_db(*places)
         if not self._flying.intersection((sender, receiver)):
             self._power_dbm[sender, receiver] = power_dbm
         return power_dbm
 
-    def _in_reach(self, node: int) -> list[SharedRadio]:
-        reached = self._reached.get(node)
+    def _noise_exceeds(self, dbm: float, frame: Transmission, receiver: SharedRadio) -> bool:
+        """Whether there was more noise than that at some time during the frame."""
+        span_ns = (round(frame.start_s * NS_PER_S), round(frame.end_s * NS_PER_S))
+        place = receiver.drone.get_location().to_vector()
+        noise_dbm = self.space.noise_dbm(place, self._carrier_mhz, self._bits_per_s, span_ns)
+        return noise_dbm > dbm
+
+    def _in_reach(self, node: int, faded: bool) -> list[SharedRadio]:
+        """Who may hear a node: on the mean, or at a moment when fading adds to the power."""
+        faded = faded and self.space.fading is not None
+        reached = self._reached.get((node, faded))
         if reached is None:
+            more_db = MOST_GAIN_DB if faded else 0.0
             reached = [
                 radio
                 for other, radio in self._radios.items()
-                if other != node
-                and self.links.reaches(
-                    self._distance_m(node, other), self._power(node, other), self._bits_per_s
-                )
+                if other != node and self._reaches(node, other, more_db)
             ]
             if not self._flying:
-                self._reached[node] = reached
+                self._reached[node, faded] = reached
         return reached
+
+    def _reaches(self, node: int, other: int, more_db: float) -> bool:
+        power_dbm = self._mean_power(node, other)
+        distance_m = self._distance_m(node, other)
+        return power_dbm > -math.inf and self.space.links.reaches(
+            distance_m, power_dbm + more_db, self._bits_per_s
+        )

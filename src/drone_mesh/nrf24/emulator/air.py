@@ -2,25 +2,26 @@
 
 A frame is received by chips that listened on its channel and rate from before its start to its end.
 Two frames that overlap on one channel destroy each other at a receiver, unless one is stronger by
-the capture ratio. Neighbouring channels do not interfere, and the speed of light is infinite.
+the capture ratio; noise destroys them in the same way (space.py). Neighbouring channels do not
+interfere, and the speed of light is infinite.
 """
 
 from __future__ import annotations
 
 import math
 import random
-from typing import Callable, Protocol, Sequence, Tuple
+from typing import Callable, Protocol, Sequence
 
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.clock import EmulatorClock
+from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
+from drone_mesh.nrf24.emulator.space import Space
 
 CAPTURE_DB = {250_000: 12.0, 1_000_000: 9.0, 2_000_000: 7.0}  # co-channel C/I [DS 5.7]
 RPD_DBM = -64.0  # [DS 6.4]
 RPD_NS = 40_000  # the least duration of power that is detected [DS 6.4]
-
-Position = Tuple[float, float, float]  # metres
 
 
 class Antenna(Protocol):
@@ -74,11 +75,11 @@ class Air:
 
     def __init__(self, clock: EmulatorClock, links: LinkModel, rng: random.Random) -> None:
         self.clock = clock
-        self._links = links
+        self.space = Space(links)
         self._rng = rng  # decides which bits of a damaged frame are wrong
         self._listening: dict[tuple[int, int], dict[Antenna, None]] = {}
         self._on_channel: dict[int, list[Transmission]] = {}
-        self._distances: dict[tuple[Antenna, Antenna], float] = {}
+        self._pairs: dict[tuple[Antenna, Antenna], tuple[float, float]] = {}  # metres, lost dB
         self._observers: list[TransmissionObserver] = []
         self.frames = 0  # frames sent so far
         self.airtime_s = 0.0  # of all frames together
@@ -90,7 +91,7 @@ class Air:
 
     def moved(self) -> None:
         """An antenna has moved."""
-        self._distances.clear()
+        self._pairs.clear()
 
     def listen(self, antenna: Antenna, channel: int, bits_per_s: int) -> None:
         """The antenna receives frames that start from now on."""
@@ -124,10 +125,17 @@ class Air:
         transmission.end_ns = self.clock.now_ns
         self._on_channel[transmission.channel].remove(transmission)
 
-    def energy_dbm(self, antenna: Antenna, channel: int, since_ns: int) -> float:
-        """Power of the strongest frame on the channel that lasted long enough to be detected."""
-        enough_ns = self.clock.now_ns - RPD_NS
-        return max(
+    def energy_dbm(self, antenna: Antenna, channel: int, bits_per_s: int, since_ns: int) -> float:
+        """Power of what is strongest on the channel and lasted long enough to be detected."""
+        now_ns = self.clock.now_ns
+        enough_ns = now_ns - RPD_NS
+        noise_dbm = -math.inf
+        if self.space.noises and since_ns <= enough_ns:
+            span_ns = (enough_ns, now_ns)
+            noise_dbm = self.space.noise_dbm(
+                antenna.position, 2400 + channel, bits_per_s, span_ns, throughout=True
+            )
+        frames_dbm = max(
             (
                 self._power_dbm(transmission, antenna)
                 for transmission in self._on_channel.get(channel, ())
@@ -136,6 +144,7 @@ class Air:
             ),
             default=-math.inf,
         )
+        return max(noise_dbm, frames_dbm)
 
     def recognised_until_ns(self, antenna: Antenna, channel: int, address_bits: int) -> int | None:
         """End of a frame that the antenna has recognised, whose address has passed; else None."""
@@ -173,12 +182,14 @@ class Air:
 
     def _arrive(self, transmission: Transmission, antenna: Antenna) -> None:
         power_dbm = self._power_dbm(transmission, antenna)
+        if power_dbm == -math.inf:
+            return  # obstacles block it
         bit_count = transmission.frame.bit_count
-        errors = self._links.bit_errors(
+        errors = self.space.links.bit_errors(
             Hop(
                 transmission.sender.name,
                 antenna.name,
-                self._distance_m(transmission.sender, antenna),
+                self._pair(transmission.sender, antenna)[0],
                 power_dbm,
                 transmission.bits_per_s,
                 bit_count,
@@ -189,7 +200,9 @@ class Air:
         if errors is None:
             return
         needed_dbm = power_dbm - CAPTURE_DB[transmission.bits_per_s]
-        if any(self._power_dbm(other, antenna) > needed_dbm for other in transmission.others):
+        if any(
+            self._power_dbm(other, antenna) > needed_dbm for other in transmission.others
+        ) or self._noise_exceeds(needed_dbm, transmission, antenna):
             self.collisions += 1
             return
         frame = transmission.frame
@@ -202,15 +215,29 @@ class Air:
     def _power_dbm(self, transmission: Transmission, antenna: Antenna) -> float:
         if transmission.sender is antenna:
             return -math.inf  # its own frame, during which it did not listen
-        distance_m = self._distance_m(transmission.sender, antenna)
-        return self._links.received_dbm(
-            distance_m, transmission.tx_dbm, 2400 + transmission.channel
-        )
+        sender, mhz = transmission.sender, 2400 + transmission.channel
+        distance_m, lost_db = self._pair(sender, antenna)
+        space = self.space
+        power_dbm = space.links.received_dbm(distance_m, transmission.tx_dbm, mhz) - lost_db
+        if space.fading is None:
+            return power_dbm
+        ends, places = (sender.name, antenna.name), (sender.position, antenna.position)
+        return power_dbm + space.fading.gain_db(ends, places, mhz, self.clock.now_ns)
 
-    def _distance_m(self, one: Antenna, other: Antenna) -> float:
-        distance_m = self._distances.get((one, other))
-        if distance_m is None:
-            (ax, ay, az), (bx, by, bz) = one.position, other.position
-            distance_m = math.sqrt((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2)
-            self._distances[one, other] = distance_m
-        return distance_m
+    def _noise_exceeds(self, dbm: float, transmission: Transmission, antenna: Antenna) -> bool:
+        """Whether there was more noise than that at some time during the frame."""
+        space = self.space
+        if not space.noises:
+            return False
+        mhz, span_ns = 2400 + transmission.channel, (transmission.start_ns, transmission.end_ns)
+        noise_dbm = space.noise_dbm(antenna.position, mhz, transmission.bits_per_s, span_ns)
+        return noise_dbm > dbm
+
+    def _pair(self, one: Antenna, other: Antenna) -> tuple[float, float]:
+        """The distance in metres, and what obstacles cost in dB."""
+        pair = self._pairs.get((one, other))
+        if pair is None:
+            here, there = one.position, other.position
+            pair = (math.dist(here, there), self.space.lost_db(here, there))
+            self._pairs[one, other] = pair
+        return pair

@@ -8,9 +8,10 @@ only recorded in `warnings`.
 from __future__ import annotations
 
 from drone_mesh.nrf24.airtime import CE_PULSE_MIN_NS, CE_TO_CSN_NS, SETTLING_NS
-from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Position
+from drone_mesh.nrf24.emulator.air import RPD_DBM, Air
 from drone_mesh.nrf24.emulator.chip_core import ChipCore
 from drone_mesh.nrf24.emulator.commands import CommandDecoder
+from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.quirks import ChipVariant
 from drone_mesh.nrf24.emulator.receiver import Receiver

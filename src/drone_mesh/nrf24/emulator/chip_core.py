@@ -10,7 +10,8 @@ import abc
 from typing import Callable
 
 from drone_mesh.nrf24.airtime import PREAMBLE_BITS, SETTLING_NS
-from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Position, Transmission
+from drone_mesh.nrf24.emulator.air import RPD_DBM, Air, Transmission
+from drone_mesh.nrf24.emulator.fading import Position
 from drone_mesh.nrf24.emulator.fifos import RxFifo, TxFifo
 from drone_mesh.nrf24.emulator.frames import Frame
 from drone_mesh.nrf24.emulator.pins import EmulatedCe, EmulatedIrq
@@ -154,8 +155,8 @@ class ChipCore(abc.ABC):
             return self._rpd_latched
         if self.listening_since_ns is None:
             return False
-        channel = self._listening_to[0]
-        return self.air.energy_dbm(self, channel, self.listening_since_ns) > RPD_DBM
+        channel, bits_per_s = self._listening_to
+        return self.air.energy_dbm(self, channel, bits_per_s, self.listening_since_ns) > RPD_DBM
 
     def transmit(self, frame: Frame, packet: object) -> None:
         """Send a frame; `frame_left` is called at its end."""

@@ -92,7 +92,7 @@ class LogDistance(LinkModel):
         self._rng = rng
         self._exponent = exponent
         self._gain_db = gain_db
-        self._scale = metres_per_metre
+        self.metres_per_metre = metres_per_metre
 
     @classmethod
     def with_edge_at(
@@ -114,7 +114,7 @@ class LogDistance(LinkModel):
 
     def received_dbm(self, distance_m: float, tx_dbm: float, carrier_mhz: int) -> float:
         at_1_m_dbm = free_space_dbm(1.0, tx_dbm + self._gain_db, carrier_mhz)
-        metres = max(distance_m * self._scale, _NEAREST_M)
+        metres = max(distance_m * self.metres_per_metre, _NEAREST_M)
         return min(at_1_m_dbm - 10 * self._exponent * math.log10(metres), _SAME_POINT_DBM)
 
     def bit_errors(self, hop: Hop) -> int | None:

@@ -12,7 +12,6 @@ import threading
 import time
 from typing import Sequence
 
-from drone_mesh.nrf24.emulator.air import Position
 from drone_mesh.nrf24.emulator.air_protocol import (
     CHIP_NUMBER,
     MAKE_CHIP,
@@ -21,6 +20,7 @@ from drone_mesh.nrf24.emulator.air_protocol import (
     receive_answer,
     send_request,
 )
+from drone_mesh.nrf24.emulator.fading import Position
 
 ANSWER_WITHIN_S = 5.0  # our choice: far above what a busy machine takes
 CONNECT_AGAIN_S = 1.0  # our choice
