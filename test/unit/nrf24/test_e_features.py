@@ -61,6 +61,18 @@ def test_row_43_dynamic_lengths_arrive_as_they_were_sent(lab, width):
     assert prx.unload(width) == PAYLOAD[:width]
 
 
+@pytest.mark.parametrize("width", [1, 8, 32])
+def test_row_43_dynamic_lengths_arrive_without_auto_ack_too_and_are_not_acknowledged(lab, width):
+    ptx, prx = lab.pair(width=0, en_aa=0x00)
+    dynamic(ptx)
+    dynamic(prx)
+    for filling in (PAYLOAD, PAYLOAD[::-1]):
+        assert ptx.send(filling[:width]) == 0x20
+        assert prx.command(Command.R_RX_PL_WID, b"\0") == bytes((width,))
+        assert prx.unload(width) == filling[:width]
+    assert lab.frames_from("prx", answers=True) == []
+
+
 def test_row_44_an_ack_payload_comes_back_with_the_acknowledgement(lab):
     ptx, prx = lab.pair()
     dynamic(ptx, 0x06)

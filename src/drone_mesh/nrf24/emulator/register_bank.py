@@ -132,15 +132,15 @@ class RegisterBank:
         auto_ack = self._byte(Register.EN_AA)
         self.auto_ack = [bool(auto_ack & ENAA[pipe].mask) for pipe in range(PIPES)]
         dynamic = self._byte(Register.DYNPD) if self.dynamic_lengths else 0
-        self.dynamic = [
-            self.auto_ack[pipe] and bool(dynamic & DPL[pipe].mask) for pipe in range(PIPES)
-        ]
+        # The datasheet asks for ENAA_Pn, too; silicon does without it (docs/radio.md, "Frames").
+        self.dynamic = [bool(dynamic & DPL[pipe].mask) for pipe in range(PIPES)]
         self.formats: list[FrameFormat] = []  # of frames that a pipe receives
         self.ack_formats: list[FrameFormat] = []  # of its acknowledgements, which carry nothing
         for pipe in range(PIPES):  # in static mode, whatever RX_PW_Pn says
             static = self._byte(Register(Register.RX_PW_P0 + pipe))
-            form = FrameFormat(self.address_bytes, self.crc_bytes, self.auto_ack[pipe], None)
             dynamic_length = self.dynamic[pipe]
+            enhanced = self.auto_ack[pipe] or dynamic_length
+            form = FrameFormat(self.address_bytes, self.crc_bytes, enhanced, None)
             self.formats.append(form if dynamic_length else form._replace(payload_bytes=static))
             self.ack_formats.append(form if dynamic_length else form._replace(payload_bytes=0))
 
