@@ -157,7 +157,7 @@ def test_with_rayleigh_fading_packets_at_the_edge_are_lost_in_blocks():
     sender, receiver = lab.driver(5), lab.driver(10, 60.0)
     results = []
     for _ in range(400):
-        results.append(sender.try_once(10, PAYLOAD, False, 0, 1))
+        results.append(sender.try_once(10, PAYLOAD, False, 0, 1).acknowledged)
         sender.drop()
         lab.clock.sleep(0.02)
         receiver.receive(0.0)
