@@ -132,7 +132,7 @@ class RegisterBank:
         auto_ack = self._byte(Register.EN_AA)
         self.auto_ack = [bool(auto_ack & ENAA[pipe].mask) for pipe in range(PIPES)]
         dynamic = self._byte(Register.DYNPD) if self.dynamic_lengths else 0
-        # The datasheet asks for ENAA_Pn, too; silicon does without it (docs/radio.md, "Frames on the air").
+        # [DS] asks for ENAA_Pn, too; silicon does not (docs/radio.md, "Frames on the air").
         self.dynamic = [bool(dynamic & DPL[pipe].mask) for pipe in range(PIPES)]
         self.formats: list[FrameFormat] = []  # of frames that a pipe receives
         self.ack_formats: list[FrameFormat] = []  # of its acknowledgements, which carry nothing
