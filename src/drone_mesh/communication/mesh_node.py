@@ -75,7 +75,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self._antenna = antenna
         seals = antenna if isinstance(antenna, IMeshSeals) else NO_SEALS
         self._rng = rng
-        self._timing = timing or MeshTiming()
+        self._timing = timing or routing.timing
         self._debug = debug
         self._deadlines = Deadlines()
         self._neighbours = Neighbours(

@@ -5,10 +5,13 @@ from __future__ import annotations
 import abc
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.timing import MeshTiming
 
 
 class ITechnique(abc.ABC):  # noqa: B024 (what each kind must do differs)
     """What `routing:=` names: an IRoutingTechnique or an IControlTechnique."""
+
+    timing = MeshTiming()  # of a node whose user does not set it
 
 
 class IDelivery(abc.ABC):

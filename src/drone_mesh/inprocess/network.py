@@ -99,7 +99,7 @@ class Network:
         """
         self._seed = seed
         self._rng = random.Random(seed)
-        self._timing = timing or MeshTiming()
+        self._timing = timing
         self._routing = routing
         self._repair = repair
         if isinstance(repair, str) and repair != ORACLE:

@@ -229,3 +229,15 @@ def test_a_repair_brings_back_a_group_behind_a_dead_relay():
     network.run_for(10.0)
     network.power(1, False)
     assert network.run_until(lambda: network.connected(2) and network.connected(3), within_s=60.0)
+
+
+def test_a_repair_begins_ten_seconds_after_the_loss():
+    network = Network(seed=1, routing="beacon")
+    network.add_gateway(0, 0.0, 0.0)
+    network.add_router(1, 8.0, 0.0)
+    network.run_for(10.0)
+    network.power(0, False)
+    network.run_for(40.0)
+    emergency = next(e for e in network.events if e.kind is MeshEventKind.EMERGENCY)
+    lost = next(e for e in network.events if e.kind is MeshEventKind.DISCONNECTED)
+    assert 10.0 <= emergency.now_s - lost.now_s <= 12.0

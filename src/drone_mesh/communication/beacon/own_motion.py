@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Callable
 
@@ -9,17 +10,26 @@ from drone_mesh.communication.beacon.packets import Motion
 from drone_mesh.drone.location import Location
 
 OVER_S = 2.0  # our choice: noise of a receiver and turns of a drone cancel out
+STANDS_S = 10.0  # our choice: a drone that has not moved for this long stands
 AGAIN_S = 0.1  # our choice: a receiver for satellites gives ten positions per second
 
 
 class OwnMotion:
     """Samples the position of one node whenever it is asked."""
 
-    def __init__(self, locate: Callable[[], Location | None]) -> None:
+    def __init__(self, locate: Callable[[], Location | None], step_m: float) -> None:
+        """`step_m`: less far is not moved, as receivers of satellites err."""
         self._locate = locate
+        self._step_m = step_m
+        self._anchor: Location | None = None
+        self._moved_s = -math.inf
         self._samples: deque[tuple[float, Location]] = deque()
         self._motion: Motion | None = None
         self._asked_s = -AGAIN_S
+
+    def stands(self, now_s: float) -> bool:
+        """Whether it is at rest, as far as it knows its place."""
+        return now_s - self._moved_s >= STANDS_S
 
     def at(self, now_s: float) -> Motion | None:
         """Position and velocity now; None while the position is unknown."""
@@ -31,6 +41,9 @@ class OwnMotion:
             self._samples.clear()
             self._motion = None
             return None
+        if self._anchor is None or self._anchor.distance_m(place) > self._step_m:
+            self._moved_s = -math.inf if self._anchor is None else now_s
+            self._anchor = place
         samples = self._samples
         samples.append((now_s, place))
         while now_s - samples[1][0] >= OVER_S if len(samples) > 1 else False:

@@ -17,7 +17,8 @@ from drone_mesh.communication.interfaces import BROADCAST, MAX_NODE_ID, NO_ROUTE
 from drone_mesh.communication.observer import MeshEventKind, in_hops
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeBasics
-from drone_mesh.communication.router_states import RouterEvent, RouterStates
+from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 
 HELD_S = 2.5  # our choice: a packet without a next hop waits this long
@@ -29,6 +30,7 @@ GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
 DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
 SEALED_ROOM = 20  # bytes of a beacon with a seal
+MOVED = 0.05  # of the range: a drone further from where it stood is on a flight
 DRIVER_TRIES = 6  # per hop: more delay the packets behind, and another neighbour may do better
 
 
@@ -43,7 +45,7 @@ class BeaconPlane(IControlPlane):
         self._routes = self.routes = BeaconRoutes(
             self._me, states is None, basics.range_m, basics.neighbours.place_of
         )
-        self._motion = OwnMotion(basics.pilot.place)
+        self._motion = OwnMotion(basics.pilot.place, MOVED * basics.range_m)
         self._courier = self.delivery = Courier(
             self._me,
             self._antenna,
@@ -132,8 +134,14 @@ class BeaconPlane(IControlPlane):
         states = self._states
         if states is not None and not states.connected and now_s >= self._check_s:
             self._check_s = now_s + CHECK_S
-            if self._antenna.on() and self._host.may_connect(NO_ROUTE, False):
+            if self._may_repair(states, now_s):
                 self._host.on_unconnected_check(now_s)
+
+    def _may_repair(self, states: RouterStates, now_s: float) -> bool:
+        """Whether a lost connection counts: not in flight, whoever flies the drone."""
+        if states.repair is RepairState.FLYING or not self._motion.stands(now_s):
+            return False
+        return self._antenna.on() and self._host.may_connect(NO_ROUTE, False)
 
     def _choose(self) -> None:
         before = self._routes.gateway, self._routes.hops
@@ -419,6 +427,8 @@ def _late_after_s(interval_s: float) -> float:
 
 class BeaconTechnique(IControlTechnique):
     """The technique `beacon`, by name."""
+
+    timing = MeshTiming(connection_lost_after_s=10.0)  # it notices a loss within seconds
 
     def control_plane(
         self, basics: NodeBasics, host: IControlHost, states: RouterStates | None
