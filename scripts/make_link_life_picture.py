@@ -16,9 +16,11 @@ WAYS = (("pdr_up", "to the gateway"), ("pdr_down", "from the gateway"))
 
 
 def main() -> None:
-    """Argument: the folder of the results."""
-    with (Path(sys.argv[1]) / "runs.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    """Arguments: the folders of the results."""
+    rows = []
+    for folder in sys.argv[1:]:
+        with (Path(folder) / "runs.csv").open(encoding="utf-8") as file:
+            rows += csv.DictReader(file)
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     for axes, (metric, title) in zip(figure.subplots(1, 2, sharey=True), WAYS):
         for routing in dict.fromkeys(row["routing"] for row in rows):
@@ -35,7 +37,7 @@ def main() -> None:
         axes.minorticks_off()
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("messages that arrive, %")
-    figure.axes[0].legend()
+    figure.axes[0].legend(loc="lower right")
     figure.savefig(PICTURE, dpi=110)
 
 
