@@ -279,10 +279,24 @@ def test_a_packet_that_it_made_itself_is_not_forwarded_and_its_entry_forgotten()
     rig = Rig()
     rig.hear("09 03 00 01 01")
     rig.know_neighbour(2)
-    rig.hear("01 02 80 01 09")
+    rig.mesh.control.send_heartbeat(9)
+    (sent,) = rig.sent(4)
+    assert sent[3] == 3
+    rig.hear("01 02 04 01 09 00 ff 02")  # the same packet, two hops later
     assert rig.sent() == []
     assert rig.routing.get_direction_to_node(9) == NO_ROUTE
     assert rig.routing.get_set_of_children() == {2, 3}
+
+
+@pytest.mark.parametrize("forged", ["01 02 80 01 09", "01 02 04 01 09 01 00 02", "01 02 06 01 09"])
+def test_a_packet_in_its_name_that_it_did_not_send_says_nothing_about_a_route(forged):
+    rig = Rig()
+    rig.hear("09 03 00 01 01")
+    rig.know_neighbour(2)
+    rig.hear(forged)
+    assert rig.sent() == []
+    assert rig.routing.get_direction_to_node(9) == 3
+    assert "dropped a packet in this node's name that it did not send" in rig.mesh.complaints.counts
 
 
 def test_a_direct_neighbour_is_never_forgotten_for_a_packet_that_goes_round():

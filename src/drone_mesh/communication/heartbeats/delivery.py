@@ -11,11 +11,14 @@ from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.deadlines import Deadlines
+from drone_mesh.communication.heartbeats.circulation import CirculationGuard
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
 from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
+from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
+from drone_mesh.communication.timing import CIRCULATION_S
 from drone_mesh.communication.ways import IDelivery
 
 DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
@@ -58,6 +61,7 @@ class Delivery(IDelivery):
         self._announced = RateLimit(REPEATS)
         self._missing_to_report: deque[tuple[int, int, int]] = deque()
         self._reporting = False
+        self._relayed = CirculationGuard(antenna.medium.stretched(CIRCULATION_S))  # own packets
         self.total_sent = 0
 
     # Sending ---------------------------------------------------------------------------------
@@ -72,6 +76,9 @@ class Delivery(IDelivery):
         if not is_known and self._strangers.ignores(to, self._deadlines.now_s):
             self._ignore(to)
             return False
+        if payload[CREATOR_AT] == self._node_id and payload[FORWARD_AT] != to:
+            now_s = self._deadlines.now_s
+            self._relayed.passed(messages.identity(payload), self._node_id, to, now_s)
         if self._shared:
             return self._hand_over(payload)
         while failures < self._attempts or failures < self._most_attempts(payload):
@@ -85,6 +92,11 @@ class Delivery(IDelivery):
         self._routing.sent(to, False, failures)
         self._neighbour_lost(to, came_from)
         return False
+
+    def went_to(self, payload: bytes) -> int | None:
+        """The relay that this packet was just sent to; None unless this node sent it."""
+        sent = self._relayed.first_passage(messages.identity(payload), self._deadlines.now_s)
+        return None if sent is None else sent[1]
 
     def _most_attempts(self, payload: bytes) -> int:
         return self._attempts * (DATA_PERSISTENCE if messages.is_data(payload) else 1)

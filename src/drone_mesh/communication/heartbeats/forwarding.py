@@ -52,7 +52,12 @@ class Forwarding:
             self._flood(payload, routing.directions(forward, from_, creator), now_s)
             return
         if creator == self._node_id:
-            self._drop_circulating(payload, routing.get_direction_to_node(forward), now_s)
+            went_to = self._delivery.went_to(payload)
+            if went_to is None:  # in its name, but not its own: it says nothing about a route
+                reason = "a packet in this node's name that it did not send"
+                self._complaints.dropped(reason, payload, now_s)
+            else:
+                self._drop_circulating(payload, went_to, now_s)
             return
         identity: Hashable
         if kind == _HEARTBEAT:  # most packets; these four values are cheaper than their bytes
