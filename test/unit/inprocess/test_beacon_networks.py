@@ -241,3 +241,20 @@ def test_a_repair_begins_ten_seconds_after_the_loss():
     emergency = next(e for e in network.events if e.kind is MeshEventKind.EMERGENCY)
     lost = next(e for e in network.events if e.kind is MeshEventKind.DISCONNECTED)
     assert 10.0 <= emergency.now_s - lost.now_s <= 12.0
+
+
+def test_the_first_call_of_a_new_router_is_due_at_its_start_and_not_before():
+    network = Network(seed=1, routing="beacon")
+    network.add_router(1, 0.0, 0.0, start_s=5.0)
+    network.run_for(5.0)
+    assert network.nodes[1].component.next_tick_s >= 5.0
+
+
+def test_the_emulated_chips_carry_it():
+    network = Network(seed=1, radio="chips", routing="beacon", rate="1M")
+    network.add_fleet(gateways=1, routers=8, gridsize=3, spacing=6.0)
+    assert network.run_until(network.all_connected, within_s=2.0)
+    answers = []
+    network.echo(0, 8, answers.append)
+    assert network.run_until(lambda: len(answers) == 1, within_s=1.0)
+    network.stop()

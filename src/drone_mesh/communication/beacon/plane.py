@@ -209,7 +209,7 @@ class BeaconPlane(IControlPlane):
             due_s = min(due_s, self._retry_s)
         if self._states is not None and not self._states.connected:
             due_s = min(due_s, self._check_s)
-        self._deadlines.set(Due.ROUTING, due_s)
+        self._deadlines.set(Due.ROUTING, max(due_s, routes.now_s))
 
     # Beacons ---------------------------------------------------------------------------------
 
