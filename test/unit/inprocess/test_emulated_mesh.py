@@ -12,6 +12,7 @@ import pytest
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.wall_mesh import WallMesh
+from drone_mesh.mobility import Area, Mobility, tracks_of
 from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance
 from drone_mesh.nrf24.settings import RadioSettings
 
@@ -158,3 +159,33 @@ def test_the_fast_model_agrees_with_the_chips():
     assert model["frames"] == pytest.approx(chips["frames"], rel=0.15)
     collided = chips["collisions"] / chips["frames"]
     assert model["collisions"] / model["frames"] == pytest.approx(collided, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("speed_m_s", "fading"), [(0.3, "none"), (0.3, "rician"), (0.0, "rayleigh")]
+)
+def test_the_fast_model_agrees_with_the_chips_where_drones_move_and_links_fade(speed_m_s, fading):
+    """Half a minute of 17 nodes, three seeds, after 20 s at rest."""
+
+    def run(radio):
+        total = Counter()
+        for seed in (1, 2, 3):
+            network = Network(seed, radio=radio, fading=fading)
+            network.add_fleet(1, 16, 4, 6.0)
+            network.run_for(20.0)
+            if speed_m_s:
+                places = {node: network.location(node).to_vector() for node in network.nodes}
+                motion = Mobility("random_waypoint", speed_m_s=(speed_m_s, speed_m_s))
+                area = Area(0.0, 0.0, 24.0, 24.0)
+                network.fly(tracks_of(motion, places, {0}, area, seed))
+            before = Counter(frames=network.air.frames, collisions=network.air.collisions)
+            network.run_for(30.0)
+            total += Counter(frames=network.air.frames, collisions=network.air.collisions) - before
+            network.stop()
+        return total
+
+    chips, model = run("chips"), run("shared")
+    assert model["frames"] == pytest.approx(chips["frames"], rel=0.2)
+    collided = chips["collisions"] / chips["frames"]
+    assert model["collisions"] / model["frames"] == pytest.approx(collided, abs=0.06)
