@@ -61,5 +61,5 @@ def test_every_command_of_the_page_works_in_its_order(
             assert [line.split()[0] for line in printed.splitlines()[3:]] == metrics
         if words[0] == "show":
             assert "reproduces the run in results/half_way" in printed
-    assert commands == ["plan", "run", "compare", "report", "show"]
+    assert commands == ["plan", "run", "compare", "report", "plot", "show"]
     assert (tmp_path / "results/half_way/report.html").exists()
