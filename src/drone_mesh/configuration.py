@@ -91,7 +91,8 @@ class FactoryConfiguration:
     )
     repair: str = Field(DEFAULT_REPAIR, min_length=1, description="the name of a repair strategy")
     clearance: float = Field(CLEARANCE_M, gt=0, le=100, description="metres")  # between drones
-    avoid_wrecks: bool = Field(False)  # whether drones that are off count for the clearance
+    # where a repair ends if a silent drone may still be at the place; see LostPlace
+    lost_place: Literal["beside", "above", "below", "exact"] = Field("beside")
     check_period: float = Field(MeshTiming.check_period_s, ge=0.1, le=3600, description="seconds")
     connection_lost_after: float = Field(
         MeshTiming.connection_lost_after_s, ge=0.1, le=3600, description="seconds"
@@ -124,7 +125,7 @@ class FactoryConfiguration:
         return value
 
 
-_SWITCHES = ("gui", "debug", "avoid_wrecks")
+_SWITCHES = ("gui", "debug")
 _FIELDS: Mapping[str, FieldInfo] = vars(FactoryConfiguration)["__pydantic_fields__"]
 
 

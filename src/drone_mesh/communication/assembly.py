@@ -65,5 +65,5 @@ def assemble_component(
         timing,
         observer,
         debug,
-        (repair_options or RepairOptions()).range_m,
+        repair_options,
     )

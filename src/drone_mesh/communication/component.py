@@ -18,6 +18,7 @@ from drone_mesh.communication.interfaces import (
     PAYLOAD_BYTES,
     IMeshNetwork,
 )
+from drone_mesh.communication.last_places import LastPlace, tell_last_places
 from drone_mesh.communication.mesh_node import MeshNode
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.orders.messages import OrderQuery
@@ -205,9 +206,21 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         if creator == from_ and messages.addressee(payload) == BROADCAST:
             self._on_goal(creator, location)
 
-    def receive_requestlocation(self, _payload: bytes, creator: int, _from: int) -> None:
-        """Answer with this node's place."""
+    def receive_requestlocation(self, payload: bytes, creator: int, from_: int) -> None:
+        """Answer with this node's place; to a drone in flight also with those of silent ones."""
+        goal = messages.AskerPlace.from_payload(payload)
+        if goal is None or creator == self._node_id or self._frame.refuses(from_):
+            self._send_location(creator)
+            return
+        self._on_place_of_asker(creator, goal.place)
         self._send_location(creator)
+        tell_last_places(self._parts, creator, goal, self._options.clearance_m)
+
+    def receive_last_place(self, payload: bytes, _creator: int, _from: int) -> None:
+        """Where another node was last heard."""
+        last = LastPlace.from_payload(payload)
+        if last is not None and last.node != self._node_id:
+            self._on_last_place(last)
 
     def receive_gateway_place(self, payload: bytes, _creator: int, _from: int) -> None:
         """Where a gateway was, in a mesh with a key."""
@@ -243,6 +256,15 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._deadlines.now_s)
+
+    def _on_place_of_asker(self, asker: int, place: Location) -> None:
+        """A node that asks for places is at `place`, or flies there."""
+        self._neighbours.set_place(asker, place, self._deadlines.now_s)
+
+    def _on_last_place(self, last: LastPlace) -> None:
+        """A node reports where another one was last heard."""
+        heard_s = self._deadlines.now_s - last.age_s
+        self._neighbours.set_place(last.node, last.place, heard_s)
 
     def _send_location(self, asker: int) -> None:
         location = self._pilot.goal or self._pilot.location()  # its destination counts

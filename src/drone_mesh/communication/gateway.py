@@ -24,7 +24,7 @@ from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
 from drone_mesh.communication.orders.messages import OrderReply
-from drone_mesh.communication.repair.options import RANGE_M
+from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import ITechnique
@@ -50,11 +50,19 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
-        range_m: float = RANGE_M,
+        options: RepairOptions | None = None,
     ) -> None:
         """Like MeshnetworkComponent; orders arrive through `internet`."""
         super().__init__(
-            node_id, antenna, engine, routing, rng, timing, observer, debug, None, range_m
+            node_id,
+            antenna,
+            engine,
+            routing,
+            rng,
+            timing,
+            observer,
+            debug,
+            options=options,
         )
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when

@@ -37,7 +37,7 @@ from drone_mesh.communication.orders.intake import OrderIntake
 from drone_mesh.communication.packet_types import DATA_TYPES
 from drone_mesh.communication.parts import NodeBasics, NodeParts
 from drone_mesh.communication.places import KnownPlaces
-from drone_mesh.communication.repair.options import RANGE_M
+from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
 from drone_mesh.communication.reports.node_reports import NodeReporter
 from drone_mesh.communication.router_states import RouterStates
@@ -61,11 +61,11 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         observer: MeshObserver = ignore_events,
         debug: bool = True,
         states: RouterStates | None = None,
-        range_m: float = RANGE_M,
+        options: RepairOptions | None = None,
     ) -> None:
         """`rng` spreads simultaneous actions of many nodes; `debug`: the antenna displays the node.
 
-        `states` are those of a router; a gateway has none. `range_m`: of the radio, about.
+        `states` are those of a router; a gateway has none..
 
         Raises ValueError for a node id outside 0..253.
         """
@@ -76,6 +76,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         seals = antenna if isinstance(antenna, IMeshSeals) else NO_SEALS
         self._rng = rng
         self._timing = timing or routing.timing
+        self._options = options or RepairOptions()
         self._debug = debug
         self._deadlines = Deadlines()
         self._neighbours = Neighbours(
@@ -99,7 +100,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
             self.complaints,
             self._frame,
             rng,
-            range_m,
+            self._options.range_m,
         )
         self.control = control = self._control_plane(basics, routing, states)
         self._learn, self._forward = control.learn, control.forward  # called for each packet

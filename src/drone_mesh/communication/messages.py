@@ -234,6 +234,8 @@ _GATEWAY_PLACE_AT = {
     int(MessageType.GATEWAY_PLACE): HEADER_BYTES,
 }
 _OLDEST_AGE_S = 2**16 - 2
+_ASKER_PLACE = struct.Struct("<ffH")  # latitude, longitude, height + 1 and whether it flies there
+_FLIES_THERE = 2**15
 _ORDER_NUMBER = struct.Struct("<H")
 _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
@@ -295,6 +297,30 @@ class GatewayPlace(NamedTuple):
         if age == 0 or not all(map(math.isfinite, place)):
             return None
         return cls(gateway, Location(*place), age - 1.0)
+
+
+class AskerPlace(NamedTuple):
+    """Where the creator of a REQUESTLOCATION is: the bytes after the header, zero if unknown."""
+
+    place: Location
+    flies_there: bool  # it is on its way to that place
+
+    def appended_to(self, request: bytes) -> bytes:
+        """The same REQUESTLOCATION with this place."""
+        latitude, longitude, height = self.place
+        code = 1 + max(0, min(_FLIES_THERE - 2, round(height)))
+        code |= _FLIES_THERE if self.flies_there else 0
+        body = _ASKER_PLACE.pack(latitude, longitude, code)
+        return request[:HEADER_BYTES] + body + request[HEADER_BYTES + len(body) :]
+
+    @classmethod
+    def from_payload(cls, request: bytes) -> AskerPlace | None:
+        """The place in a REQUESTLOCATION; None if there is no valid one."""
+        latitude, longitude, code = _ASKER_PLACE.unpack_from(request, HEADER_BYTES)
+        height = (code & ~_FLIES_THERE) - 1
+        if height < 0 or not (math.isfinite(latitude) and math.isfinite(longitude)):
+            return None
+        return cls(Location(latitude, longitude, height), bool(code & _FLIES_THERE))
 
 
 # Used for each packet: none of these calls a Python function.

@@ -108,9 +108,11 @@ class Neighbours:
         """The hops that `node` reported last; 255: none."""
         return self._hops.get(node, NO_ROUTE)
 
-    def set_place(self, node: int, place: Location, now_s: float) -> None:
-        """`node`, a neighbour or not, reports its place."""
-        self._places[node] = HeardPlace(place, now_s)
+    def set_place(self, node: int, place: Location, heard_s: float) -> None:
+        """`node`, a neighbour or not, was at `place` at `heard_s`; older information is ignored."""
+        known = self._places.get(node)
+        if known is None or heard_s >= known.heard_s:
+            self._places[node] = HeardPlace(place, heard_s)
 
     def place_of(self, node: int) -> HeardPlace | None:
         """The last reported place of `node`."""

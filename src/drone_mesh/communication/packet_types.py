@@ -90,6 +90,7 @@ _BEACON = (
 )
 _SEARCH = "uint8 node, uint16 number, uint8 hopsLeft"
 _WORDS = "uint8 part, bytes[13] text"
+_LAST_PLACE = f"uint16 age, uint8 node, {_PLACE}"
 _GATEWAY_PLACE = f"uint16 agePlusOne, uint8 gateway, {_PLACE}"
 
 
@@ -138,6 +139,8 @@ class MessageType(enum.IntEnum):
         68,
         PacketType(PacketKind.REPORT, _CONTROL, "uint8 node, uint16 number", "NodeSearch"),
     )
+    # Where another node was last heard, for a drone that is about to land near there
+    LAST_PLACE = 69, PacketType(PacketKind.POSITION, _NODE, _LAST_PLACE, "LastPlace")
     # Where a gateway was, in a mesh with a key
     GATEWAY_PLACE = 125, PacketType(PacketKind.POSITION, _NODE, _GATEWAY_PLACE, "GatewayPlace")
     # Asks a neighbour to prove that it has the key, and the proof

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.messages import packet
+from drone_mesh.communication.messages import AskerPlace, packet
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 
 
 def ask_for_place(parts: NodeParts, node: int) -> None:
     """Ask `node` for its place, along the route to it."""
-    me = parts.node_id
-    parts.delivery.send_own(packet(MessageType.REQUESTLOCATION, me, me, node, node))
+    parts.delivery.send_own(_request(parts, node))
 
 
 def ask_all_for_places(parts: NodeParts) -> None:
     """Ask every node in range for its place."""
-    me = parts.node_id
-    request = packet(MessageType.REQUESTLOCATION, me, me, BROADCAST, BROADCAST)
-    parts.antenna.broadcast_message(request)
+    parts.antenna.broadcast_message(_request(parts, BROADCAST))
+
+
+def _request(parts: NodeParts, to: int) -> bytes:
+    """A request with the place of this node: its destination, if it flies."""
+    me, pilot = parts.node_id, parts.pilot
+    request = packet(MessageType.REQUESTLOCATION, me, me, to, to)
+    place = pilot.goal or pilot.place()
+    if place is None:
+        return request
+    return AskerPlace(place, flies_there=pilot.goal is not None).appended_to(request)

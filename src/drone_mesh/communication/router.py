@@ -13,6 +13,7 @@ from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
+from drone_mesh.communication.last_places import LastPlace
 from drone_mesh.communication.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
@@ -52,7 +53,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
         repair_options: RepairOptions | None = None,
     ) -> None:
         """Like MeshnetworkComponent; the default of `repair` is Thesis."""
-        options = repair_options or RepairOptions()
         self._states = RouterStates()
         super().__init__(
             node_id,
@@ -64,14 +64,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
             observer,
             debug,
             self._states,
-            options.range_m,
+            repair_options,
         )
         self._repair = ConnectionRepair(
             self._parts,
             self._states,
             self.control,
             repair or Thesis(),
-            options,
+            self._options,
         )
         self._repair_status = NOTHING_TO_REPAIR  # replaced whole: any thread reads it
 
@@ -157,6 +157,16 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if node == control.next_hop():
             self.places.update_next_hop(node, location, now_s)
         self._repair.on_place(node, location)
+
+    def _on_place_of_asker(self, asker: int, place: Location) -> None:
+        super()._on_place_of_asker(asker, place)
+        self._repair.on_taken(place)
+
+    def _on_last_place(self, last: LastPlace) -> None:
+        super()._on_last_place(last)
+        heard = self._neighbours.place_of(last.node)
+        if heard is not None:
+            self._repair.on_taken(heard.place)
 
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
         if self.control.may_use(gateway.gateway):

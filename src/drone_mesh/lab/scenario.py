@@ -207,7 +207,7 @@ class Repair(Part):
     """The adjustable numbers of a repair, as in RepairOptions; the range is range_m."""
 
     clearance_m: Above0 = CLEARANCE_M
-    avoid_wrecks: bool = False
+    lost_place: Literal["beside", "above", "below", "exact"] = "beside"
 
 
 class Pick(Part):

@@ -12,7 +12,7 @@ import numpy as np
 
 from drone_mesh.air.graph import Graph
 from drone_mesh.channel.statistics import RadioStatistics
-from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
@@ -310,7 +310,7 @@ def _options(scenario: Scenario, streams: Streams) -> dict[str, Any]:
         "repair_options": RepairOptions(
             clearance_m=scenario.repair_options.clearance_m,
             range_m=scenario.range_m,
-            avoid_wrecks=scenario.repair_options.avoid_wrecks,
+            lost_place=LostPlace(scenario.repair_options.lost_place),
         ),
     }
     if scenario.positions != Positions():

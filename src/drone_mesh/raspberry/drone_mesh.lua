@@ -28,6 +28,7 @@ local types = {
   [66] = "NODE_REPORT",
   [67] = "NODE_WORDS",
   [68] = "NODE_SEARCH",
+  [69] = "LAST_PLACE",
   [125] = "GATEWAY_PLACE",
   [126] = "SEAL_CHALLENGE",
   [127] = "SEAL_ANSWER",
@@ -103,6 +104,13 @@ local bodies = { -- name, form, bytes
   [68] = {
     { "node", "uint8", 1 },
     { "number", "uint16", 2 },
+  },
+  [69] = {
+    { "age", "uint16", 2 },
+    { "node", "uint8", 1 },
+    { "latitude", "float", 4 },
+    { "longitude", "float", 4 },
+    { "height", "int16", 2 },
   },
   [125] = {
     { "agePlusOne", "uint16", 2 },

@@ -18,7 +18,7 @@ from drone_mesh.communication.repair.named_strategies import (
     REPAIR_STRATEGIES,
     create_repair_strategy,
 )
-from drone_mesh.communication.repair.options import DEFAULT_REPAIR, RepairOptions
+from drone_mesh.communication.repair.options import DEFAULT_REPAIR, LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey, NodeKeys
 from drone_mesh.communication.timing import MIN_REPORT_PERIOD_S, MeshTiming
@@ -220,6 +220,13 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(default: %(default)g)",
     )
     mesh.add_argument(
+        "--lost-place",
+        choices=[lost_place.value for lost_place in LostPlace],
+        default=LostPlace.BESIDE.value,
+        help="where a repair ends if a silent drone may still be at the place; exact: at that very "
+        "place (default: %(default)s)",
+    )
+    mesh.add_argument(
         "--range",
         type=float,
         default=OUTDOOR_RANGE_M,
@@ -312,7 +319,11 @@ def _options(
             ),
             routing=parsed.routing,
             repair=parsed.repair,
-            repair_options=RepairOptions(clearance_m=parsed.clearance, range_m=parsed.range),
+            repair_options=RepairOptions(
+                clearance_m=parsed.clearance,
+                range_m=parsed.range,
+                lost_place=LostPlace(parsed.lost_place),
+            ),
             location=location,
             flight=flight_options(parsed),
             fleet=fleet_options(parsed),

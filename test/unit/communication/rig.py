@@ -18,6 +18,7 @@ from drone_mesh.errors import LocationUnknown
 
 FIRST_CHECK_S = 5.0  # half a period: see AlwaysHalf
 PERIOD_S = 10.0
+FROM_0 = "00 00 00 00 00 00 00 00 01 00"  # in a request: the place of the node that asks
 
 
 def packet(text):
@@ -124,7 +125,14 @@ class Rig:
     """A started component, its antenna and its drone, and the time they live in."""
 
     def __init__(
-        self, node_id=1, gateway=False, timing=None, debug=True, routing=None, repair=None
+        self,
+        node_id=1,
+        gateway=False,
+        timing=None,
+        debug=True,
+        routing=None,
+        repair=None,
+        options=None,
     ):
         self.now_s = 0.0
         self.antenna = RecordingAntenna()
@@ -142,10 +150,18 @@ class Rig:
                 timing,
                 self.events.append,
                 debug,
+                options,
             )
         else:
             self.mesh = MeshnetworkRouter(
-                node_id, *carried, AlwaysHalf(), timing, self.events.append, debug, repair
+                node_id,
+                *carried,
+                AlwaysHalf(),
+                timing,
+                self.events.append,
+                debug,
+                repair,
+                options,
             )
         self.mesh.start(self.now_s)
         self.forget()

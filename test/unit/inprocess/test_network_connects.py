@@ -262,10 +262,10 @@ RECORDED = [
     "21.640 3 DISCONNECTED 0",
     "61.640 3 EMERGENCY 255",
     "61.640 3 FLIGHT_DECIDED 2",
-    "65.240 3 LANDED 255",
-    "65.252 3 CONNECTED 0 2 hops",
+    "66.240 3 LANDED 255",
+    "66.252 3 CONNECTED 0 2 hops",
 ]
-RECORDED_PACKETS = 167
+RECORDED_PACKETS = 171
 
 
 def test_a_recorded_run_of_layout_201_without_node_2():

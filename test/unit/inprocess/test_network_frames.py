@@ -14,7 +14,7 @@ from drone_mesh.communication.packet_types import TYPES_WITH_PLACES
 from drone_mesh.inprocess.drone import InProcessDrone
 
 ONE, OTHER = 0x1234, 0x4321
-LOCATION, MOVE_TO_LOCATION, NODE_REPORT, GATEWAY_PLACE = 1, 6, 66, 125
+LOCATION, MOVE_TO_LOCATION, NODE_REPORT, LAST_PLACE, GATEWAY_PLACE = 1, 6, 66, 69, 125
 
 
 @pytest.fixture
@@ -92,5 +92,6 @@ def test_a_place_is_taken_only_from_a_neighbour_with_the_same_origin(own, heard,
     assert frame.refuses(2) is refused
 
 
-def test_four_types_of_packets_carry_places():
-    assert {LOCATION, MOVE_TO_LOCATION, NODE_REPORT, GATEWAY_PLACE} == TYPES_WITH_PLACES
+def test_these_types_of_packets_carry_places():
+    places = {LOCATION, MOVE_TO_LOCATION, NODE_REPORT, GATEWAY_PLACE, LAST_PLACE}
+    assert places == TYPES_WITH_PLACES

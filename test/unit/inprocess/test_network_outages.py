@@ -9,7 +9,7 @@ from scenarios import events, fleet
 
 GRIDS = [(24, 5), pytest.param(99, 10, marks=pytest.mark.slow)]
 CONNECTED_WITHIN_S = 15.0
-CLEARANCE_M = 0.5
+CLEARANCE_M = 1.0
 
 
 def standing(network):

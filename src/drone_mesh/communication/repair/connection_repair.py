@@ -24,8 +24,9 @@ from drone_mesh.communication.repair.election import NO_BID
 from drone_mesh.communication.repair.flight import ASK_AGAIN_S, RepairFlight
 from drone_mesh.communication.repair.interfaces import IRepairStrategy, Step
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import PITCH, beside, own_spot
+from drone_mesh.communication.repair.spots import PITCH, Landing, own_spot
 from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair.taken_places import TakenPlaces
 from drone_mesh.communication.repair.views import RepairViews
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
 from drone_mesh.drone.location import Location
@@ -46,6 +47,7 @@ class ConnectionRepair(RepairViews):
     ) -> None:
         super().__init__(parts, states, control, options)
         self._strategy = strategy
+        self._taken = TakenPlaces(parts, options)
         # Valid from LOSS_NOTICED until the router is AT_REST:
         self._lost_since_s = math.inf
         self._emergency_s = math.inf  # when the time is up, as far as known
@@ -81,7 +83,7 @@ class ConnectionRepair(RepairViews):
         self._strategy.reason = ""
         self._strategy.on_gateway_found()
         if self._flight is not None:
-            self._flight.stop_here()
+            self._flight.stop_here(self._control.next_hop())
 
     def on_antenna_off(self) -> None:
         """The antenna is off."""
@@ -114,6 +116,11 @@ class ConnectionRepair(RepairViews):
             self._flight.on_place(node, place)
         else:
             self._strategy.on_place(node, place)
+
+    def on_taken(self, place: Location) -> None:
+        """A drone is at `place` or flies there, or was last heard there."""
+        if self._flight is not None:
+            self._flight.on_taken(place)
 
     def on_bid(self, node: int, score: float, from_: int, about: Location | None) -> None:
         """A node of the group bids; `from_` sent or relayed that bid (see IRepairStrategy)."""
@@ -163,8 +170,10 @@ class ConnectionRepair(RepairViews):
             self._control.introduce,
             step.owner,
             step.place,
-            self._goal(step),
+            self.goal_of(step),
             self._options,
+            self._taken,
+            self._landing(step),
         )
         flight.stops_when_connected = until_connected or step.home
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
@@ -269,20 +278,31 @@ class ConnectionRepair(RepairViews):
             return False
         return True
 
-    def _goal(self, step: Step) -> Location:
-        """The goal of a step, beside a live gateway or, in a silent medium, beside any node."""
+    def goal_of(self, step: Step) -> Location:  # noqa: D102
         if step.owner == self.node_id:
             return step.place
         if self.silent:
-            known = [heard.place for heard in self._parts.neighbours.places().values()]
-            known += [step.place, *filter(None, [self.gateway_place])]
+            known = [step.place, *self._taken.all()]
             return own_spot(step.place, self.node_id, self.clearance_m, known)
-        gateway, origin = self.gateway_place, self.own_place() or step.place
-        if gateway is not None and step.place.distance_m(gateway) < self.clearance_m:
-            return beside(gateway, origin, PITCH * self.clearance_m)
-        if self._options.avoid_wrecks and step.owner != NO_ROUTE:
-            return beside(step.place, origin, PITCH * self.clearance_m)
-        return step.place
+        return self._taken.at_or_beside(step.place, self._landing(step))
+
+    def _landing(self, step: Step) -> Landing:
+        """Where the drone comes from, and which links it needs at the place of the lost node.
+
+        These are the links of the lost node: to the neighbours of this drone, to the place that it
+        leaves, which another one may take, and to a relay that it does not know, on the way to the
+        gateway.
+        """
+        neighbours = self._parts.neighbours
+        heard = [neighbours.place_of(node) for node in sorted(neighbours.ids())]
+        origin = self.own_place() or step.place
+        places = [origin, *(known.place for known in heard if known is not None)]
+        links = [place for place in places if place.distance_m(step.place) < self.range_m]
+        gateway = self.gateway_place
+        if gateway is not None and not step.home:
+            away_m = min(self.range_m - PITCH * self.clearance_m, step.place.distance_m(gateway))
+            links.append(step.place.towards(gateway, away_m))
+        return Landing(origin, [] if step.home else links)
 
     def _plan_emergency(self) -> None:
         patience = self._strategy.patience(self.silent)

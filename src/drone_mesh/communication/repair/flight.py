@@ -7,14 +7,14 @@ from typing import Callable
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.place_requests import ask_all_for_places
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import free_spot
+from drone_mesh.communication.repair.spots import Landing
+from drone_mesh.communication.repair.taken_places import TakenPlaces
 from drone_mesh.communication.timing import LANDED_WITHIN_M
 from drone_mesh.drone.location import Location
 
 ASK_AGAIN_S = 0.3  # our choice: an answer takes some milliseconds
 ASKS_ON_GROUND = 2  # our choice: a lossy medium loses a question now and then
 LEG = 2.0 / 3.0  # of the range, our choice: at half that height it hears nodes below
-FRESH_S = 5.0  # our choice: a drone may have moved this long after reporting its place
 
 
 class RepairFlight:
@@ -33,6 +33,8 @@ class RepairFlight:
         place: Location,
         goal: Location,
         options: RepairOptions,
+        taken: TakenPlaces,
+        landing: Landing,
     ) -> None:
         """To `goal`, at or near the `place` of node `owner`. `introduce` broadcasts a PRESENT."""
         self.goal = goal
@@ -41,7 +43,8 @@ class RepairFlight:
         self.stops_when_connected = False
         self.asks_left = 0  # on the ground
         self._wanted = place
-        self._origin = parts.pilot.location() or goal
+        self._taken = taken
+        self._landing = landing
         self._parts = parts
         self._introduce = introduce
         self._clearance_m = options.clearance_m
@@ -68,14 +71,16 @@ class RepairFlight:
         """Stop at the first connection, unless this flight leads back."""
         self.stops_when_connected = self._owner != self._parts.node_id
 
-    def stop_here(self) -> None:
-        """Land at the nearest free spot."""
+    def stop_here(self, next_hop: int) -> None:
+        """Land at the nearest free spot, in reach of `next_hop` if possible."""
         here = self._parts.pilot.location()
         if here is not None and not self.on_ground:
             below = Location(here.latitude, here.longitude, self.goal.height)
             if below.distance_m(self.goal) >= self._clearance_m:
+                relay = self._parts.neighbours.place_of(next_hop)
                 self._wanted = below
-                self._go_to(below if self._is_free(below) else self._spot())
+                self._landing = Landing(here, [] if relay is None else [relay.place])
+                self._go_to(below if self._taken.is_free(below) else self._spot())
 
     def on_place(self, node: int, place: Location) -> None:
         """Another node reports its place; keep clear of it."""
@@ -83,6 +88,11 @@ class RepairFlight:
             self.stop_when_connected()
         if place.distance_m(self.goal) < self._clearance_m:
             self.stop_when_connected()
+        self.on_taken(place)
+
+    def on_taken(self, place: Location) -> None:
+        """Another drone is at `place`, or may be there in silence; keep clear of it."""
+        if place.distance_m(self.goal) < self._clearance_m:
             self._diversions += 1
             self._go_to(self._spot())
 
@@ -137,18 +147,4 @@ class RepairFlight:
     def _spot(self) -> Location:
         """A free spot; two drones that divert at the same time skip different numbers of spots."""
         skip = self._parts.node_id % 5 if self._diversions > 1 else 0
-        return free_spot(self._wanted, self._origin, self._clearance_m, self._others(), skip)
-
-    def _is_free(self, spot: Location) -> bool:
-        return all(spot.distance_m(other) >= self._clearance_m for other in self._others())
-
-    def _others(self) -> list[Location]:
-        """Where other drones are or may be."""
-        now_s, me = self._parts.now_s, self._parts.node_id
-        gateway = self._parts.places.gateway  # it may be there, although it is off now
-        kept_free = [] if gateway is None else [gateway]
-        return kept_free + [
-            heard.place
-            for node, heard in self._parts.neighbours.places().items()
-            if node != me and now_s - heard.heard_s <= FRESH_S
-        ]
+        return self._taken.beside(self._wanted, self._landing, skip)

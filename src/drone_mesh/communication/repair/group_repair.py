@@ -21,7 +21,7 @@ from drone_mesh.communication.repair.election import (
 )
 from drone_mesh.communication.repair.flight_news import FlightNews
 from drone_mesh.communication.repair.interfaces import IRepairActions, IRepairStrategy, Step
-from drone_mesh.communication.repair.spots import PITCH
+from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterEvent
 from drone_mesh.drone.location import Location
 
@@ -129,7 +129,7 @@ class GroupRepair(IRepairStrategy):
         mesh = self.mesh
         if step.owner in mesh.neighbours():
             return step.owner
-        radius_m = mesh.clearance_m * (2 * PITCH if step.home else 1.0)
+        radius_m = mesh.clearance_m * (2 * PITCH if step.home else NEAR)
         for node, view in mesh.reachable().items():
             if node == step.owner and view.age_s <= mesh.now_s - self._asked_s:
                 return node

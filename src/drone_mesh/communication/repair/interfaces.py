@@ -128,6 +128,10 @@ class IRepairActions(abc.ABC):
         """Why the drone cannot fly for a repair; empty if it can."""
 
     @abc.abstractmethod
+    def goal_of(self, step: Step) -> Location:
+        """Where a flight for this step would end, clear of other drones, silent ones included."""
+
+    @abc.abstractmethod
     def was_at(self, step: Step) -> bool:
         """Whether the drone flew there since it was last connected."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from dataclasses import dataclass
 
@@ -9,7 +10,16 @@ from drone_mesh.errors import ConfigurationError
 
 DEFAULT_REPAIR = "thesis"
 RANGE_M = 9.0  # docs/ros.md, "Wireless signal simulator": a node nearer than this is in range
-CLEARANCE_M = 0.5  # docs/protocol.md, "Negotiation": a drone nearer than this occupies a place
+CLEARANCE_M = 1.0  # our choice: two drones of 0.5 m with a position error of 0.25 m each
+
+
+class LostPlace(enum.Enum):
+    """Where a repair ends if a silent drone may still be at the place that is to be taken."""
+
+    BESIDE = "beside"
+    ABOVE = "above"
+    BELOW = "below"  # beside, if the ground is in the way
+    EXACT = "exact"  # at that very place, as in the document
 
 
 @dataclass(frozen=True)
@@ -18,7 +28,7 @@ class RepairOptions:
 
     clearance_m: float = CLEARANCE_M  # least distance between drones at rest
     range_m: float = RANGE_M  # range of the radio, as far as the node knows
-    avoid_wrecks: bool = False  # whether a drone that is switched off occupies its place
+    lost_place: LostPlace = LostPlace.BESIDE
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a number outside its range."""

@@ -11,7 +11,7 @@ from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.communication.repair.interfaces import IRepairActions, NeighbourView, Step
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.spots import PITCH
+from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterStates
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.location import Location
@@ -110,7 +110,7 @@ class RepairViews(IRepairActions):
         return self._parts.pilot.why_not_repair()
 
     def was_at(self, step: Step) -> bool:  # noqa: D102
-        radius_m = self.clearance_m * (2 * PITCH if step.home else 1.0)
+        radius_m = self.clearance_m * (2 * PITCH if step.home else NEAR)
         return any(step.place.distance_m(place) < radius_m for place in self._tried_goals)
 
     def _view(self, node: int) -> NeighbourView:

@@ -10,7 +10,7 @@ from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.communication.named_techniques import create_routing_technique
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.repair.named_strategies import create_repair_strategy
-from drone_mesh.communication.repair.options import RepairOptions
+from drone_mesh.communication.repair.options import LostPlace, RepairOptions
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.timing import MeshTiming
@@ -51,7 +51,7 @@ class MeshSettings:
             repair_options=RepairOptions(
                 clearance_m=configuration.clearance,
                 range_m=configuration.max_distance,
-                avoid_wrecks=configuration.avoid_wrecks,
+                lost_place=LostPlace(configuration.lost_place),
             ),
             timing=MeshTiming(
                 configuration.check_period,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from rig import Rig, packet
+from rig import FROM_0, Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import Medium
@@ -59,13 +59,13 @@ def test_staying_connected_is_no_reason_to_introduce_the_node():
 def test_becoming_connected_asks_a_gateway_next_door_for_its_location():
     rig = Rig()
     rig.hear(ANSWER)
-    assert rig.sent() == [packet("01 01 02 00 00")]
+    assert rig.sent() == [packet("01 01 02 00 00" + FROM_0)]
 
 
 def test_becoming_connected_asks_the_gateway_and_the_next_hop_for_their_locations():
     rig = Rig()
     rig.hear("00 02 04 01 01 01 00 01")
-    assert rig.sent() == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
+    assert rig.sent() == [packet("01 01 02 02 00" + FROM_0), packet("01 01 02 02 02" + FROM_0)]
 
 
 # The check -----------------------------------------------------------------------------------
@@ -91,10 +91,10 @@ def test_the_location_of_the_gateway_is_asked_for_until_it_is_known():
     rig = Rig()
     rig.connect_through(2)
     rig.wait_until(5.0)
-    assert packet("01 01 02 02 00") in rig.sent(REQUEST)
+    assert packet("01 01 02 02 00" + FROM_0) in rig.sent(REQUEST)
     rig.hear("00 02 04 01 01 01 00 01", "00 02 01 01 01 00 00 80 3f")
     rig.wait_until(15.0)
-    assert rig.sent(REQUEST) == [packet("01 01 02 02 02")]  # the next hop, in each round
+    assert rig.sent(REQUEST) == [packet("01 01 02 02 02" + FROM_0)]  # the next hop, in each round
 
 
 @pytest.mark.parametrize("neighbour", [0, 2], ids=["gateway", "router"])
@@ -103,7 +103,7 @@ def test_the_location_of_the_next_hop_is_asked_for_in_each_round(neighbour):
     rig.connect_through(neighbour, hops=0)
     for check_s in (5.0, 15.0, 25.0):
         rig.wait_until(check_s)
-        assert packet(f"01 01 02 0{neighbour} 0{neighbour}") in rig.sent(REQUEST)
+        assert packet(f"01 01 02 0{neighbour} 0{neighbour}" + FROM_0) in rig.sent(REQUEST)
         rig.hear(f"00 0{neighbour} 04 01 01 01 00 00", "00 02 01 01 01 00 00 80 3f")
 
 
@@ -161,7 +161,10 @@ def test_an_answer_after_the_connection_was_lost_is_a_new_connection():
     rig.forget()
     rig.hear("00 02 04 01 01 01 00 01")
     assert rig.broadcasts() == [packet("01 01 03 fe fe 02 01")]
-    assert rig.sent(REQUEST) == [packet("01 01 02 02 00"), packet("01 01 02 02 02")]
+    assert rig.sent(REQUEST) == [
+        packet("01 01 02 02 00" + FROM_0),
+        packet("01 01 02 02 02" + FROM_0),
+    ]
 
 
 def test_a_heartbeat_without_an_acknowledgement_ends_the_connection_at_once():
@@ -474,7 +477,7 @@ def test_another_gateway_has_another_location():
     rig.hear("00 02 01 01 01 00 00 80 3f", "09 03 04 01 01 01 09 01")
     rig.forget()
     rig.wait_until(5.0)
-    assert packet("01 01 02 03 09") in rig.sent(REQUEST)
+    assert packet("01 01 02 03 09" + FROM_0) in rig.sent(REQUEST)
 
 
 # Power ---------------------------------------------------------------------------------------

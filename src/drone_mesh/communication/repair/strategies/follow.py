@@ -29,5 +29,5 @@ class Follow(Nearest):
             super().on_place(node, place)
 
     def _fly(self, step: Step) -> None:
-        self.mesh.announce_place(step.place)
+        self.mesh.announce_place(self.mesh.goal_of(step))
         super()._fly(step)

@@ -62,5 +62,5 @@ class Inward(Home):
         return is_beside and self._moves < MOVES
 
     def _move_to(self, step: Step) -> None:
-        self.mesh.announce_place(step.place)
+        self.mesh.announce_place(self.mesh.goal_of(step))
         self.mesh.fly(step)

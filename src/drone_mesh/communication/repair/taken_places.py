@@ -1,0 +1,46 @@
+"""TakenPlaces: where other drones stand, or may still hang in the air without a radio.
+
+docs/protocol.md, "Places of silent drones".
+"""
+
+from __future__ import annotations
+
+from drone_mesh.communication.parts import NodeParts
+from drone_mesh.communication.repair.options import LostPlace, RepairOptions
+from drone_mesh.communication.repair.spots import Landing, free_spot
+from drone_mesh.drone.location import Location
+
+FRESH_S = 5.0  # our choice: with EXACT, a drone that was silent for longer takes no place
+
+
+class TakenPlaces:
+    """The places of other drones, as one node knows them, and the spots that are clear of them."""
+
+    def __init__(self, parts: NodeParts, options: RepairOptions) -> None:
+        self._parts = parts
+        self._options = options
+
+    def all(self) -> list[Location]:
+        """Where each other node was last heard, and the gateway's place."""
+        now_s, me = self._parts.now_s, self._parts.node_id
+        gateway = self._parts.places.gateway  # it may be there, although it is off now
+        kept_free = [] if gateway is None else [gateway]
+        exact = self._options.lost_place is LostPlace.EXACT
+        return kept_free + [
+            heard.place
+            for node, heard in self._parts.neighbours.places().items()
+            if node != me and not (exact and now_s - heard.heard_s > FRESH_S)
+        ]
+
+    def is_free(self, spot: Location) -> bool:
+        """Whether no other drone is within the clearance."""
+        clearance_m = self._options.clearance_m
+        return all(spot.distance_m(other) >= clearance_m for other in self.all())
+
+    def at_or_beside(self, place: Location, landing: Landing) -> Location:
+        """`place` if that is free, else the best spot near it."""
+        return place if self.is_free(place) else self.beside(place, landing)
+
+    def beside(self, place: Location, landing: Landing, skip: int = 0) -> Location:
+        """The best free spot near `place`; `skip`: see free_spot."""
+        return free_spot(place, landing, self._options, self.all(), skip)
