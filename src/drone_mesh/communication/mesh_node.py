@@ -65,7 +65,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
     ) -> None:
         """`rng` spreads simultaneous actions of many nodes; `debug`: the antenna displays the node.
 
-        `states` are those of a router; a gateway has none..
+        `states` are those of a router; a gateway has none.
 
         Raises ValueError for a node id outside 0..253.
         """

@@ -92,7 +92,8 @@ class RepairFlight:
 
     def on_taken(self, place: Location) -> None:
         """Another drone is at `place`, or may be there in silence; keep clear of it."""
-        if place.distance_m(self.goal) < self._clearance_m:
+        near = place.distance_m(self.goal) < self._clearance_m
+        if near and not self._taken.is_free(self.goal):
             self._diversions += 1
             self._go_to(self._spot())
 
