@@ -108,7 +108,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self._orders = OrderIntake(self._parts, self.complaints, self._took_off)
         self._reporter = NodeReporter(self._parts, self)
         room = messages.BODY_BYTES - seals.reserved_bytes(DATA_TYPES.start)
-        self.data = Transport(self._parts, self.complaints, rng, self.get_preferred_gateway, room)
+        self.data = Transport(self._parts, self.complaints, rng, self, room)
 
     def _control_plane(
         self,

@@ -3,8 +3,9 @@
 A message is cut into fragments. The receiver of a reliable one reports the fragments that it has in
 an ACK: when the message is complete, when its last fragment arrived but others are missing, and in
 answer to a POLL. Missing fragments are then sent again. The sender sends a POLL when no ACK arrives
-in time, and when the window is full. If there are relays on a shared channel on the way, a train
-takes the place of the window (see Train), also for messages that are not reliable.
+in time, and when the window is full; while one is unanswered, it sends nothing else. If there are
+relays on a shared channel on the way, a train takes the place of the window (see Train), also for
+messages that are not reliable, and a pause may follow an answer (see Pace).
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.congestion_window import CongestionWindow
 from drone_mesh.communication.data.fragmentation import Fragmentation, Seal, leave_plain
 from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
+from drone_mesh.communication.data.pace import Pace
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import TicketState, destination_in_words
-from drone_mesh.communication.data.train import Train
+from drone_mesh.communication.data.train import LEAST_LENGTH, Train
 
 
 class Outbox:
@@ -48,9 +50,11 @@ class Outbox:
         self._fragmentation = Fragmentation(session, room, seal, self._open)
         self._window = CongestionWindow()
         self._round_trip = RoundTrip()
+        self._pace = Pace()
         self._nonce = 0
         self._train: Train | None = None  # while relays share the channel with this node
         self._latest: OutgoingMessage | None = None  # message whose fragment left last
+        self._may_begin = True  # another message, after its pause
         self.not_before_s = -math.inf  # no route: time of the next attempt
 
     def __len__(self) -> int:
@@ -79,9 +83,11 @@ class Outbox:
 
     def next_packet(self, now_s: float) -> DataPacket | None:
         """The next packet to send; call `on_sent` once it was sent."""
+        self._may_begin = self._train is None or now_s >= self._pace.until_s
         train = self._train
         if train is None:
-            return self._timely_poll(now_s) or self._fragment()
+            poll = self._timely_poll(now_s)
+            return poll if poll is not None or self._unanswered else self._fragment()
         if train.waits:
             if now_s < self._train_due_s(train):
                 return None
@@ -89,7 +95,7 @@ class Outbox:
                 return self._end_of_train()
             train.end(arrived=False)
         poll = self._timely_poll(now_s)
-        if poll is not None:
+        if poll is not None or self._unanswered:
             return poll
         if train.is_full and self._has_more():
             return self._end_of_train()
@@ -97,10 +103,16 @@ class Outbox:
 
     def _timely_poll(self, now_s: float) -> DataPacket | None:
         """A POLL for a message whose ACK is late."""
-        for message in self._open.values():
+        unanswered = self._unanswered
+        for message in [unanswered] if unanswered else self._open.values():
             if message.asks and now_s >= message.asked_s + self._timeout_s(message):
                 return self._poll(message)
         return None
+
+    @property
+    def _unanswered(self) -> OutgoingMessage | None:
+        """The message whose POLL remained without an answer: nothing else is sent meanwhile."""
+        return next((message for message in self._open.values() if message.asks > 1), None)
 
     def _fragment(self) -> DataPacket | None:
         """The next fragment; a POLL if the window is full."""
@@ -128,6 +140,8 @@ class Outbox:
         message = packet.message
         if packet.ends_train:
             assert self._train is not None
+            if self._train.waits:
+                self._pace.on_silence(now_s - self._train.asked_s)
             poll = packets.poll_of(packet.body)
             self._train.is_open = False
             if poll.nonce != NO_ANSWER:
@@ -136,6 +150,8 @@ class Outbox:
         if packet.kind == packets.POLL:
             if self._train is not None:
                 self._train.is_open = False
+            if message.asks:
+                self._pace.on_silence(now_s - message.asked_s)
             message.asked_s, message.asks = now_s, message.asks + 1
             return
         self._latest = message
@@ -149,14 +165,15 @@ class Outbox:
             return
         message.whole = True
         if message.ticket.reliable:
-            message.asked_s, message.asks = now_s, 1
+            message.asked_s = message.left_s = now_s
+            message.asks = 1
             if message.ticket.state is TicketState.QUEUED:
                 message.ticket.set_state(TicketState.SENT)
         else:
             self._close(message, TicketState.SENT)
 
-    def answered(self, ack: Ack, now_s: float) -> None:
-        """Process an ACK of the receiver."""
+    def answered(self, ack: Ack, now_s: float, patience: float = 0.0) -> None:
+        """Process an ACK of the receiver; `patience` of the antenna: how busy the channel is."""
         if ack.session != self._session:
             return
         complete = {
@@ -175,20 +192,21 @@ class Outbox:
             self._partly(message, ack, now_s)
         for number in complete:
             message = self._open[number]
-            if message.asks == 1 and (message.nonce == 0 or message.nonce == ack.nonce):
-                self._round_trip.measured(now_s - message.asked_s)
+            if number == ack.number:
+                self._measure(message, ack, now_s)
+                self._rest(patience, now_s)
             self._window.grow(message.in_flight)
             self._close(message, TicketState.DELIVERED)
-        self._train_answered(ack, now_s)
+        self._train_answered(ack, now_s, patience)
 
-    def _train_answered(self, ack: Ack, now_s: float) -> None:
+    def _train_answered(self, ack: Ack, now_s: float, patience: float) -> None:
         train = self._train
         if train is None:
             return
         arrived = not self._in_flight()
         if train.waits and ack.nonce == train.nonce:
-            if train.asks == 1:
-                self._round_trip.measured(now_s - train.asked_s)
+            self._round_trip.measured(now_s - train.asked_s)
+            self._rest(patience, now_s)
             train.end(arrived)
             for message in self._open.values():
                 if not message.ticket.reliable:
@@ -211,6 +229,8 @@ class Outbox:
             due_s = min(due_s, message.expires_s)
         if self._waiting:
             due_s = min(due_s, self._waiting[0].expires_s)
+            if now_s < self._pace.until_s:
+                due_s = min(due_s, self._pace.until_s)
         return self.not_before_s if now_s < self.not_before_s else due_s
 
     def expire(self, now_s: float, has_route: bool) -> None:
@@ -227,13 +247,28 @@ class Outbox:
 
     def blocked(self, reason: str) -> None:
         """Nothing can be sent now: reliable messages wait, the others are given up."""
+        for message in list(self):
+            if not message.ticket.reliable:
+                self.give_up(message, reason)
+        self.waits_because(reason)
+
+    def waits_because(self, reason: str) -> None:
+        """Nothing is sent for now."""
         if self._train is not None:
             self._train.is_open = False
-        for message in list(self):
-            if message.ticket.reliable:
-                message.ticket.reason = reason
-            else:
-                self.give_up(message, reason)
+        for message in self:
+            message.ticket.reason = reason
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it has a message that it sends until it is acknowledged."""
+        return any(message.ticket.reliable for message in self)
+
+    def ask_anew(self, now_s: float) -> None:
+        """There is a connection again: late answers are no reason to wait for long."""
+        for message in self._open.values():
+            if message.asks:
+                message.asked_s, message.asks = now_s, 1
 
     def take(self, to: int) -> list[OutgoingMessage]:
         """Remove the messages addressed to `to`, and return them as if nothing had been sent."""
@@ -248,7 +283,9 @@ class Outbox:
     # One message ------------------------------------------------------------------------------
 
     def _may_open(self) -> bool:
-        return bool(self._waiting) and self._fragmentation.may_open(self._waiting[0].ticket)
+        if not self._waiting or not self._may_begin:
+            return False
+        return self._fragmentation.may_open(self._waiting[0].ticket)
 
     def _opened(self) -> DataPacket:
         message = self._waiting.popleft()
@@ -292,8 +329,7 @@ class Outbox:
         if not message.ticket.reliable:
             message.known = ack.has
             return
-        if message.asks == 1:
-            self._round_trip.measured(now_s - message.asked_s)
+        self._measure(message, ack, now_s)
         lost = message.sent & ~ack.has
         self._window.grow(bin(ack.has & message.sent & ~message.known).count("1"))
         message.known = ack.has
@@ -304,6 +340,24 @@ class Outbox:
             self._window.on_loss()
             again = [index for index in range(len(packets.FRAGMENTS)) if lost >> index & 1]
             message.to_send.extendleft(reversed(again))
+
+    def _rest(self, patience: float, now_s: float) -> None:
+        """An answer came: pause, for a shorter time after a train that can still become shorter."""
+        if self._train is not None:
+            share = min(1.0, LEAST_LENGTH / max(1, self._train.left))
+            self._pace.on_answer(share * self._round_trip.mean_s, patience, now_s)
+
+    def _measure(self, message: OutgoingMessage, ack: Ack, now_s: float) -> None:
+        """Learn the round trip from an answer: to its latest POLL, or to its last fragment.
+
+        The latter may arrive after a POLL; without it, a timeout that is too short would stay so.
+        """
+        if self._train is not None and ack.nonce == self._train.nonce != 0:
+            return  # an answer to the train, which measures itself
+        if ack.nonce and ack.nonce == message.nonce:
+            self._round_trip.measured(now_s - message.asked_s)
+        elif ack.nonce == 0 and message.whole:
+            self._round_trip.measured(now_s - message.left_s)
 
     def _close(self, message: OutgoingMessage, state: TicketState, reason: str = "") -> None:
         self._remove(message)

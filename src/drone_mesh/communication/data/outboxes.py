@@ -23,7 +23,7 @@ from drone_mesh.communication.data.ticket import (
     TicketState,
     destination_in_words,
 )
-from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.interfaces import NO_ROUTE, IMeshDebugInfo
 from drone_mesh.communication.parts import NodeParts
 
 BURST = 8  # our choice: packets sent before others get their turn
@@ -37,16 +37,17 @@ class Outboxes:
         self,
         parts: NodeParts,
         rng: random.Random,
-        my_gateway: Callable[[], int],
+        node: IMeshDebugInfo,
         room: int,
         send_packet: SendPacket,
         ended: Callable[[TicketState], None],
         hint: Callable[[], str],
     ) -> None:
-        """`room`, `ended` and `hint` as for Outbox; `my_gateway`: its id, or NO_ROUTE."""
+        """`room`, `ended` and `hint` as for Outbox; `node` knows its connection."""
         self._parts = parts
         self._rng = rng
-        self._my_gateway = my_gateway
+        self._node = node
+        self._was_cut_off = False
         self._room = room
         self._send_packet = send_packet
         self._ended = ended
@@ -70,7 +71,7 @@ class Outboxes:
         """Process an ACK of a receiver."""
         outbox = self._outboxes.get(by)
         if outbox is not None:
-            outbox.answered(ack, self._parts.now_s)
+            outbox.answered(ack, self._parts.now_s, self._parts.antenna.patience())
 
     def send(self) -> float:
         """Send what may be sent now; returns when to call it again, or infinity."""
@@ -78,6 +79,7 @@ class Outboxes:
         if not self._outboxes and not self._for_gateway:
             return math.inf
         self._follow_gateway()
+        self._yield_to_repair()
         left = min(BURST, antenna.data_room())
         idle = 0
         while left > 0 and idle < len(self._outboxes):
@@ -131,12 +133,28 @@ class Outboxes:
         outbox.blocked(self.unreachable(outbox.to))
         return False
 
+    def _yield_to_repair(self) -> None:
+        """On a shared channel, a node that lost its gateway sends no messages that it repeats.
+
+        They would keep the channel busy for the packets that mend the mesh.
+        """
+        node, now_s = self._node, self._parts.now_s
+        lost = not node.get_connected_to_gateway() and node.get_preferred_gateway() != NO_ROUTE
+        cut_off = lost and self._parts.antenna.medium.shared
+        for outbox in self._outboxes.values():
+            if cut_off and outbox.repeats:
+                outbox.not_before_s = max(outbox.not_before_s, now_s + ROUTE_PERIOD_S)
+                outbox.waits_because("this node looks for a gateway")
+            elif self._was_cut_off and not cut_off:
+                outbox.ask_anew(now_s)
+        self._was_cut_off = cut_off
+
     def _direction(self, to: int) -> int:
         return to if to == TO_ALL else self._parts.routing.get_direction_to_node(to)
 
     def _follow_gateway(self) -> None:
         """Move messages for the gateway to the one that this node uses now."""
-        gateway = self._my_gateway()
+        gateway = self._node.get_preferred_gateway()
         if gateway == NO_ROUTE:
             self._give_up_without_gateway()
             return

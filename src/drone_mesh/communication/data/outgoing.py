@@ -25,8 +25,8 @@ class OutgoingMessage:
     """One message under way."""
 
     __slots__ = (
-        "asked_s", "asks", "expires_s", "head", "known", "nonce", "payload", "sealed", "sent",
-        "ticket", "to_send", "whole",
+        "asked_s", "asks", "expires_s", "head", "known", "left_s", "nonce", "payload", "sealed",
+        "sent", "ticket", "to_send", "whole",
     )  # fmt: skip
 
     def __init__(self, ticket: Ticket, payload: bytes, now_s: float) -> None:
@@ -40,6 +40,7 @@ class OutgoingMessage:
         self.sent = 0  # fragments that left, as bits
         self.known = 0  # fragments that the receiver has, as bits
         self.asked_s = math.inf  # since when an answer is awaited
+        self.left_s = math.inf  # when its last fragment left
         self.asks = 0  # questions without an answer
         self.nonce = 0  # of the latest POLL; 0: none
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 FIRST_TIMEOUT_S = 1.0  # RFC 6298, 2.1
 LEAST_TIMEOUT_S = 0.3  # our choice: above the half second of circulation after one doubling
-MOST_TIMEOUT_S = 4.0  # our choice: how long a restored route may stay unused
+MOST_TIMEOUT_S = 30.0  # our choice: three check periods; with less, POLLs alone fill a channel
 
 
 class RoundTrip:
@@ -13,6 +13,11 @@ class RoundTrip:
     def __init__(self) -> None:
         self._mean_s: float | None = None
         self._deviation_s = 0.0
+
+    @property
+    def mean_s(self) -> float:
+        """The mean of the answers so far; 0 without any."""
+        return self._mean_s or 0.0
 
     def measured(self, seconds: float) -> None:
         """An answer arrived after `seconds`, to a question that was sent only once."""

@@ -22,7 +22,7 @@ from drone_mesh.communication.data.outgoing import OutgoingMessage
 from drone_mesh.communication.data.reassembly import Whole
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY, Ticket, TicketState
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.interfaces import MAX_NODE_ID
+from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.errors import MessageRefused, PacketError, QueueFull
 
@@ -66,20 +66,18 @@ class Transport:
         parts: NodeParts,
         complaints: Complaints,
         rng: random.Random,
-        my_gateway: Callable[[], int],
+        node: IMeshDebugInfo,
         room: int = messages.BODY_BYTES,
     ) -> None:
-        """`room`: free bytes in a packet's body; `my_gateway`: its id, or NO_ROUTE."""
+        """`node` knows its connection; `room`: free bytes in a packet's body."""
         if not packets.LEAST_ROOM <= room <= messages.BODY_BYTES:
             raise ValueError(
                 f"invalid room {room}: must be {packets.LEAST_ROOM}..{messages.BODY_BYTES}"
             )
         self._parts = parts
         self._complaints = complaints
-        self._my_gateway = my_gateway
-        self._outboxes = Outboxes(
-            parts, rng, my_gateway, room, self._send_packet, self._ended, self.hint
-        )
+        self._my_gateway = node.get_preferred_gateway
+        self._outboxes = Outboxes(parts, rng, node, room, self._send_packet, self._ended, self.hint)
         self._inboxes = Inboxes(parts, room, self._send_packet, self._arrived)
         self._flood = Flood(parts)
         self._echoes = Echoes(self._send_packet, room)
