@@ -47,7 +47,7 @@ class Outboxes:
         self._parts = parts
         self._rng = rng
         self._node = node
-        self._was_cut_off = False
+        self._was_lost = False
         self._room = room
         self._send_packet = send_packet
         self._ended = ended
@@ -140,14 +140,13 @@ class Outboxes:
         """
         node, now_s = self._node, self._parts.now_s
         lost = not node.get_connected_to_gateway() and node.get_preferred_gateway() != NO_ROUTE
-        cut_off = lost and self._parts.antenna.medium.shared
         for outbox in self._outboxes.values():
-            if cut_off and outbox.repeats:
+            if not lost and self._was_lost:
+                outbox.ask_anew(now_s)
+            elif lost and self._parts.antenna.medium.shared and outbox.repeats:
                 outbox.not_before_s = max(outbox.not_before_s, now_s + ROUTE_PERIOD_S)
                 outbox.waits_because("this node looks for a gateway")
-            elif self._was_cut_off and not cut_off:
-                outbox.ask_anew(now_s)
-        self._was_cut_off = cut_off
+        self._was_lost = lost
 
     def _direction(self, to: int) -> int:
         return to if to == TO_ALL else self._parts.routing.get_direction_to_node(to)
