@@ -5,7 +5,7 @@ an ACK: when the message is complete, when its last fragment arrived but others 
 answer to a POLL. Missing fragments are then sent again. The sender sends a POLL when no ACK arrives
 in time, and when the window is full; while one is unanswered, it sends nothing else. If there are
 relays on a shared channel on the way, a train takes the place of the window (see Train), also for
-messages that are not reliable, and a pause may follow an answer (see Pace).
+messages that are not reliable, and a pause may follow an answer (see MessagePause).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import Callable, Iterator
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.congestion_window import CongestionWindow
 from drone_mesh.communication.data.fragmentation import Fragmentation, Seal, leave_plain
+from drone_mesh.communication.data.message_pause import MessagePause
 from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
-from drone_mesh.communication.data.pace import Pace
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import TicketState, destination_in_words
@@ -50,7 +50,7 @@ class Outbox:
         self._fragmentation = Fragmentation(session, room, seal, self._open)
         self._window = CongestionWindow()
         self._round_trip = RoundTrip()
-        self._pace = Pace()
+        self._pace = MessagePause()
         self._nonce = 0
         self._train: Train | None = None  # while relays share the channel with this node
         self._latest: OutgoingMessage | None = None  # message whose fragment left last

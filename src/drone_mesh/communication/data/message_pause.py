@@ -1,4 +1,4 @@
-"""Pace: the pause between the messages of one outbox on a shared channel.
+"""MessagePause: the pause between the messages of one outbox on a shared channel.
 
 A window cannot become smaller than one message, and many nodes with one message each still
 congest a channel. The pause takes the place of smaller windows: it doubles with each timeout,
@@ -18,7 +18,7 @@ SHRINKS_BY = 0.8  # our choice: with each other answer
 LEAST_PAUSE_S = 0.05  # our choice: a shorter one is none
 
 
-class Pace:
+class MessagePause:
     """The pause of one outbox."""
 
     def __init__(self) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.message_pause import MOST_PAUSE_S, MessagePause
 from drone_mesh.communication.data.outbox import Outbox
 from drone_mesh.communication.data.outgoing import OutgoingMessage
-from drone_mesh.communication.data.pace import MOST_PAUSE_S, Pace
 from drone_mesh.communication.data.round_trip import FIRST_TIMEOUT_S, MOST_TIMEOUT_S
 from drone_mesh.communication.data.ticket import Ticket, TicketState
 
@@ -15,13 +15,13 @@ BUSY, QUIET = 2.5, 0.0
 
 
 def test_on_a_quiet_channel_no_pause_follows_an_answer():
-    pace = Pace()
+    pace = MessagePause()
     pace.on_answer(0.1, QUIET, 7.0)
     assert pace.until_s < 7.0
 
 
 def test_the_pause_doubles_with_each_timeout_and_shrinks_with_each_answer():
-    pace = Pace()
+    pace = MessagePause()
     for expected_s in (1.0, 2.0, 4.0, 8.0):
         pace.on_silence(1.0)
         assert pace.pause_s == expected_s
@@ -36,14 +36,14 @@ def test_the_pause_doubles_with_each_timeout_and_shrinks_with_each_answer():
 
 
 def test_the_pause_is_bounded():
-    pace = Pace()
+    pace = MessagePause()
     for _ in range(20):
         pace.on_silence(1.0)
     assert pace.pause_s == MOST_PAUSE_S == 30.0
 
 
 def test_on_a_busy_channel_it_grows_with_each_answer_to_eight_round_trips():
-    pace, pauses = Pace(), []
+    pace, pauses = MessagePause(), []
     for _ in range(10):
         pace.on_answer(0.2, BUSY, 0.0)
         pauses.append(pace.pause_s)
