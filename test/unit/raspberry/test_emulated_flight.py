@@ -149,7 +149,8 @@ def test_layout_202_without_node_1_is_repaired_by_drones_that_really_fly(kind: A
 def test_a_drone_whose_pilot_chose_to_hover_is_not_flown_by_a_repair(kind: Autopilot) -> None:
     mesh = FlyingMesh(kind, seed=4)
     for node_id, east_m in ((0, 0.0), (1, 6.0), (2, 8.0)):
-        mesh.add(node_id, Location(0.0, east_m, 0.0))
+        add = mesh.add_router if node_id else mesh.add_gateway
+        add(node_id, east_m, 0.0)
     try:
         assert mesh.run_until(mesh.all_connected, within_s=60.0)
         mesh.run_for(30.0)
