@@ -14,7 +14,8 @@ release = ElementTree.parse(str(ROOT / "package.xml")).findtext("version") or ""
 
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode"]
 autosummary_generate = True
-autodoc_default_options = {"members": True, "show-inheritance": True}
+# What a package re-exports is described where it is defined.
+autodoc_default_options = {"members": True, "show-inheritance": True, "ignore-module-all": True}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 # ROS and hardware are not needed to read the reference.

@@ -161,7 +161,8 @@ mesh.addEventListener("layouts", () => {
   const offers = (action) => mesh.actions.includes(action);
   byId("pause").hidden = byId("speed").parentElement.hidden = !offers("speed");
   byId("power").hidden = !offers("power");
-  for (const action of ["demonstrate", "add", "remove", "mission"]) byId(action).hidden = !offers(action);
+  for (const action of ["demonstrate", "add", "remove", "mission"])
+    byId(action).hidden = !offers(action);
 });
 
 // Orders
@@ -369,7 +370,8 @@ const KEYS = {
   Delete: () => fleet.remove(),
   z: () => undo(),
   "?": () => byId("help").showModal(),
-  Escape: () => map.cancelDrag() || fleet.close() || missions.close() || flights.undo() || mesh.select(null),
+  Escape: () =>
+    map.cancelDrag() || fleet.close() || missions.close() || flights.undo() || mesh.select(null),
 };
 
 document.addEventListener("keydown", (event) => {

@@ -50,7 +50,8 @@ export class Missions {
     this.form.hidden = !open;
     document.body.toggleAttribute("data-adding", open);
     byId("mission").setAttribute("aria-pressed", open);
-    const add = (x, y) => this.#set([...this.waypoints, [Number(x.toFixed(1)), Number(y.toFixed(1))]]);
+    const add = (x, y) =>
+      this.#set([...this.waypoints, [Number(x.toFixed(1)), Number(y.toFixed(1))]]);
     this.map.choosePlace(open ? add : null);
     if (!open) this.map.showMission([]);
   }
@@ -61,7 +62,8 @@ export class Missions {
       ? `${this.drones.length > 1 ? "drones" : "drone"} ${this.drones.slice(0, 8).join(", ")}`
       : "no drone: select one first";
     const { length } = waypoints;
-    byId("mission-text").textContent = `${length} ${length === 1 ? "waypoint" : "waypoints"}, ${who}`;
+    byId("mission-text").textContent =
+      `${length} ${length === 1 ? "waypoint" : "waypoints"}, ${who}`;
     byId("mission-send").disabled = !length || !this.drones.length;
     byId("mission-back").disabled = !length;
     byId("mission-error").textContent = "";
