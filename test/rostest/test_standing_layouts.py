@@ -27,6 +27,10 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+def waits_for_17(progress: LayoutProgress) -> bool:
+    return bytes(progress.waiting) == bytes([17])
+
+
 class StandingLayoutsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
@@ -102,12 +106,12 @@ class StandingLayoutsTest(unittest.TestCase):
         done = run("layout", "1")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("1 of 1 at their place", done.stdout)
-        self.mesh.switch(16, False)
-        layout = subprocess.Popen(
-            ["rosrun", "drone_mesh", "layout", "16"], stdout=subprocess.PIPE, text=True
+        layout = subprocess.Popen(  # 17 is off and elsewhere, since the test before
+            ["rosrun", "drone_mesh", "layout", "17"], stdout=subprocess.PIPE, text=True
         )
         self.assertIn("ordered", layout.stdout.readline())
-        number = max(self.progress)
+        wait_for("it waits for 17", FLIGHTS_S, lambda: any(map(waits_for_17, self.open())))
+        (number,) = (progress.id for progress in self.open())
         os.kill(layout.pid, signal.SIGINT)
         self.assertEqual(layout.wait(60), 130)
         self.assertTrue(self.wait_until_over(number).over)
@@ -115,6 +119,9 @@ class StandingLayoutsTest(unittest.TestCase):
             refused = run(*wrong)
             self.assertEqual(refused.returncode, 2)
             self.assertIn("invalid value", refused.stderr)
+
+    def open(self) -> list[LayoutProgress]:
+        return [progress for progress in self.progress.values() if not progress.over]
 
     def waiting(self, number: int) -> bytes | None:
         """Its drones without a route, once no drone flies any more."""
