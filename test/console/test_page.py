@@ -392,7 +392,7 @@ DRAW_LOST = """async (count) => {
   const nodes = new Map();
   for (let id = 0; id < 254; id++)
     nodes.set(id, { id, role: 0, on: true, colour: "off", path: [],
-      position: [id % 16, id / 16, 0] });
+      position: [id % 16, id / 16, 0], heading: [] });
   const lost = [];
   for (let a = 0; a < 254 && lost.length < count; a++)
     for (let b = a + 1; b < 254 && lost.length < count; b++) lost.push([a, b]);
@@ -403,8 +403,8 @@ DRAW_LOST = """async (count) => {
     if (context.getLineDash().length) alpha ??= context.globalAlpha;
     stroke();
   };
-  const mesh = { nodes, links: { known: [], lost, route: [] }, clock: {}, obstacles: [],
-    selected: null, group: new Set() };
+  const mesh = { nodes, links: { known: [], lost, route: [], soon: [] }, clock: {}, obstacles: [],
+    trails: new Map(), selected: null, group: new Set() };
   const options = { known: true, ranges: false, covered: { top: 0, bottom: 0 } };
   const drawn = drawMesh(context, new Camera(), mesh, readColours(), options, []);
   return [drawn.lostLinks, alpha];
