@@ -19,6 +19,7 @@ _STATE_OF = {
     MeshEventKind.NO_ROUTE.value: OrderState.NO_ROUTE,
 }
 
+CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the process that orders and a gateway's
 BEING_SENT = "being sent"  # no gateway has reported the order yet
 
 

@@ -16,9 +16,9 @@ from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
+from drone_mesh.state.orders import CLOCKS_DIFFER_S
 
 AT_PLACE_M = 0.5  # our choice: heights are rounded to whole metres, and physics moves drones
-CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the process that orders and a gateway's
 FIRST_PAUSE_S = 5.0  # our choice, simulated: an order over 100 nodes takes less than a second
 LONGEST_PAUSE_S = 40.0  # our choice: each try costs a packet per hop
 

@@ -31,11 +31,10 @@ from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
 from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
-from drone_mesh.state.orders import OrderProgress
+from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
 POLL_PERIOD_S = 1.0  # wall; our choice: how often the drones are compared with the actions
 SENT_WITHIN_S = 30.0  # wall; our choice: a gateway reports an order within a second
-CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the processes of this node and of a gateway
 
 _log = logging.getLogger(__name__)
 

@@ -21,10 +21,9 @@ from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import event_record
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
 from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
-from drone_mesh.state.orders import OrderProgress
+from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
 SHOW_EVERY_S = 2.0  # simulated; our choice
-CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the processes of a state and of a gateway
 
 
 def main() -> None:
