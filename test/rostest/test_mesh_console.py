@@ -4,10 +4,16 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
+import tempfile
 import threading
 import unittest
+from pathlib import Path
+from urllib.error import HTTPError
 from urllib.request import urlopen
 
+import psutil
 import rosgraph
 import rospy
 import rostest
@@ -21,6 +27,8 @@ from rostest_support import (
 )
 
 HOST = "127.0.0.1:18181"
+TOKEN = "a-token-for-this-test"
+CONSOLE = ("rosrun", "drone_mesh", "console", "__name:=guarded_console", "_port:=0")
 
 
 class Page:
@@ -150,6 +158,43 @@ class MeshConsoleTest(unittest.TestCase):
         open_page()
         with urlopen(f"http://{HOST}/", timeout=5) as answer:
             self.assertIn(b"<title>Drone mesh</title>", answer.read())
+
+    def test_5_a_token_is_in_its_file_and_in_no_parameter_and_no_argument(self) -> None:
+        with tempfile.NamedTemporaryFile("w") as file:
+            Path(file.name).chmod(0o600)
+            file.write(TOKEN)
+            file.flush()
+            console = subprocess.Popen(
+                [*CONSOLE, f"_token_file:={file.name}"], stdout=subprocess.PIPE, text=True
+            )
+            try:
+                assert console.stdout is not None
+                line = console.stdout.readline()
+                url = re.findall(r"http://127\.0\.0\.1:\d+/", line)[0]
+                self.assertIn(f"the content of {file.name}", line)
+                with self.assertRaises(HTTPError):
+                    urlopen(url, timeout=5)
+                with urlopen(f"{url}static/app.js?token={TOKEN}", timeout=5) as answer:
+                    self.assertEqual(answer.status, 200)
+                self.assertNotIn(TOKEN, str(rospy.get_param("/")))
+                for process in psutil.process_iter(["cmdline"]):
+                    self.assertNotIn(TOKEN, " ".join(process.info["cmdline"] or ()))
+            finally:
+                console.terminate()
+                console.communicate()
+
+    def test_6_a_token_in_a_parameter_is_refused(self) -> None:
+        console = subprocess.run(
+            [*CONSOLE, f"_token:={TOKEN}"],
+            stderr=subprocess.PIPE,
+            timeout=WALL_LIMIT_S,
+            check=False,
+            text=True,
+        )
+        rospy.delete_param("/guarded_console/token")
+        self.assertNotEqual(console.returncode, 0)
+        self.assertIn("give token_file", console.stderr)
+        self.assertNotIn(TOKEN, console.stderr)
 
 
 if __name__ == "__main__":

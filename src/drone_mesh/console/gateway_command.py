@@ -5,9 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import os
-import secrets
 import signal
-import socket
 import sys
 import time
 from functools import partial
@@ -17,13 +15,13 @@ from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
 from drone_mesh.console.history import History
+from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.real_mesh import events_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import MeshError
 from drone_mesh.stopping import StopRequest
 from drone_mesh.web import LOOPBACK
-from drone_mesh.web.access import access_for, is_loopback
 
 ASK_PERIOD_S = 1.0  # our choice
 GATEWAY_TOKEN = "DRONE_MESH_TOKEN"  # as of the gateway
@@ -100,9 +98,7 @@ def main(
     if not options.gateway.startswith(("http://", "https://")):
         parser.error(f"--gateway {options.gateway}: must begin with http:// or https://")
     logging.basicConfig(format="%(levelname)s %(message)s", level="INFO")
-    token = environment.get(PAGE_TOKEN, "")
-    if not token and not is_loopback(options.bind):
-        token = secrets.token_urlsafe(18)
+    token = PageToken.needed(options.bind, environment.get(PAGE_TOKEN, ""), f"${PAGE_TOKEN}")
     with StopRequest() as stop:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: stop.make())
@@ -115,17 +111,15 @@ def main(
     return 0
 
 
-def _serve(client: GatewayClient, address: str, port: int, token: str, stop: StopRequest) -> None:
+def _serve(
+    client: GatewayClient, address: str, port: int, token: PageToken, stop: StopRequest
+) -> None:
     store = FrameStore(History())
     controls = GatewayControls(client)
-    server = ConsoleServer(
-        store, controls, access_for(address, token), actions=GatewayControls.ACTIONS
-    )
+    server = ConsoleServer(store, controls, token.access(address), actions=GatewayControls.ACTIONS)
     runner = ConsoleRunner(server, address, port)
     runner.start()
-    name = socket.gethostname() if address in ("0.0.0.0", "::") else address
-    name = f"[{name}]" if ":" in name else name
-    print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
+    print(token.greeting(address, runner.port), flush=True)
     feed = GatewayFeed(client, store, runner)
     try:
         feed.ask()

@@ -10,7 +10,7 @@ from drone_mesh.arguments import whole
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet import DEFAULT_PORT
 from drone_mesh.internet.http_settings import HttpSettings
-from drone_mesh.raspberry.secret_file import read_secret
+from drone_mesh.secret_file import read_secret
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.access import access_for
 from drone_mesh.web.listening import MAX_PORT

@@ -9,7 +9,7 @@ from typing import Mapping
 
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
-from drone_mesh.raspberry.secret_file import read_secret
+from drone_mesh.secret_file import read_secret
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ssl
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,8 @@ class Certificate:
         """Raise ConfigurationError unless both files can be read and match."""
         for option, path in (("--cert", self.cert), ("--key", self.key)):
             try:
+                if not stat.S_ISREG(path.stat().st_mode):  # a pipe would block whoever opens it
+                    raise ConfigurationError(f"{option} {path}: not a regular file")
                 path.open("rb").close()
             except OSError as error:
                 raise ConfigurationError(f"{option} {path}: {error.strerror}") from error

@@ -161,6 +161,7 @@ def test_a_gateway_is_node_0_and_serves_this_machine_alone():
 def test_the_token_comes_from_the_environment_or_from_a_file_which_wins(tmp_path):
     file = tmp_path / "token"
     file.write_text(f"{TOKEN}\n")
+    file.chmod(0o600)
     environment = {"DRONE_MESH_TOKEN": "of the environment it is"}
     assert parse_gateway([], environment).http.token == "of the environment it is"
     assert parse_gateway(["--token-file", str(file)], environment).http.token == TOKEN
@@ -229,9 +230,9 @@ def test_a_wrong_option_ends_the_program_with_status_2_and_the_reason(capsys, li
         ("--key-file /no/such/file", ": --key-file /no/such/file: No such file or directory$"),
         (
             "--mqtt mqtts://u@h/m --mqtt-password-file /dev/null",
-            "--mqtt-password-file /dev/null: the file contains no password",
+            "--mqtt-password-file /dev/null: not a regular file",
         ),
-        ("--token-file /dev/null", "--token-file /dev/null: the file contains no token"),
+        ("--token-file /dev/null", "--token-file /dev/null: not a regular file"),
     ],
 )
 def test_a_wrong_option_of_the_gateway_is_named(capsys, line, reason):

@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 import os
-import stat
 from pathlib import Path
 
 from drone_mesh.communication.seals.keys import MeshKey, NodeKeys, keys_from_text
 from drone_mesh.errors import ConfigurationError
-
-_FOR_OTHERS = stat.S_IRWXG | stat.S_IRWXO
+from drone_mesh.secret_file import read_secret_file
 
 
 def read_key_file(path: Path) -> MeshKey | NodeKeys:
-    """The keys in a file. Raises ConfigurationError if others may read it or it holds no keys."""
-    try:
-        with open(path, encoding="ascii") as file:
-            mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-            if mode & _FOR_OTHERS:
-                raise ConfigurationError(
-                    f"{path}: other users can access it (mode {mode:04o}); run: chmod 600 {path}"
-                )
-            text = file.read()
-    except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigurationError(f"{path}: not a text file") from error
+    """The keys in a secret file. Raises ConfigurationError if it is none or holds no keys."""
+    text = read_secret_file(path)
     try:
         return keys_from_text(text)
     except ConfigurationError as error:

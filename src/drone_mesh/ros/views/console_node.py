@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-import secrets
-import socket
 import time
 from functools import partial
 from pathlib import Path
@@ -19,9 +17,10 @@ from drone_mesh.console.dots import make_dots
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import LayoutOffer, places_of
+from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
-from drone_mesh.errors import ConfigurationError
+from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
 from drone_mesh.ros.graph import names
@@ -32,14 +31,12 @@ from drone_mesh.ros.graph.parameters import manager_layouts
 from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.ros.views.recording import Recording
 from drone_mesh.ros.views.state_source import OLD_STATE_S
+from drone_mesh.secret_file import read_secret
 from drone_mesh.stopping import StopRequest
 from drone_mesh.web import LOOPBACK
-from drone_mesh.web.access import access_for, is_loopback
 
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
-TOKEN_BYTES = 18
 REPAIR_DEMO = "repair"
-EVERYWHERE = ("0.0.0.0", "::")  # addresses that mean all addresses of this machine
 
 log = logging.getLogger(__name__)
 
@@ -138,10 +135,11 @@ def layout_offers(layouts: Layouts) -> list[LayoutOffer]:
 def main() -> None:
     """Runs the web console, which shows and controls the mesh in a browser.
 
-    Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token
-    (str): password of the console; without it, a random one is made and printed if other machines
-    can reach the address; ~demo (str): "repair" shows a repair as soon as a page is open;
-    ~recording (str): path of the bag that is played; its page takes no orders.
+    Parameters (private): ~address (str, 127.0.0.1) and ~port (int, 8080) to listen on; ~token_file
+    (str): path of a file with the password of the console, which only its owner can access;
+    without it, a random one is made and printed if other machines can reach the address; ~demo
+    (str): "repair" shows a repair as soon as a page is open; ~recording (str): path of the bag that
+    is played; its page takes no orders.
     /DroneManager/casus (str): the file of the layouts.
     """
     prepare_node(main.__doc__)
@@ -153,9 +151,7 @@ def _run() -> int:
     show_library_logs_on_rosout()
     address = str(rospy.get_param("~address", LOOPBACK))
     port = _port(rospy.get_param("~port", DEFAULT_PORT))
-    token = str(rospy.get_param("~token", ""))
-    if not token and not is_loopback(address):
-        token = secrets.token_urlsafe(TOKEN_BYTES)
+    token = _token(address)
     demo = str(rospy.get_param("~demo", ""))
     if demo not in ("", REPAIR_DEMO):
         raise ConfigurationError(f"invalid demo {demo!r}: must be {REPAIR_DEMO} or empty")
@@ -163,7 +159,7 @@ def _run() -> int:
     whole = History(math.inf, math.inf) if recording else None
     store = FrameStore(History() if whole is None else None)
     layouts = layout_offers(manager_layouts())
-    access = access_for(address, token)
+    access = token.access(address)
     controls: MeshControls = RecordingControls() if recording else RosControls()
     server = ConsoleServer(
         store,
@@ -178,12 +174,9 @@ def _run() -> int:
     stop = StopRequest()  # created where signals are handled, in the thread that waits
     rospy.on_shutdown(stop.make)
     runner.start()
-    name = socket.gethostname() if address in EVERYWHERE else address
-    name = f"[{name}]" if ":" in name else name
-    # Printed, not logged: the log is public on /rosout, the token is secret.
     if demo:
         print("the demonstration begins when a browser opens this page:", flush=True)
-    print(f"console: http://{name}:{runner.port}/{f'?token={token}' if token else ''}", flush=True)
+    print(token.greeting(address, runner.port), flush=True)
     reading = None if whole is None else Recording(Path(recording), whole, runner)
     try:
         if reading is not None:
@@ -194,6 +187,19 @@ def _run() -> int:
             reading.stop()
         runner.stop()
     return 0
+
+
+def _token(address: str) -> PageToken:
+    if rospy.has_param("~token"):
+        raise ConfigurationError(
+            "~token: everybody on the ROS network can read parameters, and every user of this "
+            "machine arguments; delete it (rosparam delete), put a new token into a file "
+            "(chmod 600) and give token_file"
+        )
+    path = str(rospy.get_param("~token_file", ""))
+    with naming_argument("token_file:=", path):
+        given = read_secret(Path(path), "token") if path else ""
+    return PageToken.needed(address, given, path)
 
 
 def _port(value: object) -> int:

