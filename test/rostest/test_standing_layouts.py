@@ -101,10 +101,10 @@ class StandingLayoutsTest(unittest.TestCase):
 
     def test_5_the_commands_show_progress_and_withdraw_on_ctrl_c(self) -> None:
         flight = run("fly", "1", "-1.5", "2", "0")
-        self.assertEqual(flight.returncode, 0, flight.stderr)
+        self.assertEqual(flight.returncode, 0, flight.stdout + flight.stderr)
         self.assertRegex(flight.stdout, r"under way: \d+\.\d m left\n(.*\n)*arrived\n")
         done = run("layout", "1")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("1 of 1 at their place", done.stdout)
         layout = subprocess.Popen(  # 17 is off and elsewhere, since the test before
             ["rosrun", "drone_mesh", "layout", "17"], stdout=subprocess.PIPE, text=True

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Callable, Sequence
 
 import actionlib
@@ -56,6 +57,8 @@ class StandingLayouts:
     Parameter:  /DroneManager/standing, what is left to order, for the next start
 
     `_lock` guards the orders and the actions; nothing is published or stored while it is held.
+    One thread publishes and stores, in the order in which it was told under the lock: what was
+    said last is what a latched topic keeps. It ends with the process.
     """
 
     def __init__(
@@ -71,6 +74,7 @@ class StandingLayouts:
         self._order = order
         self._begin = begin
         self._lock = threading.Lock()
+        self._reporter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="standing layouts")
         self._orders = StandingOrders()
         self._shown: dict[int, StandingProgress] = {}
         self._saved = ""
@@ -112,15 +116,11 @@ class StandingLayouts:
             progress = self._orders.withdraw(number)
             handle = self._handles.pop(number, None)
             self._shown.pop(number, None)
-        if progress is None:
-            return None
-        words = progress.in_words()
-        self._publisher.publish(progress_msg(progress, over=True))
-        if handle is not None:
-            handle.set_canceled(LayoutResult(number, False, words), words)
-        _log.info("case %d: withdrawn: %s", progress.case, words)
-        self._save()
-        return words
+            if progress is None:
+                return None
+            self._reporter.submit(self._report_withdrawn, progress, handle)
+            self._save()
+        return progress.in_words()
 
     # Threads of rospy ------------------------------------------------------------------------
 
@@ -149,38 +149,48 @@ class StandingLayouts:
             self.withdraw(number)
 
     def _show(self) -> None:
-        """Publish what has changed since the last call, and end what is over."""
+        """Report what has changed since the last call, and end what is over."""
         with self._lock:
             progresses = self._orders.all_progress()
             changed = [p for p in progresses if self._shown.get(p.number) != p]
             self._shown = {p.number: p for p in progresses if not p.is_over}
             self._orders.forget_complete()
-            handles = {p.number: self._handles.get(p.number) for p in changed}
             for progress in changed:
+                handle = self._handles.get(progress.number)
                 if progress.is_over:
                     self._handles.pop(progress.number, None)
-        for progress in changed:
-            self._publisher.publish(progress_msg(progress, progress.is_over))
-            if progress.is_over:
-                _log.info("case %d: %s", progress.case, progress.in_words())
-            handle = handles[progress.number]
-            if handle is not None:
-                _tell(handle, progress)
-        if changed:
-            self._save()
-
-    # For a restart ---------------------------------------------------------------------------
+                self._reporter.submit(self._report, progress, handle)
+            if changed:
+                self._save()
 
     def _save(self) -> None:
-        with self._lock:
-            left = json.dumps(self._orders.saved())
-            if left == self._saved:
-                return
+        """For a restart. The caller holds the lock."""
+        left = json.dumps(self._orders.saved())
+        if left != self._saved:
             self._saved = left
-        try:
-            rospy.set_param(names.STANDING_PARAM, left)
-        except NO_ANSWER as error:
-            _log.debug("what is left to order is not stored: %s", error)
+            self._reporter.submit(_store, left)
+
+    # The reporter's thread -------------------------------------------------------------------
+
+    def _report(
+        self, progress: StandingProgress, handle: actionlib.ServerGoalHandle | None
+    ) -> None:
+        self._publisher.publish(progress_msg(progress, progress.is_over))
+        if progress.is_over:
+            _log.info("case %d: %s", progress.case, progress.in_words())
+        if handle is not None:
+            _tell(handle, progress)
+
+    def _report_withdrawn(
+        self, progress: StandingProgress, handle: actionlib.ServerGoalHandle | None
+    ) -> None:
+        words = progress.in_words()
+        self._publisher.publish(progress_msg(progress, over=True))
+        if handle is not None:
+            handle.set_canceled(LayoutResult(progress.number, False, words), words)
+        _log.info("case %d: withdrawn: %s", progress.case, words)
+
+    # At the start ----------------------------------------------------------------------------
 
     def _restore(self) -> None:
         try:
@@ -191,6 +201,13 @@ class StandingLayouts:
             return
         for progress in self._orders.all_progress():
             _log.info("case %d: goes on: %s", progress.case, progress.in_words())
+
+
+def _store(left: str) -> None:
+    try:
+        rospy.set_param(names.STANDING_PARAM, left)
+    except NO_ANSWER as error:
+        _log.debug("what is left to order is not stored: %s", error)
 
 
 def _tell(handle: actionlib.ServerGoalHandle, progress: StandingProgress) -> None:

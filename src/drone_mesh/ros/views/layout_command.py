@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import queue
+import signal
 import sys
 
 import rospy
@@ -16,6 +17,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
 from drone_mesh.srv import OrderLayout, OrderLayoutRequest, WithdrawLayout, WithdrawLayoutRequest
+from drone_mesh.stopping import StopRequest
 
 
 def main() -> None:
@@ -40,29 +42,34 @@ def _run(case: int) -> int:
     join_graph("order_layout")
     heard: queue.Queue[LayoutProgress] = queue.Queue()
     rospy.Subscriber(names.LAYOUTS_TOPIC, LayoutProgress, heard.put)
-    try:
-        answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, OrderLayoutRequest(case))
-    except ServiceGone as error:
-        raise MeshError(f"{error}: is the simulation running?") from None
-    except ServiceRefused as error:
-        raise MeshError(str(error)) from None
-    print(answer.message, flush=True)
-    try:
-        return _follow(heard, answer.id)
-    except KeyboardInterrupt:
+    with StopRequest() as stop:  # from here on Ctrl-C finds a layout that it can withdraw
+        signal.signal(signal.SIGINT, lambda _number, _frame: stop.make())
+        try:
+            answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, OrderLayoutRequest(case))
+        except ServiceGone as error:
+            raise MeshError(f"{error}: is the simulation running?") from None
+        except ServiceRefused as error:
+            raise MeshError(str(error)) from None
+        print(answer.message, flush=True)
+        over = _follow(heard, answer.id, stop)
+        if over is not None:
+            missing = over.waiting + over.refused + over.replaced + over.not_in_fleet
+            return 1 if missing else 0
         words = call_once(
             names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, WithdrawLayoutRequest(answer.id)
         ).message
-        print(f"withdrawn, drones in flight fly on: {words}", file=sys.stderr)
-        raise
+    print(f"withdrawn, drones in flight fly on: {words}", file=sys.stderr)
+    raise KeyboardInterrupt
 
 
-def _follow(heard: queue.Queue[LayoutProgress], number: int) -> int:
-    """Print each change until it is over; returns the exit code."""
+def _follow(
+    heard: queue.Queue[LayoutProgress], number: int, stop: StopRequest
+) -> LayoutProgress | None:
+    """Print each change until it is over; returns the last. None: the program shall stop."""
     shown = ""
-    while True:
+    while not stop.is_made():
         try:
-            progress = heard.get(timeout=1.0)  # or else Ctrl-C would wait for a message
+            progress = heard.get(timeout=0.2)
         except queue.Empty:
             continue
         if progress.id != number:
@@ -71,5 +78,5 @@ def _follow(heard: queue.Queue[LayoutProgress], number: int) -> int:
             shown = progress.message
             print(shown, flush=True)
         if progress.over:
-            missing = progress.waiting + progress.refused + progress.replaced
-            return 1 if missing + progress.not_in_fleet else 0
+            return progress
+    return None
