@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import time
 from pathlib import Path
 
 import pytest
 from copter_rig import FLIGHT_S, CopterRig
 
+from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.errors import GoalRefused
 
@@ -31,6 +33,19 @@ def test_it_flies_up_across_and_down_again_and_again(
             assert not rig.pilot.armed
             print(f"flight {flight + 1} of {FLIGHTS} at {speedup:g}x, {losing:.0%} lost")
             rig.pilot.until("ready again", rig.engine.can_fly)
+
+
+def test_a_flight_goes_on_after_the_node_was_given_no_time(
+    program: tuple[Path, Path], tmp_path: Path
+) -> None:
+    with CopterRig(program, tmp_path, speedup=1.0) as rig:
+        rig.set_out(80.0, 0.0, 7.0)
+        own = os.getpid()
+        stopped = f"kill -STOP {own}; sleep 4; kill -CONT {own}"
+        subprocess.run(["sh", "-c", stopped], check=True)
+        rig.pilot.until("at its goal", lambda: not rig.engine.is_flying(), FLIGHT_S)
+        assert rig.engine.why_ended() == ""
+        assert rig.engine.get_location().distance_m(Location(80.0, 0.0, 7.0)) < 1.6
 
 
 def test_the_speed_of_the_engine_is_kept(program: tuple[Path, Path], tmp_path: Path) -> None:

@@ -12,12 +12,14 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.mavlink.limits import FlightLimits, Permissions
 from drone_mesh.drone.mavlink.link import MavlinkLink
+from drone_mesh.drone.mavlink.listening import ListeningClock
 from drone_mesh.drone.mavlink.pilot import MavlinkPilot
 from drone_mesh.drone.mavlink.pilot_status import PilotStatus
 from drone_mesh.errors import GoalRefused, LocationUnknown
 
 TICK_S = 0.05  # our choice: four ticks per target
 STALE_S = 2.0  # an older status is no longer valid
+CATCH_UP_S = 0.5  # our choice: for its thread, when the whole program was given no time
 
 _log = logging.getLogger(__name__)
 
@@ -45,6 +47,8 @@ class MavlinkEngine(IDroneEngine):
         self._pilot = MavlinkPilot(node_id, origin, limits, permissions, self._link.send)
         self._goals: deque[tuple[Location, bool, bool]] = deque()  # lands there; for a repair
         self._latest = (PilotStatus(), time.monotonic())
+        self._missed: tuple[PilotStatus, float] | None = None  # was waited for in vain
+        self._updated = threading.Event()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"mavlink {node_id}", daemon=True)
         self._thread.start()
@@ -101,13 +105,19 @@ class MavlinkEngine(IDroneEngine):
 
     def status(self) -> PilotStatus:
         """The latest status of the drone; without a position if it is too old."""
-        status, taken_s = self._latest
-        if time.monotonic() - taken_s > STALE_S:
+        latest = self._latest
+        if _is_stale(latest) and latest is not self._missed:
+            # Who asks may have slept as long as the thread, and wakes before it: once it waits.
+            self._updated.clear()
+            if self._latest is latest and not self._updated.wait(CATCH_UP_S):
+                self._missed = latest
+            latest = self._latest
+        if _is_stale(latest):
             silent = "the engine does not answer"
             return PilotStatus(
                 location_trouble=silent, why_not_fly=silent, why_not_repair=silent, ended=silent
             )
-        return status
+        return latest[0]
 
     def close(self) -> None:
         """End the thread and close the link."""
@@ -124,16 +134,19 @@ class MavlinkEngine(IDroneEngine):
         self._goals.append((goal, lands, for_repair))
 
     def _run(self) -> None:
-        tick_due_s = 0.0
+        clock, tick_due_s = ListeningClock(time.monotonic()), 0.0
         try:
             while not self._ended.is_set():
                 messages = self._link.receive(TICK_S)
-                now_s = time.monotonic()
+                clock.step(time.monotonic())
                 for message in messages:
-                    self._pilot.on_message(message, now_s)
-                if now_s >= tick_due_s or self._goals:
-                    tick_due_s = now_s + TICK_S
-                    self._tick(now_s)
+                    self._pilot.on_message(message, clock.now_s)
+                if clock.slept_s:
+                    _log.warning("node %d: asleep for %.1f s", self._node_id, clock.slept_s)
+                    self._pilot.slept(clock.now_s)
+                if clock.now_s >= tick_due_s or self._goals:
+                    tick_due_s = clock.now_s + TICK_S
+                    self._tick(clock.now_s)
         finally:
             self._link.close()
 
@@ -145,7 +158,15 @@ class MavlinkEngine(IDroneEngine):
             except GoalRefused as error:
                 _log.warning("node %d: the goal is refused: %s", self._node_id, error)
             self._pilot.tick(now_s)
-            self._latest = (self._pilot.status(now_s), now_s)
+            self._publish(now_s)
             self._goals.popleft()
         self._pilot.tick(now_s)
-        self._latest = (self._pilot.status(now_s), now_s)
+        self._publish(now_s)
+
+    def _publish(self, now_s: float) -> None:
+        self._latest = (self._pilot.status(now_s), time.monotonic())
+        self._updated.set()
+
+
+def _is_stale(latest: tuple[PilotStatus, float]) -> bool:
+    return time.monotonic() - latest[1] > STALE_S

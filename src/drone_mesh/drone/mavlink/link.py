@@ -12,6 +12,7 @@ from drone_mesh.drone.mavlink.lines import Line, open_line
 from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.errors import ConfigurationError
 
+MOST_READINGS = 500  # our choice: of datagrams that waited; more than ten seconds of all reports
 SILENT_S = 10.0  # our choice: after this silence a peer on another port is accepted
 OPEN_AGAIN_S = 2.0  # our choice: period of attempts to open a broken line
 _BAD_DATA = "BAD_DATA"
@@ -35,20 +36,16 @@ class MavlinkLink:
             raise ConfigurationError(f"MAVLink address {address}: {error}") from error
 
     def receive(self, timeout_s: float) -> list[Message]:
-        """Wait up to this time for messages; returns as soon as there are some."""
+        """Wait up to this time for messages; returns all that wait as soon as there are some."""
         if self._line is None:
             time.sleep(timeout_s)
             self._try_to_open()
             return []
-        try:
-            data = self._line.receive(timeout_s)
-        except OSError as error:
-            self._broke(error)
-            return []
+        data = self._read_all(self._line, timeout_s)
         now_s = time.monotonic()
         if data:
             self._heard_s = now_s
-        elif now_s - self._heard_s > SILENT_S:
+        elif now_s - self._heard_s > SILENT_S and self._line is not None:
             self._heard_s = now_s
             self._line.forget_peer()
         messages = self._codec.parse_buffer(data) if data else None
@@ -69,6 +66,19 @@ class MavlinkLink:
         if self._line is not None:
             self._line.close()
             self._line = None
+
+    def _read_all(self, line: Line, timeout_s: float) -> bytes:
+        """Everything that waits: of an old report and its successor only the latter counts."""
+        data = b""
+        try:
+            for _ in range(MOST_READINGS):
+                more = line.receive(0.0 if data else timeout_s)
+                if not more:
+                    break
+                data += more
+        except OSError as error:
+            self._broke(error)
+        return data
 
     def _broke(self, error: Exception) -> None:
         _log.warning("MAVLink %s broke: %s; trying again", self._address, error)

@@ -68,6 +68,7 @@ class MavlinkPilot:
         self._moved: tuple[Location, float] | None = None  # where it last moved, and when
         self._target_due_s = -math.inf
         self._last_tick_s = -math.inf
+        self._slept_s = -math.inf  # no heartbeat was heard since the caller awoke then
 
     def on_message(self, message: Message, now_s: float) -> None:
         """Process a message from the link."""
@@ -113,12 +114,21 @@ class MavlinkPilot:
         elif self._phase in (Phase.IDLE, Phase.HOLDING):
             self._enter(Phase.CHANGING_MODE, now_s)
 
+    def slept(self, now_s: float) -> None:
+        """The caller read nothing for a while: what it read just now may be old.
+
+        Until another heartbeat shows the mode, the pilot sends nothing that moves the drone.
+        """
+        self._slept_s = now_s
+
     def tick(self, now_s: float) -> None:
         """Do what is due; to be called about ten times a second."""
         passed_s = min(1.0, now_s - self._last_tick_s)
         self._last_tick_s = now_s
         self._commander.tick(now_s)
         self._parameters.tick(now_s)
+        if self._telemetry.heartbeat_s <= self._slept_s and not self._telemetry.link_trouble(now_s):
+            return
         if self._phase is not Phase.IDLE:
             reason = self._why_let_go(now_s)
             if reason:
