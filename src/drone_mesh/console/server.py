@@ -13,6 +13,7 @@ import contextlib
 import json
 import logging
 import math
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Sequence
@@ -27,6 +28,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from drone_mesh.communication.packet_types import PacketKind
+from drone_mesh.communication.throttle import Throttle
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
@@ -47,7 +49,7 @@ from drone_mesh.console.orders import (
 from drone_mesh.console.page import Page
 from drone_mesh.console.stage import Stage
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
-from drone_mesh.web.access import Access, AccessDenied
+from drone_mesh.web.access import Access, AccessDenied, TooManyGuesses
 
 log = logging.getLogger(__name__)
 
@@ -55,6 +57,7 @@ STATIC = Path(__file__).resolve().parent / "static"
 FRAME_PERIOD_S = 0.2  # 5 Hz
 SEND_TIMEOUT_S = 10.0
 MOST_PAGES = 32
+REFUSAL_LOG_PERIOD_S = 10.0  # our choice
 MOST_ORDERS_WAITING = 16  # per page
 ORDER_THREADS = 8
 EVENT_WITHIN_S = 5.0  # wall, our choice: after the answer to an order; hosts report every second
@@ -83,6 +86,7 @@ class Guard:
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
         self._access = access
+        self._refusals = Throttle(REFUSAL_LOG_PERIOD_S)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -92,18 +96,23 @@ class Guard:
         host = connection.headers.get("host", "")
         try:
             self._access.check_host(host)
-            self._access.check_token(
-                connection.query_params.get("token") or connection.cookies.get(COOKIE)
-            )
+            given = connection.query_params.get("token") or connection.cookies.get(COOKIE)
+            if not self._access.is_right(given, _address_of(connection)):
+                raise AccessDenied(
+                    "token missing or invalid: open the console with the address that it printed"
+                )
             if scope["type"] == "websocket":
                 self._access.check_origin(connection.headers.get("origin"), host)
         except AccessDenied as error:
-            who = connection.client.host if connection.client else "unknown client"
-            log.warning("console: refused %s: %s", who, error)
+            if self._refusals.count("refused", time.monotonic()):
+                number = self._refusals.counts["refused"]
+                who = _address_of(connection)
+                log.warning("console: refused %s: %s (refusal %d)", who, error, number)
             if scope["type"] == "websocket":
                 await WebSocket(scope, receive, send).close(POLICY_VIOLATION)
             else:
-                await PlainTextResponse(f"{error}\n", 403)(scope, receive, send)
+                status = 429 if isinstance(error, TooManyGuesses) else 403
+                await PlainTextResponse(f"{error}\n", status)(scope, receive, send)
             return
 
         async def send_with_headers(message: Message) -> None:
@@ -115,6 +124,10 @@ class Guard:
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
+
+
+def _address_of(connection: HTTPConnection) -> str:
+    return connection.client.host if connection.client else "unknown client"
 
 
 class ConsoleServer:

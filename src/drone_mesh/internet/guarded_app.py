@@ -4,7 +4,8 @@ No `from __future__ import annotations` here: FastAPI reads the annotations at r
 Python 3.8.
 """
 
-import hmac
+import logging
+import time
 from typing import Any, Dict, List, Optional, Tuple, Union
 
 from fastapi import Depends, FastAPI, Request
@@ -17,10 +18,15 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
+from drone_mesh.communication.throttle import Throttle
 from drone_mesh.errors import GoalRefused
 from drone_mesh.internet.asking import AnswerLate, NotCarriedOut
 from drone_mesh.internet.request_guard import RequestGuard
-from drone_mesh.web.access import Access
+from drone_mesh.web.access import Access, TooManyGuesses
+
+REFUSAL_LOG_PERIOD_S = 10.0  # our choice
+
+_log = logging.getLogger(__name__)
 
 Responses = Dict[Union[int, str], Dict[str, Any]]
 
@@ -38,6 +44,7 @@ REFUSALS: Responses = {
     411: {"model": Refusal, "description": "A body of unknown length"},
     413: {"model": Refusal, "description": "Body too large; no request needs one"},
     414: {"model": Refusal, "description": "Address too long"},
+    429: {"model": Refusal, "description": "Too many wrong tokens from this address; wait 1 s"},
     431: {"model": Refusal, "description": "Headers too large"},
     503: {"model": Refusal, "description": "Not done; nothing was sent"},
     504: {"model": Refusal, "description": "Started, but not finished in time"},
@@ -62,15 +69,25 @@ def guarded_app(title: str, description: str, access: Access) -> Tuple[FastAPI, 
     _answer_errors_with_a_reason(app)
     bearer = HTTPBearer(auto_error=False, description="Not needed if started without a token.")
 
+    refusals = Throttle(REFUSAL_LOG_PERIOD_S)
+
     async def check_token(
+        request: Request,
         credentials: Annotated[Optional[HTTPAuthorizationCredentials], Depends(bearer)],
     ) -> None:
-        if access.token is None:
-            return
         given = credentials.credentials if credentials is not None else ""
-        if not hmac.compare_digest(given.encode(), access.token.encode()):
+        address = request.client.host if request.client else "unknown client"
+        status, headers = 401, {"WWW-Authenticate": "Bearer"}
+        try:
+            if access.is_right(given, address):
+                return
             reason = "invalid token" if given else "token missing: send Authorization: Bearer"
-            raise HTTPException(401, reason, headers={"WWW-Authenticate": "Bearer"})
+        except TooManyGuesses as error:
+            status, headers, reason = 429, {"Retry-After": "1"}, str(error)
+        if refusals.count("refused", time.monotonic()):
+            number = refusals.counts["refused"]
+            _log.warning("HTTP: refused %s: %s (refusal %d)", address, reason, number)
+        raise HTTPException(status, reason, headers=headers)
 
     return app, [Depends(check_token)]
 

@@ -10,18 +10,23 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import socket
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Iterable
 from urllib.parse import urlsplit
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.web import LOOPBACK
+from drone_mesh.web.guesses import GuessLimit
 
 SHORTEST_TOKEN = 16  # characters; our choice: too long to be guessed over a network
 
 
 class AccessDenied(MeshError):
     """A refused request; the text gives the reason."""
+
+
+class TooManyGuesses(AccessDenied):
+    """The address sent too many wrong tokens and has to wait."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,7 @@ class Access:
 
     token: str | None = None
     names: frozenset[str] = frozenset()
+    guesses: GuessLimit = field(default_factory=GuessLimit, compare=False, repr=False)
 
     def check_host(self, host: str) -> None:
         """Check the Host header. Raises AccessDenied."""
@@ -51,14 +57,21 @@ class Access:
                 f"the page {origin or 'without an origin'} was not sent by this server"
             )
 
-    def check_token(self, token: str | None) -> None:
-        """Check the token from the request's address or cookie. Raises AccessDenied."""
+    def is_right(self, token: str | None, address: str) -> bool:
+        """Whether this token of a client at `address` is right, or none is needed.
+
+        Raises TooManyGuesses.
+        """
         if self.token is None:
-            return
-        if token is None or not hmac.compare_digest(token.encode(), self.token.encode()):
-            raise AccessDenied(
-                "token missing or invalid: open the console with the address that it printed"
-            )
+            return True
+        if not token:
+            return False
+        if self.guesses.is_over(address):
+            raise TooManyGuesses(f"too many wrong tokens from {address}: try again in a second")
+        if hmac.compare_digest(token.encode(), self.token.encode()):
+            return True
+        self.guesses.note_wrong(address)
+        return False
 
 
 def access_for(bind_address: str, token: str, names: Iterable[str] = ()) -> Access:

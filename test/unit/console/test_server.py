@@ -21,6 +21,30 @@ LIMIT_S = 5.0
 OFFER = LayoutOffer(0, "0: field case", [(1, 2.0, 3.0, 0.0)])
 
 
+class Request:
+    """A GET request for the page."""
+
+    def __init__(self, server: ConsoleServer, query: bytes) -> None:
+        self._app = server.app
+        self._query = query
+        self.status = 0
+
+    async def answer(self) -> int:
+        scope = {
+            "type": "http",
+            "method": "GET",
+            "path": "/palette.css",
+            "query_string": self._query,
+            "headers": [(b"host", b"10.0.0.9:1")],
+            "client": ("10.0.0.1", 5),
+        }
+        await self._app(scope, asyncio.Queue().get, self._send)
+        return self.status
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        self.status = message.get("status", self.status)
+
+
 class PromptControls:
     """Everything is done at once; layout 9 is refused."""
 
@@ -112,6 +136,21 @@ def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> Non
 
 ACTIONS = ["fly", "power", "layout", "speed", "add", "remove", "mission", "demonstrate", "packets"]
 KINDS = ["heartbeat", "introduction", "position", "repair", "order", "report", "data", "other"]
+
+
+def test_who_guesses_tokens_is_slowed_down_and_logged_once(caplog):
+    server = ConsoleServer(FrameStore(), PromptControls(), Access("0123456789abcdef"))
+
+    async def guess() -> list[int]:
+        return [await Request(server, b"token=wrong").answer() for _ in range(600)]
+
+    statuses = asyncio.run(guess())
+    assert statuses[:10] == [403] * 10
+    assert statuses.count(403) < 20
+    assert statuses[-1] == 429
+    lines = [line for line in caplog.messages if "refused" in line]
+    assert len(lines) == 1
+    assert lines[0].startswith("console: refused 10.0.0.1: token missing or invalid")
 
 
 def test_a_page_is_greeted_and_then_gets_everything():

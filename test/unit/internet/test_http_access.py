@@ -46,6 +46,20 @@ def test_a_wrong_token_is_refused_before_the_numbers_are_looked_at(stranger):
     assert stranger.post("/DroneMovement/999/2/3/4").status_code == 401
 
 
+def test_who_guesses_tokens_is_slowed_down_and_logged_once(make_mesh, caplog):
+    mesh = make_mesh(token="0123456789abcdef0123")
+    headers = {"Authorization": "Bearer wrong"}
+    answers = [mesh.client.get("/ready", headers=headers) for _ in range(20)]
+    statuses = [answer.status_code for answer in answers]
+    assert statuses[:10] == [401] * 10
+    assert statuses.count(401) <= 12
+    assert statuses[-1] == 429
+    assert answers[-1].headers["Retry-After"] == "1"
+    assert "too many wrong tokens" in answers[-1].json()["detail"]
+    lines = [line for line in caplog.messages if "refused" in line]
+    assert lines == ["HTTP: refused 127.0.0.1: invalid token (refusal 1)"]
+
+
 def test_with_the_token_everything_is_answered(guarded_mesh):
     client = guarded_mesh.client
     assert client.get("/ready").status_code == 200

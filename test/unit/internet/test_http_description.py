@@ -34,7 +34,7 @@ def test_the_description_names_all_operations_and_what_may_come_back(mesh):
         for method, operation in methods.items()
     }
     by_the_guard = {"400", "403", "411", "413", "414", "431"}
-    always = {"200", "401", "503", "504", *by_the_guard}
+    always = {"200", "401", "429", "503", "504", *by_the_guard}
     assert answers == {
         ("get", "/ready"): sorted(always),
         ("get", "/nodes"): sorted(always),

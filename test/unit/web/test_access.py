@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.web.access import Access, AccessDenied, access_for
+from drone_mesh.web.access import Access, AccessDenied, TooManyGuesses, access_for
+from drone_mesh.web.guesses import FREE_GUESSES, MOST_ADDRESSES, GuessLimit
 
 TOKEN = "0123456789abcdef"
+HERE = "127.0.0.1"
 
 
 @pytest.mark.parametrize(
@@ -31,12 +35,51 @@ def test_with_a_token_any_name_is_accepted():
 
 @pytest.mark.parametrize("token", [None, "", "0123456789abcdeX", TOKEN + "0", "größer"])
 def test_a_wrong_token_is_refused(token):
-    with pytest.raises(AccessDenied, match="token"):
-        Access(TOKEN).check_token(token)
+    assert not Access(TOKEN).is_right(token, HERE)
 
 
 def test_the_right_token_is_accepted():
-    Access(TOKEN).check_token(TOKEN)
+    assert Access(TOKEN).is_right(TOKEN, HERE)
+    assert Access().is_right(None, HERE)
+
+
+def test_an_address_that_guesses_gets_one_guess_a_second_and_others_do_not_wait():
+    clock = [1000.0]
+    access = Access(TOKEN, guesses=GuessLimit(lambda: clock[0]))
+    for _ in range(FREE_GUESSES):
+        assert not access.is_right("wrong", "10.0.0.1")
+    with pytest.raises(TooManyGuesses, match=r"from 10\.0\.0\.1: try again"):
+        access.is_right(TOKEN, "10.0.0.1")  # the answer would tell that it is the right one
+    assert access.is_right(TOKEN, "10.0.0.2")
+    compared = 0
+    for _ in range(40):
+        clock[0] += 0.25
+        with contextlib.suppress(TooManyGuesses):
+            compared += not access.is_right("wrong", "10.0.0.1")
+    assert compared == 10
+    clock[0] += 1.0
+    assert access.is_right(TOKEN, "10.0.0.1")
+
+
+def test_a_network_of_ipv6_counts_as_one_address():
+    access = Access(TOKEN)
+    for number in range(FREE_GUESSES):
+        assert not access.is_right("wrong", f"2001:db8::{number:x}")
+    with pytest.raises(TooManyGuesses):
+        access.is_right("wrong", "2001:db8::ffff")
+
+
+def test_only_so_many_addresses_are_remembered():
+    limit = GuessLimit(lambda: 0.0)
+    for number in range(2 * MOST_ADDRESSES):
+        limit.note_wrong(f"client {number}")
+    assert len(limit._used_up_s) == MOST_ADDRESSES
+
+
+def test_a_missing_token_is_no_guess():
+    access = Access(TOKEN)
+    assert not any(access.is_right(None, HERE) for _ in range(100))
+    assert access.is_right(TOKEN, HERE)
 
 
 def test_the_own_page_may_connect():
