@@ -27,7 +27,7 @@ CANCELLED_WITHIN_S = 10.0  # simulated
 def show(feedback: FlyFeedback) -> None:
     """Print where the drone is."""
     place = f"x {feedback.longitude:.1f}, y {feedback.latitude:.1f}, z {feedback.height:.1f}"
-    print(f"{feedback.state}: {place}, {feedback.distance:.1f} m left", flush=True)
+    print(f"{feedback.state}: {place}", flush=True)
 
 
 def why_not_offered(drone: int) -> str:

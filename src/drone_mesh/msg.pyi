@@ -64,6 +64,8 @@ class FlyResult(Message):
     NO_ROUTE: Final = 3
     GIVEN_UP: Final = 4
     CANCELLED: Final = 5
+    REPLACED: Final = 6
+    LOST_CONTACT: Final = 7
     outcome: int
     message: str
     def __init__(self, outcome: int = ..., message: str = ...) -> None: ...
@@ -184,6 +186,8 @@ class MeshEvent(Message):
     TOOK_OFF: Final = 25
     CANNOT_FLY: Final = 26
     CAN_FLY: Final = 27
+    ORDER_REPLACED: Final = 28
+    ORDER_LOST_CONTACT: Final = 29
     stamp: rospy.Time
     node: int
     code: int

@@ -33,7 +33,7 @@ class MeshEventKind(enum.Enum):
     BATTERY_LOW = "battery low"
     BATTERY_EMPTY = "battery empty"
     GOAL_REFUSED = "goal refused"  # detail: why
-    # What a gateway knows of an order; peer: its drone, detail: its number, and why
+    # What a gateway knows of an order; peer: its drone, detail: its number, its goal, and why
     ORDER_SENT = "order sent"
     ORDER_ACCEPTED = "order accepted"
     ORDER_REFUSED = "order refused"
@@ -43,6 +43,9 @@ class MeshEventKind(enum.Enum):
     TOOK_OFF = "took off"
     CANNOT_FLY = "cannot fly"  # detail: why
     CAN_FLY = "can fly again"
+    # Of an order, too
+    ORDER_REPLACED = "order replaced"
+    ORDER_LOST_CONTACT = "order lost contact"
 
 
 class MeshEvent(NamedTuple):

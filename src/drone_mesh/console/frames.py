@@ -111,8 +111,7 @@ class FrameStore:
         slots = fan_out(mesh.nodes)
         for node in mesh.nodes:
             fields = _fields(node, troubles.get(node.id))
-            order = self._orders.words(node.id)
-            fields.update(slot=slots.get(node.id), order=order, **more.get(node.id, {}))
+            fields.update(self._order_of(node), slot=slots.get(node.id), **more.get(node.id, {}))
             self._update_node(node.id, fields)
         for node_id, fields in self._links(mesh, wall_s).items():
             self._update_node(node_id, fields)
@@ -154,8 +153,12 @@ class FrameStore:
 
     def _show_orders(self) -> None:
         self._next_version()
-        for node in self._nodes:
-            self._update_node(node, {"order": self._orders.words(node)})
+        for node in self._mesh.nodes if self._mesh else ():
+            self._update_node(node.id, self._order_of(node))
+
+    def _order_of(self, node: NodeStatus) -> dict[str, str]:
+        """Its latest order, and what it did since."""
+        return {"order": self._orders.words(node.id, node), "since": self._orders.since(node)}
 
     @property
     def mesh(self) -> MeshStatus | None:

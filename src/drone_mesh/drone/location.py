@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import NamedTuple, Sequence
 
 from drone_mesh.drone.flight_path import Vector
@@ -42,3 +43,12 @@ class Location(NamedTuple):
     def in_words(self) -> str:
         """The position as text: x, y, z."""
         return f"x {self.longitude:.2f} m, y {self.latitude:.2f} m, z {self.height:.0f} m"
+
+    @classmethod
+    def from_words(cls, text: str) -> Location | None:
+        """The position in a text of `in_words`; None: there is none."""
+        found = re.search(r"x (\S+) m, y (\S+) m, z (\S+) m", text)
+        try:
+            return None if found is None else cls.from_vector([float(n) for n in found.groups()])
+        except ValueError:
+            return None

@@ -207,7 +207,7 @@ def make_api(
             response.headers["Location"] = f"/orders/{orders[-1].number}"
         if not taken:
             raise HTTPException(
-                503, f"the gateway has no route to drone {drone}, which stays where it is"
+                503, f"the gateway has no route to drone {drone}: the order was not sent"
             )
         _log.info("drone %d: order sent, to %s", drone, place.in_words())
 

@@ -32,7 +32,8 @@ class OrderReport(BaseModel):
     longitude: float = Field(description="x, metres")
     height: int = Field(description="metres")
     state: OrderState
-    reason: str = Field(description="Why it was refused or given up; otherwise empty.")
+    reason: str = Field(description="Of the state; empty: none.")
+    text: str = Field(description="State and reason in words, as in logs and on the page.")
     ordered_s_ago: float
     changed_s_ago: float = Field(description="Seconds in this state.")
 
@@ -83,6 +84,7 @@ def _report(order: OrderRecord, now_s: float) -> OrderReport:
         height=int(order.goal.height),
         state=order.state,
         reason=order.reason,
+        text=order.state.in_words(order.reason),
         ordered_s_ago=round(max(0.0, now_s - order.ordered_s), 3),
         changed_s_ago=round(max(0.0, now_s - order.changed_s), 3),
     )

@@ -123,6 +123,7 @@ local bodies = { -- name, form, bytes
 -- end of packet types
 local outcomes = {
   [1] = "accepted", [2] = "refused", [3] = "arrived", [4] = "given up", [5] = "unknown",
+  [6] = "replaced",
 }
 
 local mesh = Proto("drone_mesh", "Drone mesh")

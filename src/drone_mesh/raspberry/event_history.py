@@ -15,7 +15,15 @@ EVENTS_KEPT = 500  # our choice: an hour of a mesh with frequent changes
 _ABOUT_GATEWAYS = frozenset(
     (MeshEventKind.CONNECTED, MeshEventKind.DISCONNECTED, MeshEventKind.GATEWAY_CHANGED)
 )
-_WITHOUT_LINE = frozenset((MeshEventKind.NO_ROUTE, MeshEventKind.FLIGHT_ORDERED))
+_WITHOUT_LINE = frozenset(  # what fails has a line of the order book
+    (
+        MeshEventKind.NO_ROUTE,
+        MeshEventKind.FLIGHT_ORDERED,
+        MeshEventKind.ORDER_REFUSED,
+        MeshEventKind.ORDER_LOST_CONTACT,
+        MeshEventKind.ORDER_GIVEN_UP,
+    )
+)
 
 _log = logging.getLogger(__name__)
 

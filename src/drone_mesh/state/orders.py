@@ -1,26 +1,95 @@
-"""The progress of each drone's latest order, derived from the events of the gateways."""
+"""The progress of orders to drones, derived from the events of the gateways.
+
+The gateways decide the state of an order (communication/orders/book.py). What they cannot know is
+added here, from the state of the mesh: how far the drone still has to fly, and what it did since.
+"""
 
 from __future__ import annotations
 
 import itertools
-from typing import Iterable
+import math
+from dataclasses import dataclass
+from typing import Iterable, Sequence
 
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderState
+from drone_mesh.communication.orders.book import EVENT_OF
+from drone_mesh.communication.orders.intake import ARRIVED_WITHIN_M
+from drone_mesh.drone.flight_path import CLIMB_ENDS_AT, SPEED_M_S
 from drone_mesh.drone.location import Location
-from drone_mesh.state.model import EventRecord
+from drone_mesh.state.model import EventRecord, NodeStatus, position_is_known
 
-_STATE_OF = {
-    MeshEventKind.ORDER_SENT.value: OrderState.ASKED,
-    MeshEventKind.ORDER_ACCEPTED.value: OrderState.UNDER_WAY,
-    MeshEventKind.ORDER_REFUSED.value: OrderState.REFUSED,
-    MeshEventKind.ORDER_ARRIVED.value: OrderState.ARRIVED,
-    MeshEventKind.ORDER_GIVEN_UP.value: OrderState.GIVEN_UP,
-    MeshEventKind.NO_ROUTE.value: OrderState.NO_ROUTE,
+_STATE_OF = {kind.value: state for state, kind in EVENT_OF.items()}
+_DEEDS = {  # of a drone, that explain why it is not where it was ordered to
+    MeshEventKind.FLIGHT_DECIDED.value: "flew to repair the mesh",
+    MeshEventKind.CRASHED.value: "crashed",
+    MeshEventKind.BATTERY_EMPTY.value: "its battery was empty",
+    MeshEventKind.POWER_OFF.value: "was switched off",
 }
 
 CLOCKS_DIFFER_S = 0.1  # simulated; our choice: between the process that orders and a gateway's
 BEING_SENT = "being sent"  # no gateway has reported the order yet
+_ACROSS_M_S = SPEED_M_S / (1.0 - 2.0 * CLIMB_ENDS_AT)  # over the ground
+_UPRIGHT_M_S = SPEED_M_S / (2.0 * CLIMB_ENDS_AT)  # half of the distance in a tenth of the time
+
+
+@dataclass
+class FollowedOrder:
+    """One order of one gateway."""
+
+    gateway: int
+    name: str  # such as: order 7 to x 1.00 m, y 2.00 m, z 3 m
+    state: OrderState
+    reason: str = ""
+    deeds: tuple[str, ...] = ()  # of its drone, since the state changed
+
+    @property
+    def goal(self) -> Location | None:
+        """Where the drone was ordered to."""
+        return Location.from_words(self.name)
+
+    def in_words(self, node: NodeStatus | None) -> str:
+        """The state, with the way that is left; `node`: its drone now, None: unknown."""
+        goal = self.goal
+        if self.state is OrderState.ACCEPTED and node is not None and goal is not None:
+            left = way_left(node, goal)
+            if left is not None:
+                return f"under way: {left[0]:.0f} m and {left[1]:.0f} s left"
+        return self.state.in_words(self.reason)
+
+    def since(self, node: NodeStatus) -> str:
+        """What the drone did since the state changed, as far as the state does not say it."""
+        goal, parts = self.goal, list(self.deeds)
+        if goal is None or not position_is_known(node):
+            return ", ".join(parts)
+        if len(node.path):
+            end = Location.from_vector(node.path[-3:])
+            if end.distance_m(goal) > ARRIVED_WITHIN_M:
+                parts.append(f"flies to {end.in_words()}")
+            elif self.state is not OrderState.ACCEPTED:
+                parts.append("flies there")
+        elif self.state in (OrderState.ACCEPTED, OrderState.ARRIVED, OrderState.LOST_CONTACT):
+            off_m = Location.from_vector(node.position).distance_m(goal)
+            if off_m > ARRIVED_WITHIN_M:
+                parts.append(f"is {off_m:.0f} m from there")
+        return ", ".join(parts)
+
+
+def way_left(node: NodeStatus, goal: Location) -> tuple[float, float] | None:
+    """Straight metres and about how many seconds a drone still flies to `goal`; None: it does not.
+
+    The seconds are those of a flight of a simulated drone (drone/flight_path.py).
+    """
+    if not len(node.path) or not position_is_known(node):
+        return None
+    if Location.from_vector(node.path[-3:]).distance_m(goal) > ARRIVED_WITHIN_M:
+        return None
+    corners = [node.position, *_triples(node.path)]
+    seconds = sum(
+        math.dist(one[:2], other[:2]) / _ACROSS_M_S + abs(other[2] - one[2]) / _UPRIGHT_M_S
+        for one, other in zip(corners, corners[1:])
+    )
+    return Location.from_vector(node.position).distance_m(goal), seconds
 
 
 class OrderProgress:
@@ -29,11 +98,15 @@ class OrderProgress:
     def __init__(self, drone: int, goal: Location, since_s: float) -> None:
         """Ignores events before `since_s` (simulated seconds), which belong to earlier orders."""
         self._drone = drone
-        self._sent = f"to {goal.in_words()}"
+        self._to = f" to {goal.in_words()}"
         self._since_s = since_s
-        self._orders: dict[tuple[int, str], OrderState] = {}  # by gateway and its order
-        self.state = OrderState.ASKED
-        self.reason = ""  # of the state
+        self._orders: dict[tuple[int, str], FollowedOrder] = {}  # by gateway and its order
+        self._latest = FollowedOrder(0, self._to, OrderState.SENT)
+
+    @property
+    def state(self) -> OrderState:
+        """Its state."""
+        return self._latest.state
 
     @property
     def was_sent(self) -> bool:
@@ -45,31 +118,31 @@ class OrderProgress:
         """Whether the drone has arrived, or no gateway's order is open any more."""
         return not self.state.is_open
 
+    def in_words(self, node: NodeStatus | None = None) -> str:
+        """Its state, with the way that is left if `node` is its drone now."""
+        return self._latest.in_words(node)
+
     def take(self, event: EventRecord) -> None:
         """Process a new event; events of other orders are ignored."""
-        state = _STATE_OF.get(event.kind)
-        if state is None or tuple(event.peers) != (self._drone,) or self.is_over:
+        order = _order_in(event)
+        if order is None or event.peers != (self._drone,) or self.is_over:
             return
-        order, _, words = event.detail.partition(": ")
-        key = event.node, order
-        if state is OrderState.ASKED and words == self._sent and event.stamp_s >= self._since_s:
-            self._orders.setdefault(key, state)
+        key = order.gateway, order.name
+        is_sent = order.state is OrderState.SENT
+        if is_sent and order.name.endswith(self._to) and event.stamp_s >= self._since_s:
+            self._orders.setdefault(key, order)
         elif key in self._orders:
-            self._orders[key] = state
-            self._conclude(state, words)
-
-    def _conclude(self, state: OrderState, reason: str) -> None:
-        """Update the outcome; `state` is that of the order that changed last."""
-        ended = not any(other.is_open for other in self._orders.values())
-        if state.is_open or state is OrderState.ARRIVED or ended:
-            self.state, self.reason = state, reason
+            self._orders[key] = order
+            ended = not any(other.state.is_open for other in self._orders.values())
+            if order.state.is_open or order.state is OrderState.ARRIVED or ended:
+                self._latest = order
 
 
 class OrderWatch:
     """Follows events and describes the progress of each drone's latest order."""
 
     def __init__(self) -> None:
-        self._latest: dict[int, tuple[int, str, str]] = {}  # drone -> gateway, order, words
+        self._latest: dict[int, FollowedOrder] = {}  # by drone
         self._tickets = itertools.count()
         self._expected: dict[int, int] = {}  # drone -> ticket of an order without an event so far
 
@@ -91,29 +164,51 @@ class OrderWatch:
     def take(self, events: Iterable[EventRecord]) -> None:
         """Process new events, oldest first. The end of an older order changes nothing."""
         for event in events:
-            state = _STATE_OF.get(event.kind)
-            order, _, reason = event.detail.partition(": ")
-            if state is None or len(event.peers) != 1 or not order:
-                continue
-            drone = event.peers[0]
-            gateway, latest, _ = self._latest.get(drone, (event.node, order, ""))
-            if gateway == event.node:
-                counts = order == latest or state in (OrderState.ASKED, OrderState.NO_ROUTE)
-            else:  # another gateway may have no route
-                counts = state is not OrderState.NO_ROUTE
-            if state in (OrderState.ASKED, OrderState.NO_ROUTE):
-                self._expected.pop(drone, None)
-            if counts:
-                words = f"{state.value}: {reason}" if reason else state.value
-                self._latest[drone] = event.node, order, words
+            if event.kind in _DEEDS and event.node in self._latest:
+                latest = self._latest[event.node]
+                latest.deeds = (*latest.deeds, _DEEDS[event.kind])[-2:]
+            order = _order_in(event)
+            if order is not None:
+                self._take(event.peers[0], order)
 
-    def words(self, drone: int) -> str:
-        """The progress of its latest order, as text; empty if there was none."""
+    def _take(self, drone: int, order: FollowedOrder) -> None:
+        latest = self._latest.get(drone, order)
+        is_new = order.state in (OrderState.SENT, OrderState.NO_ROUTE)
+        if latest.gateway == order.gateway:
+            counts = order.name == latest.name or is_new
+        else:  # another gateway may have no route
+            counts = order.state is not OrderState.NO_ROUTE
+        if is_new:
+            self._expected.pop(drone, None)
+        if counts:
+            self._latest[drone] = order
+
+    def words(self, drone: int, node: NodeStatus | None) -> str:
+        """Its latest order and the progress, as text; empty if there was none."""
         if drone in self._expected:
             return BEING_SENT
-        return self._latest[drone][2] if drone in self._latest else ""
+        latest = self._latest.get(drone)
+        return "" if latest is None else f"{latest.name}: {latest.in_words(node)}"
+
+    def since(self, node: NodeStatus) -> str:
+        """What the drone did since, beyond that progress, as text; empty: nothing."""
+        latest = None if node.id in self._expected else self._latest.get(node.id)
+        return "" if latest is None else latest.since(node)
 
     def forget(self) -> None:
         """Forget all orders: a new run has begun."""
         self._latest.clear()
         self._expected.clear()
+
+
+def _order_in(event: EventRecord) -> FollowedOrder | None:
+    """The order that a gateway's event is about; None: it is about something else."""
+    state = _STATE_OF.get(event.kind)
+    name, _, reason = event.detail.partition(": ")
+    if state is None or len(event.peers) != 1 or not name:
+        return None
+    return FollowedOrder(event.node, name, state, reason)
+
+
+def _triples(values: Sequence[float]) -> list[Sequence[float]]:
+    return [values[at : at + 3] for at in range(0, len(values), 3)]

@@ -141,7 +141,7 @@ class StandingOrders:
         if len(event.peers) != 1:
             return
         drone = event.peers[0]
-        _number, _, words = event.detail.partition(": ")
+        what, _, words = event.detail.partition(": ")
         for order in self._orders.values():
             part = order.parts.get(drone)
             is_older = event.stamp_s < order.given_s - CLOCKS_DIFFER_S
@@ -149,7 +149,7 @@ class StandingOrders:
                 continue
             if event.kind == MeshEventKind.ORDER_REFUSED.value:
                 part.state, part.reason = PartState.REFUSED, words
-            elif event.kind == MeshEventKind.ORDER_SENT.value and words != _sent_to(part.goal):
+            elif event.kind == MeshEventKind.ORDER_SENT.value and not what.endswith(_to(part.goal)):
                 part.state = PartState.REPLACED
 
     def update(self, mesh: MeshStatus) -> list[tuple[int, Location]]:
@@ -224,9 +224,9 @@ class StandingOrders:
             self._last_number = max(self._last_number, number)
 
 
-def _sent_to(goal: Location) -> str:
-    """What a gateway says of an order that it sends."""
-    return f"to {_as_ordered(goal).in_words()}"
+def _to(goal: Location) -> str:
+    """How a gateway names an order to this place."""
+    return f" to {_as_ordered(goal).in_words()}"
 
 
 def _as_ordered(goal: Location) -> Location:

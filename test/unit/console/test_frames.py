@@ -215,37 +215,37 @@ def test_nodes_at_one_position_come_with_their_slots():
 
 def test_the_latest_order_of_a_drone_is_shown_with_it():
     store = FrameStore()
-    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7")])
+    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7 to A")])
     store.update_mesh(mesh(), wall_s=0.0)
-    assert frame(store, 0)["nodes"]["1"]["order"] == "under way"
+    assert frame(store, 0)["nodes"]["1"]["order"] == "order 7 to A: accepted"
     assert frame(store, 0)["nodes"]["0"]["order"] == ""
 
 
 def test_the_end_of_an_earlier_order_is_not_shown_once_a_new_one_is_given():
     store = FrameStore()
-    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7")])
+    store.add_events([EventRecord(1.0, 0, "order accepted", (1,), "order 7 to A")])
     store.update_mesh(mesh(), wall_s=0.0)
     before = store.version
     ticket = store.expect_orders([1])
     assert frame(store, before)["nodes"] == {"1": {"order": "being sent"}}
-    store.add_events([EventRecord(2.0, 0, "order arrived", (1,), "order 7")])
+    store.add_events([EventRecord(2.0, 0, "order arrived", (1,), "order 7 to A")])
     store.update_mesh(mesh(), wall_s=1.0)
     assert frame(store, 0)["nodes"]["1"]["order"] == "being sent"
-    store.add_events([EventRecord(3.0, 0, "order sent", (1,), "order 8: to x")])
+    store.add_events([EventRecord(3.0, 0, "order sent", (1,), "order 8 to B")])
     store.update_mesh(mesh(), wall_s=2.0)
     store.forget_expected(ticket)
-    assert frame(store, 0)["nodes"]["1"]["order"] == "asked: to x"
+    assert frame(store, 0)["nodes"]["1"]["order"] == "order 8 to B: sent"
 
 
 def test_an_order_that_was_refused_leaves_the_earlier_one_as_it_was():
     store = FrameStore()
-    store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "order 7")])
+    store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "order 7 to A")])
     store.update_mesh(mesh(), wall_s=0.0)
     refused, newer = store.expect_orders([1]), store.expect_orders([1])
     store.forget_expected(refused)
     assert frame(store, 0)["nodes"]["1"]["order"] == "being sent"
     store.forget_expected(newer)
-    assert frame(store, 0)["nodes"]["1"]["order"] == "arrived"
+    assert frame(store, 0)["nodes"]["1"]["order"] == "order 7 to A: arrived"
 
 
 def test_a_node_says_which_messages_of_users_it_sent_and_received():

@@ -234,21 +234,21 @@ def test_a_new_order_of_a_page_hides_the_progress_of_the_one_before():
         def order() -> str:
             return json.loads(store.frame_since(0))["nodes"]["1"]["order"]
 
-        store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "order 7")])
+        store.add_events([EventRecord(1.0, 0, "order arrived", (1,), "order 7 to A")])
         store.update_mesh(MeshStatus(1.0, [NodeStatus(1)]), 0.0)
         page = FakePage(server).open()
         page.say(do="power", number=1, node=1, on=False)
         await until("an answer", lambda: page.of_type("answer"))
-        assert order() == "arrived"
+        assert order() == "order 7 to A: arrived"
         for number, request in enumerate(
             ({"do": "fly", "node": 1, "x": 2.0, "y": 3.0, "z": 0.0}, {"do": "layout", "case": 0}), 2
         ):
             page.say(number=number, **request)
             await until("an answer", lambda number=number: len(page.of_type("answer")) == number)
             assert order() == "being sent"
-            store.add_events([EventRecord(2.0, 0, "order sent", (1,), f"order {number + 6}: to x")])
+            store.add_events([EventRecord(2.0, 0, "order sent", (1,), f"order {number + 6} to B")])
             store.update_mesh(MeshStatus(2.0, [NodeStatus(1)]), 0.0)
-            assert order() == "asked: to x"
+            assert order() == f"order {number + 6} to B: sent"
 
     run(scenario)
 

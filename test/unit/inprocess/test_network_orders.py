@@ -32,7 +32,7 @@ def test_a_drone_three_hops_away_accepts_flies_far_and_arrives():
     network = line()
     assert network.order(3, 18.0, 6.0)
     network.run_for(0.5)
-    assert ends(network) == [(3, "under way", "")]
+    assert ends(network) == [(3, "accepted", "")]
     network.run_for(15.0)
     assert ends(network) == [(3, "arrived", "")]
 
@@ -59,11 +59,11 @@ def test_replies_and_reports_pass_a_shared_channel_and_the_seals_of_a_key(medium
     assert four.why_not_fly == "it stands on the ground"
 
 
-def test_a_drone_that_flew_out_of_reach_is_given_up():
+def test_contact_with_a_drone_that_flew_out_of_reach_is_lost():
     network = line()
     assert network.order(3, 400.0, 400.0)
     network.run_for(30.0 + 21 * 15.0)
-    assert ends(network) == [(3, "given up", "the drone fell silent")]
+    assert ends(network) == [(3, "lost contact", "at 0 s: it fell silent on its way")]
 
 
 def test_a_relay_that_dies_under_an_order_ends_it_without_a_route():
@@ -95,7 +95,7 @@ def test_on_a_lossy_medium_each_order_is_flown_once_and_its_end_is_known():
             ordered = [goal for goal in flown[drone] if goal == (2.0, 5.0 * drone, 0.0)]
             assert len(ordered) <= 1
             assert ordered or state != "arrived"
-    assert set(states) <= {"arrived", "no route", "given up"}
+    assert set(states) <= {"arrived", "no route", "lost contact", "given up"}
     assert states.count("arrived") >= 6
 
 

@@ -9,7 +9,7 @@ def test_an_order_is_followed_to_its_arrival_where_its_location_header_points(ma
     where = sent.headers["Location"]
     asked = mesh.client.get(where).json()
     assert asked["id"] == int(where.rpartition("/")[2])
-    assert (asked["drone"], asked["state"], asked["reason"]) == (3, "asked", "")
+    assert (asked["drone"], asked["state"], asked["reason"]) == (3, "sent", "")
     assert (asked["latitude"], asked["longitude"], asked["height"]) == (2.5, 17.5, 4)
     mesh.run_for(20.0)
     assert [(order.drone, order.state.value) for order in mesh.gateway.get_orders()] == [

@@ -25,7 +25,7 @@ def test_an_order_for_a_drone_without_a_route_is_answered_503_with_the_reason(me
     sent = mesh.sent()
     answer = mesh.client.post("/DroneMovement/99/2.5/17.5/4")
     assert answer.status_code == 503
-    reason = "the gateway has no route to drone 99, which stays where it is"
+    reason = "the gateway has no route to drone 99: the order was not sent"
     assert answer.json() == {"detail": reason}
     assert mesh.sent() == sent
 

@@ -80,8 +80,8 @@ def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
 def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
     orders = StandingOrders()
     orders.give(7, {4: NORTH}, now_s=10.0)
-    sent = "order 3: to x 0.00 m, y 6.00 m, z 1 m"
-    elsewhere = "order 4: to x 9.00 m, y 0.00 m, z 0 m"
+    sent = "order 3 to x 0.00 m, y 6.00 m, z 1 m"
+    elsewhere = "order 4 to x 9.00 m, y 0.00 m, z 0 m"
     orders.take(EventRecord(5.0, 0, "order sent", (4,), elsewhere))  # an older one
     orders.take(EventRecord(10.0, 0, "order sent", (4,), sent))
     assert words(orders) == ["0 of 1 at their place, 1 without a route: 4"]
@@ -92,7 +92,11 @@ def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
 def test_a_refusal_is_shown_with_its_reason_and_tried_again():
     orders = StandingOrders()
     orders.give(7, {4: EAST}, now_s=0.0)
-    orders.take(EventRecord(1.0, 0, "order refused", (4,), "order 3: battery at 9 %"))
+    orders.take(
+        EventRecord(
+            1.0, 0, "order refused", (4,), "order 3 to x 6.00 m, y 0.00 m, z 0 m: battery at 9 %"
+        )
+    )
     assert words(orders) == ["0 of 1 at their place, 4 refused: battery at 9 %"]
     assert orders.update(state(6.0, drone(4))) == [(4, EAST)]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass, field
-from typing import Callable
+from typing import Callable, Iterable
 
 from drone_mesh.communication.deadlines import Due
 from drone_mesh.communication.heartbeats.node_search import NUMBERS_PER_S, SEARCH_EVERY_S
@@ -31,20 +31,26 @@ MOST_QUERIES = 20  # our choice: without an answer: five minutes
 _log = logging.getLogger(__name__)
 
 
-_EVENTS = {
-    OrderState.ASKED: MeshEventKind.ORDER_SENT,
-    OrderState.UNDER_WAY: MeshEventKind.ORDER_ACCEPTED,
-    OrderState.NO_ROUTE: MeshEventKind.NO_ROUTE,
-    OrderState.REFUSED: MeshEventKind.ORDER_REFUSED,
+EVENT_OF = {
+    OrderState.SENT: MeshEventKind.ORDER_SENT,
+    OrderState.ACCEPTED: MeshEventKind.ORDER_ACCEPTED,
     OrderState.ARRIVED: MeshEventKind.ORDER_ARRIVED,
+    OrderState.REPLACED: MeshEventKind.ORDER_REPLACED,
+    OrderState.REFUSED: MeshEventKind.ORDER_REFUSED,
+    OrderState.NO_ROUTE: MeshEventKind.NO_ROUTE,
+    OrderState.LOST_CONTACT: MeshEventKind.ORDER_LOST_CONTACT,
     OrderState.GIVEN_UP: MeshEventKind.ORDER_GIVEN_UP,
 }
+_FAILURES = (
+    OrderState.REFUSED, OrderState.NO_ROUTE, OrderState.LOST_CONTACT, OrderState.GIVEN_UP,
+)  # fmt: skip
 _STATE_AFTER = {
-    OrderOutcome.ACCEPTED: OrderState.UNDER_WAY,
+    OrderOutcome.ACCEPTED: OrderState.ACCEPTED,
     OrderOutcome.REFUSED: OrderState.REFUSED,
     OrderOutcome.ARRIVED: OrderState.ARRIVED,
     OrderOutcome.GIVEN_UP: OrderState.GIVEN_UP,
     OrderOutcome.UNKNOWN: OrderState.GIVEN_UP,
+    OrderOutcome.REPLACED: OrderState.REPLACED,
 }
 
 
@@ -54,13 +60,14 @@ class _Order:
     drone: int
     goal: Location
     ordered_s: float
-    state: OrderState = OrderState.ASKED
+    state: OrderState = OrderState.SENT
     reason: str = ""
     changed_s: float = 0.0
     due_s: float = math.inf  # next repeat or query
     searches: int = 0  # number of searches for the drone without a route
     seeking: bool = False  # a search for it is running or about to start
     unanswered: int = 0  # packets since the drone's last reply about it
+    heard_s: float = 0.0  # when the drone last reported about it, or when it was ordered
     settled: bool = False  # the drone itself has reported the outcome
     reason_parts: TextAssembly = field(default_factory=TextAssembly)
 
@@ -97,12 +104,10 @@ class OrderBook:
         ]
 
     def enter(self, drone: int, goal: Location) -> int:
-        """Record a new order; returns its number. It ends an older order for that drone."""
+        """Record a new order; returns its number."""
         now_s = self._parts.now_s
-        for other in self._open_for(drone):
-            self._move(other, OrderState.GIVEN_UP, "another order followed")
         number = self._next_number()
-        self._orders[number] = _Order(number, drone, goal, now_s, changed_s=now_s)
+        self._orders[number] = _Order(number, drone, goal, now_s, changed_s=now_s, heard_s=now_s)
         self._forget_old()
         return number
 
@@ -115,17 +120,19 @@ class OrderBook:
         if self._parts.delivery.send_own(self._packet(order)):
             self._wait(order, self._stretched(REPEAT_AFTER_S[0]))
         elif not self._seek(order):
-            self._no_route(order)
+            self._move(order, OrderState.NO_ROUTE)
             return False
+        # Not of one that the drone has accepted: it flies there until it has the new one.
+        self._replace(order, [o for o in self._open_for(order.drone) if o.state is OrderState.SENT])
         self._report(order)
         return True
 
     def on_missing(self, drone: int) -> None:
         """A relay reports that it has no route to this drone."""
         for order in self._open_for(drone):
-            waits = order.state is not OrderState.ASKED or order.seeking
+            waits = order.state is not OrderState.SENT or order.seeking
             if not waits and not self._seek(order):
-                self._no_route(order)
+                self._move(order, OrderState.NO_ROUTE)
 
     def on_found(self, drone: int) -> None:
         """A drone answered the search, along a working path."""
@@ -161,10 +168,12 @@ class OrderBook:
         order = self._orders.get(number)
         if order is None or order.settled:
             return
-        order.unanswered = 0
+        order.unanswered, order.heard_s = 0, self._parts.now_s
         if outcome is OrderOutcome.UNKNOWN:
             reason = "the drone no longer knows this order"
         order.settled = outcome is not OrderOutcome.ACCEPTED
+        if outcome in (OrderOutcome.ACCEPTED, OrderOutcome.ARRIVED):
+            self._replace(order, self._older(order), for_good=True)
         self._move(order, _STATE_AFTER[outcome], reason)
         is_own = order.drone == self._parts.node_id
         self._wait(order, math.inf if order.settled or is_own else self._stretched(QUERY_PERIOD_S))
@@ -181,19 +190,19 @@ class OrderBook:
         order.due_s = math.inf
         if order.seeking:
             if not self._seek(order):
-                self._no_route(order)
+                self._move(order, OrderState.NO_ROUTE)
             return
         order.unanswered += 1
-        if order.state is OrderState.ASKED:
+        if order.state is OrderState.SENT:
             if order.unanswered >= len(REPEAT_AFTER_S):
-                self._move(order, OrderState.GIVEN_UP, "the drone did not reply")
+                self._lost(order, "it did not reply")
                 return
             self._send_if_routed(order, self._packet(order))
             again_s = self._stretched(REPEAT_AFTER_S[order.unanswered])
             order.due_s = self._parts.now_s + again_s
-        elif order.state is OrderState.UNDER_WAY:
+        elif order.state is OrderState.ACCEPTED:
             if order.unanswered > MOST_QUERIES:
-                self._move(order, OrderState.GIVEN_UP, "the drone fell silent")
+                self._lost(order, "it fell silent on its way")
                 return
             query = OrderQuery.packet(order.number, self._parts.node_id, order.drone)
             self._send_if_routed(order, query)
@@ -210,13 +219,26 @@ class OrderBook:
         packet = GoToLocationMessage(me, me, to, to, latitude, longitude, int(height)).to_payload()
         return with_order_number(packet, order.number)
 
-    def _no_route(self, order: _Order) -> None:
-        _log.warning(
-            "gateway %d: no route to drone %d: it stays where it is",
-            self._parts.node_id,
-            order.drone,
-        )
-        self._move(order, OrderState.NO_ROUTE)
+    def _lost(self, order: _Order, why: str) -> None:
+        self._move(order, OrderState.LOST_CONTACT, f"at {order.heard_s:.0f} s: {why}")
+
+    def _replace(self, order: _Order, older: Iterable[_Order], for_good: bool = False) -> None:
+        """These orders for its drone end; `for_good`: whatever the drone still says of them."""
+        for other in older:
+            if other is not order:
+                other.settled = for_good
+                self._move(other, OrderState.REPLACED, f"by order {order.number}")
+
+    def _older(self, order: _Order) -> list[_Order]:
+        """The orders for its drone before it whose end the drone has not reported."""
+        numbers = list(self._orders)
+        before = (self._orders[number] for number in numbers[: numbers.index(order.number)])
+        return [
+            other
+            for other in before
+            if other.drone == order.drone
+            and not (other.settled or other.state is OrderState.NO_ROUTE)
+        ]
 
     def _move(self, order: _Order, state: OrderState, reason: str = "") -> None:
         if state is order.state:
@@ -227,12 +249,13 @@ class OrderBook:
         self._report(order)
 
     def _report(self, order: _Order) -> None:
-        words = f"order {order.number}"
-        if order.state is OrderState.ASKED:
-            words += f": to {order.goal.in_words()}"
-        elif order.reason:
-            words += f": {order.reason}"
-        self._parts.report(_EVENTS[order.state], order.drone, words)
+        what = f"order {order.number} to {order.goal.in_words()}"
+        if order.state in _FAILURES:
+            words = order.state.in_words(order.reason)
+            me = self._parts.node_id
+            _log.warning("gateway %d: drone %d, %s: %s", me, order.drone, what, words)
+        detail = f"{what}: {order.reason}" if order.reason else what
+        self._parts.report(EVENT_OF[order.state], order.drone, detail)
 
     def _wait(self, order: _Order, seconds: float) -> None:
         order.due_s = self._parts.now_s + seconds

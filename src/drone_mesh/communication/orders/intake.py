@@ -79,7 +79,7 @@ class OrderIntake:
             raise
         for other in self._under_way():
             if other.goal != goal:
-                self._reply(other, OrderOutcome.GIVEN_UP, "another order came")
+                self._reply(other, OrderOutcome.REPLACED, _by(order, other.gateway))
         self._reply(order, OrderOutcome.ACCEPTED)
         if starts:
             self._parts.report(MeshEventKind.FLIGHT_ORDERED, gateway, f"to {goal.in_words()}")
@@ -176,6 +176,14 @@ class OrderIntake:
             parts.deadlines.set(
                 Due.ORDER_REPLIES, parts.now_s + parts.antenna.medium.stretched(REPLY_AGAIN_S)
             )
+
+
+def _by(order: _KnownOrder, gateway: int) -> str:
+    """The order that came, in words for this gateway."""
+    if not order.number:
+        return "by an order without a number"
+    where = "" if order.gateway == gateway else f" of gateway {order.gateway}"
+    return f"by order {order.number}{where}"
 
 
 _NOWHERE = Location(math.nan, math.nan, math.nan)

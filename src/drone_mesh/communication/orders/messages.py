@@ -26,6 +26,7 @@ class OrderOutcome(enum.IntEnum):
     ARRIVED = 3  # it is there
     GIVEN_UP = 4  # the flight ended elsewhere; with the reason
     UNKNOWN = 5  # answer to a query: it knows no such order (any more)
+    REPLACED = 6  # it flies elsewhere; with the order that came
 
 
 @dataclass(frozen=True)

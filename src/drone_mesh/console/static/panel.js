@@ -45,6 +45,7 @@ export class NodePanel {
     const facts = [
       ...(node.repair ? [["Repair", node.repair, { wide: true }]] : []),
       ...(node.order ? [["Latest order", node.order, { wide: true }]] : []),
+      ...(node.since ? [["Since then", node.since, { wide: true }]] : []),
       [node.condition === "connected" ? "Gateway" : "Last gateway", orDash(node.gateway)],
       ["Hops", orDash(node.hops)],
       [

@@ -98,10 +98,11 @@ class DroneManager:
         if not self._gateway_is_there():
             _log.warning("drone %d: order dropped: no gateway is running", request.ID)
             return RequestDroneFlightResponse(status=0)
-        self._standing.replace(request.ID)
         _sent, no_route = self._order([Order(request.ID, goal)], fleet)
         if no_route:
             _log.warning("drone %d: no gateway has a route to it", request.ID)
+        else:
+            self._standing.replace(request.ID)
         return RequestDroneFlightResponse(status=2 if no_route else 1)
 
     def _set_to_casus(self, request: CasusRequest) -> CasusResponse:

@@ -24,13 +24,16 @@ from drone_mesh.msg import (
 )
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import prepare_node
-from drone_mesh.ros.graph.conversions import event_record, location_of, whole_metres
+from drone_mesh.ros.graph.conversions import event_record, location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import NO_ANSWER, MasterWatch
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
-from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
-from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
+from drone_mesh.ros.services.flight_request import (
+    FlightNotOrdered,
+    FlightRefused,
+    request_flight,
+)
 from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
 POLL_PERIOD_S = 1.0  # wall; our choice: how often the drones are compared with the actions
@@ -43,11 +46,9 @@ _OUTCOMES = {
     OrderState.REFUSED: FlyResult.REFUSED,
     OrderState.NO_ROUTE: FlyResult.NO_ROUTE,
     OrderState.GIVEN_UP: FlyResult.GIVEN_UP,
+    OrderState.REPLACED: FlyResult.REPLACED,
+    OrderState.LOST_CONTACT: FlyResult.LOST_CONTACT,
 }
-
-
-class _Refused(Exception):
-    """An order was not sent; the arguments are outcome and reason."""
 
 
 class _Flight:
@@ -159,10 +160,11 @@ class FlyActions:
     def _begin(self, drone: int, handle: actionlib.ServerGoalHandle) -> None:
         flight = _Flight(handle, drone, rospy.get_time() - CLOCKS_DIFFER_S)
         try:
-            _order(drone, flight.goal)
-        except _Refused as refusal:
-            outcome, why = refusal.args
-            handle.set_rejected(FlyResult(outcome, why), why)
+            request_flight(drone, flight.goal)
+        except FlightNotOrdered as error:
+            refused = isinstance(error, FlightRefused)
+            outcome = FlyResult.REFUSED if refused else FlyResult.NO_ROUTE
+            handle.set_rejected(FlyResult(outcome, str(error)), str(error))
             return
         handle.set_accepted()
         self._flights.append(flight)
@@ -178,12 +180,12 @@ class FlyActions:
         node = self._nodes.get(flight.drone)
         try:
             if node is None or not math.isfinite(node.position[0]):
-                raise _Refused(FlyResult.GIVEN_UP, "its place is not known")
+                raise FlightNotOrdered("its place is not known")
             x, y, z = node.position
-            _order(flight.drone, Location.from_vector((x, y, max(0.0, z))))
+            request_flight(flight.drone, Location.from_vector((x, y, max(0.0, z))))
             why = f"ordered to stop at x {x:.1f} m, y {y:.1f} m, z {max(0.0, z):.0f} m"
-        except _Refused as refusal:
-            why = f"the drone continues its flight: {refusal.args[1]}"
+        except FlightNotOrdered as error:
+            why = f"the drone continues its flight: {error}"
         self._forget(flight)
         handle.set_canceled(FlyResult(FlyResult.CANCELLED, why), why)
 
@@ -192,8 +194,9 @@ class FlyActions:
         for flight in list(self._flights):
             flight.progress.take(record)
             if flight.progress.is_over:
-                state, reason = flight.progress.state, flight.progress.reason
-                self._end(flight, _OUTCOMES[state], reason)
+                arrived = flight.progress.state is OrderState.ARRIVED
+                words = "" if arrived else flight.progress.in_words()
+                self._end(flight, _OUTCOMES[flight.progress.state], words)
 
     def _take_state(self, state: MeshState) -> None:
         self._nodes = {node.id: node for node in state.nodes}
@@ -202,8 +205,8 @@ class FlyActions:
             if node is not None:
                 x, y, z = node.position
                 left_m = Location.from_vector(node.position).distance_m(flight.goal)
-                word = flight.progress.state.value
-                flight.handle.publish_feedback(FlyFeedback(word, y, x, z, left_m))
+                words = flight.progress.in_words(node)
+                flight.handle.publish_feedback(FlyFeedback(words, y, x, z, left_m))
 
     def _end(self, flight: _Flight, outcome: int, why: str) -> None:
         self._forget(flight)
@@ -218,23 +221,6 @@ class FlyActions:
         if not self._flights and self._states is not None:
             self._states.unregister()
             self._states, self._nodes = None, {}
-
-
-def _order(drone: int, goal: Location) -> None:
-    """Order a drone through the DroneManager, as users do. Raises _Refused."""
-    request = RequestDroneFlightRequest(
-        drone, goal.latitude, goal.longitude, whole_metres(goal.height)
-    )
-    try:
-        status = call_once(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request).status
-    except ServiceGone:
-        raise _Refused(FlyResult.NO_ROUTE, "the DroneManager does not answer") from None
-    except ServiceRefused as error:
-        raise _Refused(FlyResult.REFUSED, str(error)) from None
-    if status == 0:
-        raise _Refused(FlyResult.NO_ROUTE, "no gateway is running")
-    if status == 2:
-        raise _Refused(FlyResult.NO_ROUTE, f"no gateway has a route to drone {drone}")
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ import logging
 from typing import Sequence
 
 from drone_mesh.console.controls import OrderRefused
+from drone_mesh.drone.location import Location as Place
 from drone_mesh.missions import Mission
 from drone_mesh.msg import Location
 from drone_mesh.ros.graph import names
@@ -18,6 +19,7 @@ from drone_mesh.ros.graph.persistent_service import (
     ServiceRefused,
     call_once,
 )
+from drone_mesh.ros.services.flight_request import FlightNotOrdered, request_flight
 from drone_mesh.srv import (
     AddDrone,
     AddDroneRequest,
@@ -29,8 +31,6 @@ from drone_mesh.srv import (
     PowerSwitchRequest,
     RemoveDrone,
     RemoveDroneRequest,
-    RequestDroneFlight,
-    RequestDroneFlightRequest,
     SetSpeed,
     SetSpeedRequest,
 )
@@ -48,12 +48,10 @@ class RosControls:
 
     def fly(self, node: int, x: float, y: float, z: float) -> str:
         """Order a drone to a place, through the mesh."""
-        request = RequestDroneFlightRequest(ID=node, latitude=y, longitude=x, height=round(z))
-        answer = _call(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request)
-        if answer.status == 0:
-            raise OrderRefused("no gateway is running to take the order")
-        if answer.status == 2:
-            raise OrderRefused(f"no gateway has a route to drone {node}")
+        try:
+            request_flight(node, Place(latitude=y, longitude=x, height=z))
+        except FlightNotOrdered as error:
+            raise OrderRefused(str(error)) from error
         return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
 
     def layout(self, case: int) -> str:

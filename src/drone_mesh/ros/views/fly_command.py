@@ -19,8 +19,7 @@ from drone_mesh.msg import MeshEvent, MeshState
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
 from drone_mesh.ros.graph.conversions import event_record
-from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
-from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
+from drone_mesh.ros.services.flight_request import request_flight
 from drone_mesh.state.orders import CLOCKS_DIFFER_S, OrderProgress
 
 SHOW_EVERY_S = 2.0  # simulated; our choice
@@ -65,9 +64,9 @@ def _run(drone: int, goal: Location) -> int:
     rospy.Subscriber(names.EVENTS_TOPIC, MeshEvent, heard.put)
     rospy.Subscriber(names.STATE_TOPIC, MeshState, heard.put, queue_size=1)
     since_s = _first_state_s(heard) - CLOCKS_DIFFER_S
-    _order(drone, goal)
+    request_flight(drone, goal)
     try:
-        return _follow(heard, OrderProgress(drone, goal, since_s), drone, goal)
+        return _follow(heard, OrderProgress(drone, goal, since_s), drone)
     except KeyboardInterrupt:
         print(f"drone {drone} flies on", file=sys.stderr)
         raise
@@ -84,28 +83,9 @@ def _first_state_s(heard: queue.Queue[MeshEvent | MeshState]) -> float:
             return message.header.stamp.to_sec()
 
 
-def _order(drone: int, goal: Location) -> None:
-    request = RequestDroneFlightRequest(drone, goal.latitude, goal.longitude, int(goal.height))
-    try:
-        status = call_once(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request).status
-    except ServiceGone as error:
-        raise MeshError(f"{error}: is the simulation running?") from None
-    except ServiceRefused as error:
-        raise MeshError(str(error)) from None
-    if status == 0:
-        raise MeshError("no gateway is running")
-    if status == 2:
-        raise MeshError(f"no gateway has a route to drone {drone}")
-
-
-def _follow(
-    heard: queue.Queue[MeshEvent | MeshState],
-    progress: OrderProgress,
-    drone: int,
-    goal: Location,
-) -> int:
+def _follow(heard: queue.Queue[MeshEvent | MeshState], progress: OrderProgress, drone: int) -> int:
     """Print the progress until the order is over; returns the exit code."""
-    shown_s, shown = -math.inf, OrderState.ASKED
+    shown_s, shown = -math.inf, OrderState.SENT
     while not progress.is_over:
         try:
             message = heard.get(timeout=1.0)  # or else Ctrl-C would wait for a message
@@ -119,9 +99,6 @@ def _follow(
             shown_s, shown = now_s, progress.state
             for node in message.nodes:
                 if node.id == drone:
-                    left_m = Location.from_vector(node.position).distance_m(goal)
-                    print(f"{shown.value}: {left_m:.1f} m left", flush=True)
-    arrived = progress.state is OrderState.ARRIVED
-    reason = f": {progress.reason}" if progress.reason and not arrived else ""
-    print(f"{progress.state.value}{reason}")
-    return 0 if arrived else 1
+                    print(progress.in_words(node), flush=True)
+    print(progress.in_words())
+    return 0 if progress.state is OrderState.ARRIVED else 1

@@ -75,9 +75,9 @@ def test_searches_do_not_count_as_orders_without_a_reply():
     assert len(rig.sent(ORDER)) == 1
     rig.wait(29.0)
     assert len(rig.sent(ORDER)) == 3
-    assert "ORDER_GIVEN_UP" not in rig.kinds()
+    assert "ORDER_LOST_CONTACT" not in rig.kinds()
     rig.wait(2.0)
-    assert "ORDER_GIVEN_UP" in rig.kinds()
+    assert "ORDER_LOST_CONTACT" in rig.kinds()
 
 
 def test_a_drone_whose_path_breaks_again_is_searched_for_three_times():

@@ -171,12 +171,26 @@ def test_the_number_of_a_restarted_gateway_with_another_goal_is_a_new_order():
     assert rig.engine.goals == [Location(1.0, 0.0, 0.0), Location(2.0, 0.0, 0.0)]
 
 
-def test_an_order_that_another_one_replaces_is_given_up():
+def test_an_order_that_another_one_replaces_says_by_which():
     rig = drone_rig()
     rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00", f"00 00 06 01 01 {TO_Y_2} 08 00")
     said = replies(rig)
-    assert [(number, outcome) for number, outcome, _ in said] == [(7, 1), (7, 4), (7, 4), (8, 1)]
-    assert "".join(text for _, _, text in said) == "another order came"
+    assert [(number, outcome) for number, outcome, _ in said] == [(7, 1), (7, 6), (8, 1)]
+    assert "".join(text for _, _, text in said) == "by order 8"
+
+
+def test_an_order_of_another_gateway_or_without_a_number_is_named_as_such():
+    rig = drone_rig()
+    rig.know_neighbour(9)
+    rig.hear(f"00 00 06 01 01 {TO_Y_1} 07 00", f"09 09 06 01 01 {TO_Y_2} 02 00")
+    assert "".join(text for _, outcome, text in replies(rig) if outcome == 6) == (
+        "by order 2 of gateway 9"
+    )
+    rig.forget()
+    rig.hear(f"00 00 06 01 01 {TO_Y_1}")
+    assert "".join(text for _, outcome, text in replies(rig) if outcome == 6) == (
+        "by an order without a number"
+    )
 
 
 def test_a_refused_order_does_not_end_the_flight_that_is_under_way():
@@ -239,15 +253,15 @@ def told(rig):
 
 def test_a_gateway_follows_an_order_from_the_request_to_the_arrival():
     rig = gateway_rig()
-    assert state(rig) == (OrderState.ASKED, "")
+    assert state(rig) == (OrderState.SENT, "")
     rig.hear("05 05 40 00 00 01 00 01")
-    assert state(rig) == (OrderState.UNDER_WAY, "")
+    assert state(rig) == (OrderState.ACCEPTED, "")
     rig.hear("05 05 40 00 00 01 00 03")
     assert state(rig) == (OrderState.ARRIVED, "")
     assert told(rig) == [
-        ("order sent", 5, "order 1: to x 0.00 m, y 1.00 m, z 0 m"),
-        ("order accepted", 5, "order 1"),
-        ("order arrived", 5, "order 1"),
+        ("order sent", 5, "order 1 to x 0.00 m, y 1.00 m, z 0 m"),
+        ("order accepted", 5, "order 1 to x 0.00 m, y 1.00 m, z 0 m"),
+        ("order arrived", 5, "order 1 to x 0.00 m, y 1.00 m, z 0 m"),
     ]
     rig.forget()
     rig.wait(100.0)
@@ -259,12 +273,12 @@ def test_a_refusal_is_put_together_from_its_parts_in_any_order():
     rig = gateway_rig()
     parts = [b"battery at", b" 9 %"]
     for part in (1, 0):
-        assert state(rig)[0] is OrderState.ASKED
+        assert state(rig)[0] is OrderState.SENT
         rig.hear(f"05 05 40 00 00 01 00 02 {0x10 + part:02x} {parts[part].hex()}")
     assert state(rig) == (OrderState.REFUSED, "battery at 9 %")
 
 
-def test_an_order_without_a_reply_is_repeated_four_times_and_then_given_up():
+def test_an_order_without_a_reply_is_repeated_and_then_contact_is_lost():
     rig = gateway_rig()
     first = rig.sent(6)
     times = []
@@ -274,26 +288,26 @@ def test_an_order_without_a_reply_is_repeated_four_times_and_then_given_up():
         assert all(one == first[0] for one in repeated)
         times += [round(rig.now_s)] * len(repeated)
     assert times == [2, 6, 14]
-    assert state(rig) == (OrderState.GIVEN_UP, "the drone did not reply")
+    assert state(rig) == (OrderState.LOST_CONTACT, "at 0 s: it did not reply")
 
 
-def test_a_late_reply_counts_although_the_gateway_had_given_up():
+def test_a_late_reply_of_a_drone_counts_although_contact_was_lost():
     rig = gateway_rig()
     rig.wait(60.0)
-    assert state(rig)[0] is OrderState.GIVEN_UP
+    assert state(rig)[0] is OrderState.LOST_CONTACT
     rig.hear("05 05 40 00 00 01 00 03")
     assert state(rig) == (OrderState.ARRIVED, "")
 
 
-def test_a_drone_that_falls_silent_is_asked_and_given_up_after_five_minutes():
+def test_contact_with_a_drone_that_falls_silent_is_lost_after_five_minutes_of_queries():
     rig = gateway_rig()
     rig.hear("05 05 40 00 00 01 00 01")
     rig.forget()
     rig.wait(299.0)
     assert rig.sent(65) == [packet("00 00 41 05 05 01 00")] * 19
-    assert state(rig)[0] is OrderState.UNDER_WAY
+    assert state(rig)[0] is OrderState.ACCEPTED
     rig.wait(20.0)
-    assert state(rig) == (OrderState.GIVEN_UP, "the drone fell silent")
+    assert state(rig) == (OrderState.LOST_CONTACT, "at 0 s: it fell silent on its way")
 
 
 def test_a_drone_that_was_restarted_does_not_know_its_order():
@@ -321,7 +335,34 @@ def test_a_second_order_for_a_drone_ends_the_repeats_of_the_first():
     rig.wait(30.0)
     assert {p[15] for p in rig.sent(6)} == {2}
     first, _second = rig.mesh.get_orders()
-    assert (first.state, first.reason) == (OrderState.GIVEN_UP, "another order followed")
+    assert (first.state, first.reason) == (OrderState.REPLACED, "by order 2")
+
+
+def states(rig):
+    return [order.state.in_words(order.reason) for order in rig.mesh.get_orders()]
+
+
+def test_the_first_order_is_followed_until_the_drone_has_the_second():
+    rig = gateway_rig()
+    rig.hear("05 05 40 00 00 01 00 01")
+    assert rig.mesh.send_goal_request_to_drone(5, 2.0, 0.0, 0, rig.now_s)
+    assert states(rig) == ["accepted", "sent"]
+    rig.hear("05 05 40 00 00 02 00 01")
+    assert states(rig) == ["replaced by order 2", "accepted"]
+    rig.hear("05 05 40 00 00 01 00 03")  # a late reply
+    assert states(rig) == ["replaced by order 2", "accepted"]
+
+
+def test_an_order_that_cannot_be_sent_leaves_the_one_before_as_it_was(caplog):
+    rig = gateway_rig()
+    rig.hear("05 05 40 00 00 01 00 01")
+    rig.antenna.dead = {5}
+    assert not rig.mesh.send_goal_request_to_drone(5, 2.0, 0.0, 0, rig.now_s)
+    assert states(rig) == ["accepted", "no route"]
+    assert "drone 5, order 2 to x 0.00 m, y 2.00 m, z 0 m: no route" in caplog.text
+    rig.antenna.dead = set()
+    rig.hear("05 05 40 00 00 01 00 03")
+    assert states(rig) == ["arrived", "no route"]
 
 
 @pytest.mark.parametrize(
@@ -338,13 +379,13 @@ def test_a_reply_that_does_not_fit_changes_nothing(reply):
     rig = gateway_rig()
     rig.know_neighbour(6)
     rig.hear(reply)
-    assert state(rig) == (OrderState.ASKED, "")
+    assert state(rig) == (OrderState.SENT, "")
 
 
 def test_the_gateways_own_drone_is_followed_too():
     rig = Rig(node_id=0, gateway=True)
     assert rig.mesh.send_goal_request_to_drone(0, 1.0, 0.0, 0, rig.now_s)
-    assert state(rig) == (OrderState.UNDER_WAY, "")
+    assert state(rig) == (OrderState.ACCEPTED, "")
     rig.engine.place = Location(1.0, 0.0, 0.0)
     rig.wait(1.1)
     assert state(rig) == (OrderState.ARRIVED, "")
