@@ -100,6 +100,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.assertFalse(call("/DroneManager/withdrawLayout", WithdrawLayout, number).success)
 
     def test_5_the_commands_show_progress_and_withdraw_on_ctrl_c(self) -> None:
+        self.mesh.wait("1 and 2 connected", 60, lambda: self.mesh.connected((1, 2)))
         flight = run("fly", "1", "-1.5", "2", "0")
         self.assertEqual(flight.returncode, 0, flight.stdout + flight.stderr)
         self.assertRegex(flight.stdout, r"under way: \d+\.\d m left\n(.*\n)*arrived\n")
