@@ -1,4 +1,4 @@
-"""Python imports this at its start: `scripts/test rostest --coverage` puts its folder in PYTHONPATH."""
+"""Python imports this at its start, with `scripts/test rostest --coverage`."""
 
 try:
     import coverage

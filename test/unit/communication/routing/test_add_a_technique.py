@@ -72,7 +72,7 @@ def test_a_technique_given_by_its_path_carries_a_mesh_its_orders_and_the_death_o
     assert network.run_until(lambda: network.nodes[11].drone.path is not None, within_s=10.0)
     network.run_for(60.0)
     network.power(1, False)  # the others keep paths over the second row of the grid
-    assert network.run_until(lambda: not technique.get_direction_to_node(1) == 1, within_s=60.0)
+    assert network.run_until(lambda: technique.get_direction_to_node(1) != 1, within_s=60.0)
     left = [node for node in range(2, 12) if node in network.shortest_hops()]
     assert len(left) == 10
     assert network.run_until(lambda: all(map(network.connected, left)), within_s=60.0)
