@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import http.client
 import inspect
 import os
+import socket
 import sys
+import xmlrpc.client
 from pathlib import Path
 from typing import Callable
 
@@ -13,13 +16,19 @@ import rosgraph
 import rospy
 
 from drone_mesh.errors import MeshError
+from drone_mesh.ros.graph import names
 from drone_mesh.stopping import quiet_on_closed_pipe
 
+ANSWER_TIMEOUT_S = 5.0  # wall; our choice: a node that is silent for longer is dead
 FAILED = 2  # exit code: the tool could not do its work; 1 means that it did, with a bad result
 
 
 class NoMaster(MeshError):
     """No ROS master answers."""
+
+
+class NameTaken(MeshError):
+    """A node of this name runs already, and would be ended by a second one."""
 
 
 def require_master() -> None:
@@ -35,14 +44,47 @@ def require_master() -> None:
 def join_graph(name: str) -> None:
     """Register as an anonymous node without rospy's signal handlers. Raises NoMaster."""
     require_master()
-    rospy.init_node(name, anonymous=True, disable_signals=True, disable_rosout=True)
+    _init_node(name, anonymous=True, disable_signals=True, disable_rosout=True)
 
 
-def prepare_node(about: str | None) -> None:
-    """Answer --help; exit with one line on unknown arguments, or when there is no master.
+def _init_node(
+    name: str, *, disable_signals: bool, anonymous: bool = False, disable_rosout: bool = False
+) -> None:
+    """Register; time comes from the clock of the node's namespace."""
+    rospy.init_node(
+        name,
+        argv=[*sys.argv, names.CLOCK_IN_NAMESPACE],
+        anonymous=anonymous,
+        disable_signals=disable_signals,
+        disable_rosout=disable_rosout,
+    )
 
-    Call this before the node registers: registering ends a running node of the same name. `about`
-    describes the node.
+
+def _require_free_name(name: str) -> None:
+    """Raises NameTaken: the master would end the node that has this name."""
+    given = [word[len("__name:=") :] for word in sys.argv if word.startswith("__name:=")]
+    full = rospy.resolve_name(given[-1] if given else name)
+    before_s = socket.getdefaulttimeout()
+    socket.setdefaulttimeout(ANSWER_TIMEOUT_S)
+    try:
+        uri = rosgraph.Master(full).lookupNode(full)
+        is_taken = xmlrpc.client.ServerProxy(uri).getName(full)[2] == full
+    except (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException):
+        return  # it never ran, or it died
+    finally:
+        socket.setdefaulttimeout(before_s)
+    if is_taken:
+        raise NameTaken(
+            f"{full} already runs on this master: stop it, give this one a namespace "
+            "(namespace:=site_a for factory.launch, __ns:=site_a for rosrun), or set "
+            "ROS_MASTER_URI to another master"
+        )
+
+
+def start_node(about: str | None, name: str, *, disable_signals: bool = False) -> None:
+    """Register as a node; answer --help instead, which `about` is for.
+
+    Exits with one line on unknown arguments, without a master, and if a node of this name runs.
     """
     program = Path(sys.argv[0]).name
     argparse.ArgumentParser(
@@ -53,9 +95,11 @@ def prepare_node(about: str | None) -> None:
     ).parse_args(rospy.myargv()[1:])
     try:
         require_master()
-    except NoMaster as error:
+        _require_free_name(name)
+    except MeshError as error:
         print(f"{program}: {error}", file=sys.stderr)
         sys.exit(FAILED)
+    _init_node(name, disable_signals=disable_signals)
 
 
 def run_tool(name: str, work: Callable[[], int]) -> None:

@@ -1,55 +1,61 @@
-"""Names in the ROS graph: those of docs/ros.md, "ROS interface", and our additions."""
+"""Names in the ROS graph: those of docs/ros.md, "ROS interface", and our additions.
+
+They are relative, so that a whole simulation lives in the namespace of its nodes. Comments and
+docstrings write them as they are without a namespace: /mesh/state.
+"""
 
 from __future__ import annotations
 
-SIGNAL_TOPIC = "/WirelessSignalSimulator"  # DroneInfo: every engine and antenna -> simulator
+SIGNAL_TOPIC = "WirelessSignalSimulator"  # DroneInfo: every engine and antenna -> simulator
 SIGNAL_QUEUE = 4096  # DroneInfo that may wait for a slow simulator; the oldest is dropped
-MESSAGE_SERVICE = "/SignalSimulator/message"
-OTHERS_IN_RANGE_SERVICE = "/SignalSimulator/othersinRange"
+MESSAGE_SERVICE = "SignalSimulator/message"
+OTHERS_IN_RANGE_SERVICE = "SignalSimulator/othersinRange"
 # Additions: one call instead of one per packet or per neighbour.
-MESSAGES_SERVICE = "/SignalSimulator/messages"
-BROADCAST_SERVICE = "/SignalSimulator/broadcast"
+MESSAGES_SERVICE = "SignalSimulator/messages"
+BROADCAST_SERVICE = "SignalSimulator/broadcast"
 
-LAYOUTS_PARAM = "/DroneManager/casus"  # the file of the layouts; empty or not set: the package's
-GATEWAY_TOPIC = "/gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
-GATEWAY_ANSWERS_TOPIC = "/gateway/answers"  # FlightOrderAnswer: each gateway -> DroneManager
-REQUEST_MOVEMENT_SERVICE = "/DroneManager/requestDroneMovement"
-SET_TO_CASUS_SERVICE = "/DroneManager/SetToCasus"
-ORDER_LAYOUT_SERVICE = "/DroneManager/orderLayout"  # OrderLayout
-WITHDRAW_LAYOUT_SERVICE = "/DroneManager/withdrawLayout"  # WithdrawLayout
-LAYOUT_ACTION = "/DroneManager/layout"  # Layout
-LAYOUTS_TOPIC = "/DroneManager/layouts"  # LayoutProgress, latched: DroneManager -> users
-STANDING_PARAM = "/DroneManager/standing"  # what is left to order, for a restarted DroneManager
+LAYOUTS_PARAM = "DroneManager/casus"  # the file of the layouts; empty or not set: the package's
+GATEWAY_TOPIC = "gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
+GATEWAY_ANSWERS_TOPIC = "gateway/answers"  # FlightOrderAnswer: each gateway -> DroneManager
+REQUEST_MOVEMENT_SERVICE = "DroneManager/requestDroneMovement"
+SET_TO_CASUS_SERVICE = "DroneManager/SetToCasus"
+ORDER_LAYOUT_SERVICE = "DroneManager/orderLayout"  # OrderLayout
+WITHDRAW_LAYOUT_SERVICE = "DroneManager/withdrawLayout"  # WithdrawLayout
+LAYOUT_ACTION = "DroneManager/layout"  # Layout
+LAYOUTS_TOPIC = "DroneManager/layouts"  # LayoutProgress, latched: DroneManager -> users
+STANDING_PARAM = "DroneManager/standing"  # what is left to order, for a restarted DroneManager
 # The same services under their short names.
-SHORT_REQUEST_MOVEMENT_SERVICE = "/requestDroneMovement"
-SHORT_SET_TO_CASUS_SERVICE = "/SetToCasus"
-ALL_DEBUG_TOPIC = "/debug"  # NodeDebugInfo of all nodes, only while there is a subscriber
+SHORT_REQUEST_MOVEMENT_SERVICE = "requestDroneMovement"
+SHORT_SET_TO_CASUS_SERVICE = "SetToCasus"
+ALL_DEBUG_TOPIC = "debug"  # NodeDebugInfo of all nodes, only while there is a subscriber
 
-CLOCK_TOPIC = "/clock"
-FACTOR_TOPIC = "/DroneFactory/real_time_factor"  # Float32: the achieved factor, once a second
-SPEED_SERVICE = "/DroneFactory/setSpeed"  # SetSpeed
-ADD_DRONE_SERVICE = "/DroneFactory/addDrone"  # AddDrone
-REMOVE_DRONE_SERVICE = "/DroneFactory/removeDrone"  # RemoveDrone
-PROGRESS_TOPIC = "/mesh/progress"  # HostProgress: progress of a host in another process
-SIM_TIME_PARAM = "/use_sim_time"
-FLEET_PARAM = "/drone_mesh/fleet"  # the factory's configuration, for hosts in other processes
-DRONES_PARAM = "/drone_mesh/drones"  # the ids of the present drones, see fleet_parameter.py
+CLOCK_TOPIC = "clock"
+CLOCK_IN_NAMESPACE = f"/clock:={CLOCK_TOPIC}"  # ROS itself always looks for /clock
+FACTOR_TOPIC = "DroneFactory/real_time_factor"  # Float32: the achieved factor, once a second
+SPEED_SERVICE = "DroneFactory/setSpeed"  # SetSpeed
+ADD_DRONE_SERVICE = "DroneFactory/addDrone"  # AddDrone
+REMOVE_DRONE_SERVICE = "DroneFactory/removeDrone"  # RemoveDrone
+PROGRESS_TOPIC = "mesh/progress"  # HostProgress: progress of a host in another process
+SIM_TIME_PARAM = "/use_sim_time"  # one for all nodes of a master
+FLEET_PARAM = "drone_mesh/fleet"  # the factory's configuration, for hosts in other processes
+DRONES_PARAM = "drone_mesh/drones"  # the ids of the present drones, see fleet_parameter.py
 
-REPORTS_TOPIC = "/mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
-STATE_TOPIC = "/mesh/state"  # MeshState, latched: DroneFactory -> users
-EVENTS_TOPIC = "/mesh/events"  # MeshEvent: DroneFactory -> users
-PACKETS_TOPIC = "/mesh/packets"  # PacketSample: simulator -> users, while there is a subscriber
-DIAGNOSTICS_TOPIC = "/diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> users
+REPORTS_TOPIC = "mesh/reports"  # HostReport: each process that hosts nodes -> DroneFactory
+STATE_TOPIC = "mesh/state"  # MeshState, latched: DroneFactory -> users
+EVENTS_TOPIC = "mesh/events"  # MeshEvent: DroneFactory -> users
+PACKETS_TOPIC = "mesh/packets"  # PacketSample: simulator -> users, while there is a subscriber
+DIAGNOSTICS_TOPIC = "diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> users
 
-MARKERS_TOPIC = "/mesh/markers"  # MarkerArray: mesh_markers -> rviz
+MARKERS_TOPIC = "mesh/markers"  # MarkerArray: mesh_markers -> rviz
+TF_TOPIC = "tf"  # TFMessage: mesh_markers -> rviz
 MAP_FRAME = "map"
 
-GROUNDED_TOPIC = "/Drones/grounded"  # GroundedDrones, latched: DroneFactory -> hosts
+GROUNDED_TOPIC = "Drones/grounded"  # GroundedDrones, latched: DroneFactory -> hosts
 
 
 def host_param(host: str) -> str:
     """The parameter by which a ROS node declares that it runs nodes of the mesh: their ids."""
-    return f"/drone_mesh/hosts/{host.strip('/')}"
+    return f"drone_mesh/hosts/{host.strip('/')}"
 
 
 def drone_frame(node_id: int) -> str:
@@ -59,44 +65,44 @@ def drone_frame(node_id: int) -> str:
 
 def node_topic(node_id: int) -> str:
     """NRF24: simulator -> antenna."""
-    return f"/Node/{node_id}"
+    return f"Node/{node_id}"
 
 
 def debug_topic(node_id: int) -> str:
     """NodeDebugInfo: antenna -> users."""
-    return f"/Nodes/{node_id}/debug"
+    return f"Nodes/{node_id}/debug"
 
 
 def power_switch(node_id: int) -> str:
     """PowerSwitch, offered by the antenna."""
-    return f"/Nodes/{node_id}/powerSwitch"
+    return f"Nodes/{node_id}/powerSwitch"
 
 
 def send_service(node_id: int) -> str:
     """SendData: users -> node."""
-    return f"/Nodes/{node_id}/send"
+    return f"Nodes/{node_id}/send"
 
 
 def received_topic(node_id: int) -> str:
     """ReceivedData: node -> users."""
-    return f"/Nodes/{node_id}/received"
+    return f"Nodes/{node_id}/received"
 
 
 def goal_topic(node_id: int) -> str:
     """Location: connector -> engine."""
-    return f"/Drones/{node_id}/goal"
+    return f"Drones/{node_id}/goal"
 
 
 def mission_service(node_id: int) -> str:
     """FlyMission, offered by the engine."""
-    return f"/Drones/{node_id}/mission"
+    return f"Drones/{node_id}/mission"
 
 
 def fly_action(node_id: int) -> str:
     """Fly, an action: users -> fly_actions."""
-    return f"/Drones/{node_id}/fly"
+    return f"Drones/{node_id}/fly"
 
 
 def gps_service(node_id: int) -> str:
     """RequestGPS, offered by the engine."""
-    return f"/Drones/{node_id}/gps"
+    return f"Drones/{node_id}/gps"

@@ -63,10 +63,10 @@ class PersistentService(Generic[Request, Response]):
         timeout_s: int = CALL_TIMEOUT_S,
     ) -> None:
         """`timeout_s`: whole wall seconds to wait for an answer."""
-        self.name = name
+        self.name = rospy.resolve_name(name)
         self._timeval = struct.pack("@ll", timeout_s, 0)
         self._response_class = service_class._response_class
-        self._protocol = TCPROSServiceClient(name, service_class, headers={"persistent": "1"})
+        self._protocol = TCPROSServiceClient(self.name, service_class, headers={"persistent": "1"})
         self._transport: TCPROSTransport | None = None
 
     def is_connected(self) -> bool:

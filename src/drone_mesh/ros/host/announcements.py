@@ -6,6 +6,8 @@ import threading
 from collections import deque
 from typing import Callable, Protocol
 
+import rospy
+
 from drone_mesh.communication.messages import packet
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.flight_path import Vector
@@ -75,7 +77,8 @@ class Announcements:
     def announce(self, antenna: AnnouncedAntenna) -> None:
         """Publish where this antenna listens and is, and whether it has power."""
         node_id = antenna.node_id
-        topic, place = names.node_topic(node_id), self._place_of(node_id)
+        place = self._place_of(node_id)
+        topic = rospy.resolve_name(names.node_topic(node_id))
         with self._announcing:
             self._publish(antenna_info(node_id, topic, antenna.on(), place))
 

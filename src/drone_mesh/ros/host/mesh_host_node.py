@@ -14,7 +14,7 @@ from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.fleet_parameter import get_fleet_parameter, get_present_drones
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
@@ -95,14 +95,13 @@ def main() -> None:
     ~index (int): the drones are divided into ~hosts equal parts, and this program runs the nodes
     of part ~index, 1..~hosts.
     """
-    prepare_node(main.__doc__)
-    rospy.init_node("mesh_host", disable_signals=True)
+    start_node(main.__doc__, "mesh_host", disable_signals=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:
         clock = FollowedClock()
         fleet_is_there = partial(rospy.has_param, names.FLEET_PARAM)
-        _wait_for("/DroneFactory to create the drones", fleet_is_there, stop.requested)
-        _wait_for("/clock", lambda: clock.now_s > 0.0, stop.requested)
+        _wait_for("DroneFactory to create the drones", fleet_is_there, stop.requested)
+        _wait_for("its clock", lambda: clock.now_s > 0.0, stop.requested)
         if stop.requested():
             return
         fleet = get_fleet_parameter()
@@ -120,7 +119,7 @@ def main() -> None:
             host.wait_for_radios(stop.requested)
             # Otherwise time would advance while the nodes start, and their timers would be late.
             _wait_for(
-                "/DroneFactory to subscribe to the progress", clock.is_followed, stop.requested
+                "DroneFactory to subscribe to the progress", clock.is_followed, stop.requested
             )
             clock.report_progress()
             drones = FollowedFleet(host, ids)

@@ -16,7 +16,7 @@ from drone_mesh.errors import GoalRefused
 from drone_mesh.layouts import Layouts, Order, UnknownCase
 from drone_mesh.msg import RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import flight_order, location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
@@ -174,8 +174,7 @@ class DroneManager:
 
 def main() -> None:
     """Run the node."""
-    prepare_node(DroneManager.__doc__)
-    rospy.init_node("DroneManager")
+    start_node(DroneManager.__doc__, "DroneManager")
     show_library_logs_on_rosout()
     layouts = or_exit(lambda: manager_layouts("~casus"))
     DroneManager(layouts)

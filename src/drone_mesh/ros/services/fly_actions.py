@@ -23,7 +23,7 @@ from drone_mesh.msg import (
     NodeState,
 )
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import event_record, location_of
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
@@ -225,10 +225,9 @@ class FlyActions:
 
 def main() -> None:
     """Run the node."""
-    prepare_node(FlyActions.__doc__)
+    start_node(FlyActions.__doc__, "fly_actions", disable_signals=True)
     # Otherwise rospy would shut down inside its signal handler, on top of whatever this thread was
     # doing then, and could wait for a thread that waits for this one.
-    rospy.init_node("fly_actions", disable_signals=True)
     show_library_logs_on_rosout()
     with OrderlyStop() as stop:
         actions = FlyActions()

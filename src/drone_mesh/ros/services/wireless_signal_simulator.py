@@ -16,7 +16,7 @@ from drone_mesh.communication.interfaces import PAYLOAD_BYTES
 from drone_mesh.communication.messages import readdressed, receiver
 from drone_mesh.msg import NRF24, DroneInfo
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.figures import FiguresPublisher
 from drone_mesh.ros.graph.logs import ThrottledLog, show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
@@ -114,7 +114,7 @@ class WirelessSignalSimulator:
             self._antenna_topics[topic] = AntennaTopic(topic)
         # An antenna's usual topic stays open: redirecting its packets for a moment must not
         # cost it the connection.
-        usual = (names.node_topic(node) for node in self._topics)
+        usual = (_usual_topic(node) for node in self._topics)
         if old_topic is not None and old_topic not in {*usual, *self._topics.values()}:
             self._antenna_topics.pop(old_topic).close()
         _log.debug("node %d listens on %s", node_id, topic)
@@ -122,7 +122,7 @@ class WirelessSignalSimulator:
 
     def _check_topic_type(self, info: DroneInfo) -> None:
         """Refuse to publish packets on a topic of another type, such as /clock."""
-        if info.sub in self._antenna_topics or info.sub == names.node_topic(info.nodeID):
+        if info.sub in self._antenna_topics or info.sub == _usual_topic(info.nodeID):
             return
         for topic, kind in rospy.get_published_topics():
             if topic == rospy.resolve_name(info.sub) and kind != NRF24._type:
@@ -204,10 +204,13 @@ class WirelessSignalSimulator:
             return {DELIVERED: self._delivered, LOST_IN_RANGE: self._lost}
 
 
+def _usual_topic(node_id: int) -> str:
+    return rospy.resolve_name(names.node_topic(node_id))
+
+
 def main() -> None:
     """Run the node."""
-    prepare_node(WirelessSignalSimulator.__doc__)
-    rospy.init_node("WirelessSignalSimulator")
+    start_node(WirelessSignalSimulator.__doc__, "WirelessSignalSimulator")
     configuration = or_exit(
         lambda: factory_configuration("max_distance", "obstacles", "obstacle_radio")
     )

@@ -24,7 +24,7 @@ from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import prepare_node, run_tool
+from drone_mesh.ros.graph.command_line import run_tool, start_node
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.parameters import manager_layouts
@@ -142,12 +142,11 @@ def main() -> None:
     is played; its page takes no orders.
     /DroneManager/casus (str): the file of the layouts.
     """
-    prepare_node(main.__doc__)
+    start_node(main.__doc__, "mesh_console")
     run_tool("console", _run)
 
 
 def _run() -> int:
-    rospy.init_node("mesh_console")
     show_library_logs_on_rosout()
     address = str(rospy.get_param("~address", LOOPBACK))
     port = _port(rospy.get_param("~port", DEFAULT_PORT))

@@ -14,7 +14,7 @@ from visualization_msgs.msg import MarkerArray
 
 from drone_mesh.msg import MeshState
 from drone_mesh.ros.graph import names
-from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.views.markers import MarkerMaker
@@ -41,7 +41,7 @@ class MeshMarkers:
             names.MARKERS_TOPIC, MarkerArray, subscriber_listener=self._new_viewers, queue_size=10
         )
         self._frames = rospy.Publisher(
-            "/tf", TFMessage, subscriber_listener=self._new_listeners, queue_size=10
+            names.TF_TOPIC, TFMessage, subscriber_listener=self._new_listeners, queue_size=10
         )
         rospy.Subscriber(names.STATE_TOPIC, MeshState, self._show, queue_size=1)
 
@@ -103,8 +103,7 @@ def _transform(node: NodeStatus, stamp: rospy.Time) -> TransformStamped:
 
 def main() -> None:
     """Run the node."""
-    prepare_node(MeshMarkers.__doc__)
-    rospy.init_node("mesh_markers")
+    start_node(MeshMarkers.__doc__, "mesh_markers")
     show_library_logs_on_rosout()
     MeshMarkers()
     MasterWatch().start()

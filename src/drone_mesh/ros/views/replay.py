@@ -14,19 +14,19 @@ import rospy
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import require_master, run_tool
-from drone_mesh.ros.views.bag import no_states, topics_in_bag
+from drone_mesh.ros.views.bag import topics_in_bag
 
-# Topics that rosbag must not publish: --clock publishes the time, and running nodes the log.
-NOT_PLAYED = {names.CLOCK_TOPIC, "/rosout", "/rosout_agg"}
+# Topics that rosbag must not publish, because running nodes do; --clock publishes the time.
+NOT_PLAYED = {"/rosout", "/rosout_agg"}
 
 
 class AlreadyATime(MeshError):
-    """A simulation or another recording already publishes /clock on this master."""
+    """A simulation or another recording already publishes this clock."""
 
-    def __init__(self, nodes: list[str]) -> None:
+    def __init__(self, nodes: list[str], clock: str) -> None:
         super().__init__(
-            f"{', '.join(nodes)} already publishes {names.CLOCK_TOPIC}: stop it, or set "
-            "ROS_MASTER_URI to another master"
+            f"{', '.join(nodes)} already publishes {clock}: stop it, play in another namespace "
+            "(__ns:=again), or set ROS_MASTER_URI to another master"
         )
 
 
@@ -72,18 +72,21 @@ def _number(text: str, lowest: float, highest: float, expected: str) -> float:
 
 
 def _run(options: argparse.Namespace) -> int:
-    topics = topics_in_bag(options.bag)
-    if names.STATE_TOPIC not in topics:
-        raise no_states(options.bag)
+    recorded, topics = topics_in_bag(options.bag)
     require_master()
+    clock = rospy.resolve_name(names.CLOCK_TOPIC)
     publishers, _subscribers, _services = rosgraph.Master("/replay").getSystemState()
-    others = dict(publishers).get(names.CLOCK_TOPIC, [])
+    others = dict(publishers).get(clock, [])
     if others:
-        raise AlreadyATime(others)
+        raise AlreadyATime(others, clock)
     rospy.set_param(names.SIM_TIME_PARAM, True)
     command = ["rosrun", "rosbag", "play", "--clock", "--keep-alive"]
     command += ["--rate", str(options.rate), "--start", str(options.start), str(options.bag)]
-    command += ["--topics", *sorted(topics - NOT_PLAYED)]
+    command += ["--topics", *sorted(topics - NOT_PLAYED - {recorded + names.CLOCK_TOPIC})]
+    # What was recorded in one namespace is played in that of this program.
+    if recorded != rospy.get_namespace():
+        of_the_mesh = [topic[len(recorded) :] for topic in topics if topic.startswith(recorded)]
+        command += [f"{recorded}{topic}:={topic}" for topic in of_the_mesh]
     remappings = [word for word in sys.argv[1:] if ":=" in word]
     sys.stdout.flush()
     os.execvp(command[0], command + remappings)

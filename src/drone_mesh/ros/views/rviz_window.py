@@ -8,6 +8,7 @@ import sys
 
 import rospy
 
+from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import run_tool
 from drone_mesh.view.window_process import require_screen
 
@@ -27,4 +28,6 @@ def main() -> None:
 def _run() -> int:
     require_screen("rviz")
     sys.stdout.flush()
-    os.execvp("rosrun", ["rosrun", "rviz", "rviz", *sys.argv[1:]])
+    # In a namespace, rviz shows the mesh of that namespace with any configuration.
+    ours = [f"/{topic}:={topic}" for topic in (names.TF_TOPIC, names.MARKERS_TOPIC)]
+    os.execvp("rosrun", ["rosrun", "rviz", "rviz", *sys.argv[1:], *ours, names.CLOCK_IN_NAMESPACE])

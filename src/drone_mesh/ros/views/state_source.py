@@ -23,7 +23,7 @@ class NoState(MeshError):
 
     def __init__(self) -> None:
         super().__init__(
-            f"no state on {names.STATE_TOPIC}: is a simulation running "
+            f"no state on {rospy.resolve_name(names.STATE_TOPIC)}: is a simulation running "
             "(roslaunch drone_mesh factory.launch)?"
         )
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import rospy
-
-from drone_mesh.ros.graph.command_line import prepare_node
+from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.orderly_stop import OrderlyStop
 from drone_mesh.ros.graph.parameters import or_exit
@@ -21,8 +19,7 @@ def main() -> None:
     the nodes run in this process, with any other number in other processes. The program also
     checks the layout file that /DroneManager/casus names.
     """
-    prepare_node(main.__doc__)
-    rospy.init_node("DroneFactory", disable_signals=True)
+    start_node(main.__doc__, "DroneFactory", disable_signals=True)
     show_library_logs_on_rosout()
     parameters = or_exit(FactoryParameters.read)
     with OrderlyStop() as stop, BulletWorld() as world:
