@@ -50,9 +50,9 @@ class ExternalDrones:
             rospy.get_param("~spacing", 1.0),
         )
         self._drones = {at.node_id: Drone(Location(at.latitude, at.longitude, 0.0)) for at in fleet}
-        self._publisher = rospy.Publisher("/WirelessSignalSimulator", DroneInfo, queue_size=1000)
+        self._publisher = rospy.Publisher("WirelessSignalSimulator", DroneInfo, queue_size=1000)
         for node_id in self._drones:
-            topic, service = f"/Drones/{node_id}/goal", f"/Drones/{node_id}/gps"
+            topic, service = f"Drones/{node_id}/goal", f"Drones/{node_id}/gps"
             rospy.Subscriber(topic, LocationMsg, partial(self._take_goal, node_id))
             rospy.Service(service, RequestGPS, partial(self._answer, node_id))
         rospy.Timer(rospy.Duration(PERIOD_S), self._step)

@@ -37,10 +37,10 @@ def main(drone: int, x: float, y: float, height: int) -> int:
             if event.code in LAST:
                 over.set()
 
-    events = rospy.Subscriber("/mesh/events", MeshEvent, on_event)
+    events = rospy.Subscriber("mesh/events", MeshEvent, on_event)
     while not events.get_num_connections():
         rospy.rostime.wallsleep(0.05)
-    order = rospy.ServiceProxy("/DroneManager/requestDroneMovement", RequestDroneFlight)
+    order = rospy.ServiceProxy("DroneManager/requestDroneMovement", RequestDroneFlight)
     status = order(ID=drone, latitude=y, longitude=x, height=height).status
     if status != 1:
         print("no gateway is running" if status == 0 else f"no gateway has a route to {drone}")

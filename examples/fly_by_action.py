@@ -34,7 +34,10 @@ def why_not_offered(drone: int) -> str:
     """The reason why the drone does not take orders yet; empty if it does."""
     if drones_if_known() is None:
         return "no simulation is running: roslaunch drone_mesh factory.launch actions:=true"
-    if any(topic == f"/Drones/{drone}/fly/status" for topic, _ in rospy.get_published_topics()):
+    if any(
+        topic == rospy.resolve_name(f"Drones/{drone}/fly/status")
+        for topic, _ in rospy.get_published_topics()
+    ):
         return ""
     return f"drone {drone} has no action: start the simulation with actions:=true"
 
@@ -62,7 +65,7 @@ def main(drone: int, x: float, y: float, height: int) -> int:
     if why:
         print(why)
         return 1
-    client = actionlib.SimpleActionClient(f"/Drones/{drone}/fly", FlyAction)
+    client = actionlib.SimpleActionClient(f"Drones/{drone}/fly", FlyAction)
     deadline_s = time.monotonic() + CONNECTED_WITHIN_S
     while not client.wait_for_server(rospy.Duration(POLL_PERIOD_S)):
         if time.monotonic() > deadline_s:

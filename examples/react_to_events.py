@@ -19,7 +19,7 @@ class Caretaker:
 
     def __init__(self) -> None:
         self._lost_at: dict[int, rospy.Time] = {}
-        rospy.Subscriber("/mesh/events", MeshEvent, self._on_event)
+        rospy.Subscriber("mesh/events", MeshEvent, self._on_event)
 
     def _on_event(self, event: MeshEvent) -> None:
         if event.code == MeshEvent.DISCONNECTED:
@@ -32,7 +32,7 @@ class Caretaker:
             rospy.Timer(wait, lambda _event: self._power_on(event.node), oneshot=True)
 
     def _power_on(self, node: int) -> None:
-        rospy.ServiceProxy(f"/Nodes/{node}/powerSwitch", PowerSwitch)(True)
+        rospy.ServiceProxy(f"Nodes/{node}/powerSwitch", PowerSwitch)(True)
         rospy.loginfo("switched node %d on again", node)
 
 

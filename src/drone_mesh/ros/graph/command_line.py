@@ -50,10 +50,10 @@ def join_graph(name: str) -> None:
 def _init_node(
     name: str, *, disable_signals: bool, anonymous: bool = False, disable_rosout: bool = False
 ) -> None:
-    """Register; time comes from the clock of the node's namespace."""
+    """Register; its clock is that of its namespace."""
     rospy.init_node(
         name,
-        argv=[*sys.argv, names.CLOCK_IN_NAMESPACE],
+        argv=[*sys.argv, *names.REMAPPINGS],
         anonymous=anonymous,
         disable_signals=disable_signals,
         disable_rosout=disable_rosout,

@@ -30,7 +30,6 @@ SHORT_SET_TO_CASUS_SERVICE = "SetToCasus"
 ALL_DEBUG_TOPIC = "debug"  # NodeDebugInfo of all nodes, only while there is a subscriber
 
 CLOCK_TOPIC = "clock"
-CLOCK_IN_NAMESPACE = f"/clock:={CLOCK_TOPIC}"  # ROS itself always looks for /clock
 FACTOR_TOPIC = "DroneFactory/real_time_factor"  # Float32: the achieved factor, once a second
 SPEED_SERVICE = "DroneFactory/setSpeed"  # SetSpeed
 ADD_DRONE_SERVICE = "DroneFactory/addDrone"  # AddDrone
@@ -45,6 +44,8 @@ STATE_TOPIC = "mesh/state"  # MeshState, latched: DroneFactory -> users
 EVENTS_TOPIC = "mesh/events"  # MeshEvent: DroneFactory -> users
 PACKETS_TOPIC = "mesh/packets"  # PacketSample: simulator -> users, while there is a subscriber
 DIAGNOSTICS_TOPIC = "diagnostics"  # DiagnosticArray: DroneFactory, hosts, simulator -> users
+# ROS and its libraries use these two with a slash: remappings that keep them in the namespace.
+REMAPPINGS = (f"/{CLOCK_TOPIC}:={CLOCK_TOPIC}", f"/{DIAGNOSTICS_TOPIC}:={DIAGNOSTICS_TOPIC}")
 
 MARKERS_TOPIC = "mesh/markers"  # MarkerArray: mesh_markers -> rviz
 TF_TOPIC = "tf"  # TFMessage: mesh_markers -> rviz

@@ -42,4 +42,4 @@ def _run(options: list[str]) -> int:
     regex = f"{re.escape(rospy.get_namespace())}({RECORDED})|/rosout_agg"
     command = ["rosrun", "rosbag", "record", *options, "--regex", regex, *remappings]
     sys.stdout.flush()
-    os.execvp(command[0], [*command, names.CLOCK_IN_NAMESPACE])
+    os.execvp(command[0], [*command, *names.REMAPPINGS])

@@ -30,4 +30,4 @@ def _run() -> int:
     sys.stdout.flush()
     # In a namespace, rviz shows the mesh of that namespace with any configuration.
     ours = [f"/{topic}:={topic}" for topic in (names.TF_TOPIC, names.MARKERS_TOPIC)]
-    os.execvp("rosrun", ["rosrun", "rviz", "rviz", *sys.argv[1:], *ours, names.CLOCK_IN_NAMESPACE])
+    os.execvp("rosrun", ["rosrun", "rviz", "rviz", *sys.argv[1:], *ours, *names.REMAPPINGS])
