@@ -21,6 +21,8 @@ class SimpleSimulatorTest(unittest.TestCase):
         _publishers, _subscribers, services = rosgraph.Master("/test").getSystemState()
         offered = {name for name, _nodes in services if name.startswith("/SignalSimulator/")}
         self.assertEqual(offered, {"/SignalSimulator/message", "/SignalSimulator/othersinRange"})
+        ours = {node for _name, nodes in services for node in nodes}
+        self.assertEqual(ours & {"/WirelessSignalSimulator", "/DroneManager"}, set())
         mesh.switch(2, False)
         mesh.wait("3, which is behind 2, lost", 30, lambda: mesh.lost(3))
         mesh.switch(2, True)
