@@ -68,12 +68,12 @@ def _require_free_name(name: str) -> None:
     socket.setdefaulttimeout(ANSWER_TIMEOUT_S)
     try:
         uri = rosgraph.Master(full).lookupNode(full)
-        is_taken = xmlrpc.client.ServerProxy(uri).getName(full)[2] == full
+        answer = xmlrpc.client.ServerProxy(uri).getName(full)  # code, text, name
     except (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException):
         return  # it never ran, or it died
     finally:
         socket.setdefaulttimeout(before_s)
-    if is_taken:
+    if isinstance(answer, list) and full in answer:
         raise NameTaken(
             f"{full} already runs on this master: stop it, give this one a namespace "
             "(namespace:=site_a for factory.launch, __ns:=site_a for rosrun), or set "
