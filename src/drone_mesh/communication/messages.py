@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 import operator
 import struct
-from dataclasses import dataclass
-from typing import Callable, ClassVar, Iterable, Mapping, NamedTuple, Union
+from dataclasses import dataclass, fields
+from typing import Callable, ClassVar, Iterable, Mapping, NamedTuple, TypeVar
 
 from drone_mesh.communication.interfaces import BROADCAST, PAYLOAD_BYTES
 from drone_mesh.communication.packet_types import (
@@ -67,115 +67,92 @@ class Message:
         return cls(*payload[:HEADER_BYTES])
 
 
+_M = TypeVar("_M", bound="_TypedMessage")
+
+
 @dataclass(frozen=True)
-class LocationMessage:
+class _TypedMessage:
+    """A header and the body of one type; a subclass adds the fields of its BODY, in its order."""
+
+    TYPE: ClassVar[MessageType]
+    BODY: ClassVar[struct.Struct]
+
+    creator: int  # the node that made it
+    from_: int  # the node that sends this hop
+    to: int  # receiver of this hop
+    forward: int  # final addressee, 254 = every node in range
+
+    def to_payload(self) -> bytes:
+        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
+        creator, from_, to, forward, *body = (getattr(self, field.name) for field in fields(self))
+        try:
+            return packet(self.TYPE, creator, from_, to, forward, self.BODY.pack(*body))
+        except (struct.error, OverflowError, ValueError) as error:
+            raise PacketError(f"{self} does not fit its packet: {error}") from error
+
+    @classmethod
+    def from_payload(cls: type[_M], payload: bytes) -> _M:
+        """Decode. Raises PacketError for another length or type."""
+        _check_length(payload)
+        creator, from_, kind, to, forward = payload[:HEADER_BYTES]
+        if kind != cls.TYPE:
+            raise PacketError(f"type {kind} is not {cls.TYPE.name} ({int(cls.TYPE)})")
+        return cls(creator, from_, to, forward, *cls.BODY.unpack_from(payload, HEADER_BYTES))
+
+
+@dataclass(frozen=True)
+class LocationMessage(_TypedMessage):
     """The position of its creator."""
 
     TYPE: ClassVar[MessageType] = MessageType.LOCATION
     BODY: ClassVar[struct.Struct] = struct.Struct("<ffhI")
 
-    creator: int  # the node that made it
-    from_: int  # the node that sends this hop
-    to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = every node in range
     latitude: float  # y, metres
     longitude: float  # x, metres
     height: int  # whole metres
     time_since_posix: int  # whole seconds of the creator's clock
 
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
-        return _packed(self, self.latitude, self.longitude, self.height, self.time_since_posix)
-
-    @classmethod
-    def from_payload(cls, payload: bytes) -> LocationMessage:
-        """Decode. Raises PacketError for another length or type."""
-        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
-
 
 @dataclass(frozen=True)
-class IntroduceMessage:
+class IntroduceMessage(_TypedMessage):
     """PRESENT: introduces its creator."""
 
     TYPE: ClassVar[MessageType] = MessageType.PRESENT
     BODY: ClassVar[struct.Struct] = struct.Struct("<B?")
 
-    creator: int  # the node that made it
-    from_: int  # the node that sends this hop
-    to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = every node in range
     hops_until_gateway: int  # 255 while not known
     know_gateway: bool  # whether its creator is connected
 
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
-        return _packed(self, self.hops_until_gateway, self.know_gateway)
-
-    @classmethod
-    def from_payload(cls, payload: bytes) -> IntroduceMessage:
-        """Decode. Raises PacketError for another length or type."""
-        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
-
 
 @dataclass(frozen=True)
-class HeartbeatMessage:
+class HeartbeatMessage(_TypedMessage):
     """Proof of a path; each node that forwards it adds a hop."""
 
     TYPE: ClassVar[MessageType] = MessageType.HEARTBEAT
     BODY: ClassVar[struct.Struct] = struct.Struct("<?BB")
 
-    creator: int  # the node that made it
-    from_: int  # the node that sends this hop
-    to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = every node in range
     know_gateway: bool  # whether its creator is connected
     preferred_gateway: int  # 255 while not known
     hops: int  # number of nodes that forwarded it
 
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
-        return _packed(self, self.know_gateway, self.preferred_gateway, self.hops)
-
-    @classmethod
-    def from_payload(cls, payload: bytes) -> HeartbeatMessage:
-        """Decode. Raises PacketError for another length or type."""
-        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
-
 
 @dataclass(frozen=True)
-class MissingMessage:
+class MissingMessage(_TypedMessage):
     """Its creator can no longer reach a node."""
 
     TYPE: ClassVar[MessageType] = MessageType.MISSING
     BODY: ClassVar[struct.Struct] = struct.Struct("<B")
 
-    creator: int  # the node that made it
-    from_: int  # the node that sends this hop
-    to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = every node in range
     missing: int  # id of that node
-
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
-        return _packed(self, self.missing)
-
-    @classmethod
-    def from_payload(cls, payload: bytes) -> MissingMessage:
-        """Decode. Raises PacketError for another length or type."""
-        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
 
 
 @dataclass(frozen=True)
-class GoToLocationMessage:
+class GoToLocationMessage(_TypedMessage):
     """MOVE_TO_LOCATION: an order to fly to a place."""
 
     TYPE: ClassVar[MessageType] = MessageType.MOVE_TO_LOCATION
     BODY: ClassVar[struct.Struct] = struct.Struct("<ffh")
 
-    creator: int  # the node that made it
-    from_: int  # the node that sends this hop
-    to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = every node in range
     latitude: float  # y, metres
     longitude: float  # x, metres
     height: int  # whole metres
@@ -185,47 +162,16 @@ class GoToLocationMessage:
         """The place in the message."""
         return Location(self.latitude, self.longitude, self.height)
 
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
-        return _packed(self, self.latitude, self.longitude, self.height)
-
-    @classmethod
-    def from_payload(cls, payload: bytes) -> GoToLocationMessage:
-        """Decode. Raises PacketError for another length or type."""
-        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
-
 
 @dataclass(frozen=True)
-class MovementNegotiationMessage:
+class MovementNegotiationMessage(_TypedMessage):
     """The bid of its creator to fly."""
 
     TYPE: ClassVar[MessageType] = MessageType.MOVEMENT_NEGOTIATION
     BODY: ClassVar[struct.Struct] = struct.Struct("<f")
 
-    creator: int  # the node that made it
-    from_: int  # the node that sends this hop
-    to: int  # receiver of this hop
-    forward: int  # final addressee, 254 = every node in range
     cost: float  # its distance to the gateway in metres; negative: it does not fly
 
-    def to_payload(self) -> bytes:
-        """The 32 bytes. Raises PacketError for a value that does not fit its field."""
-        return _packed(self, self.cost)
-
-    @classmethod
-    def from_payload(cls, payload: bytes) -> MovementNegotiationMessage:
-        """Decode. Raises PacketError for another length or type."""
-        return cls(*_unpacked(cls.TYPE, cls.BODY, payload))
-
-
-_TypedMessage = Union[
-    LocationMessage,
-    IntroduceMessage,
-    HeartbeatMessage,
-    MissingMessage,
-    GoToLocationMessage,
-    MovementNegotiationMessage,
-]
 
 _GATEWAY_PLACE = struct.Struct("<HBffh")  # age + 1 in seconds, id, latitude, longitude, height
 _GATEWAY_PLACE_AT = {
@@ -512,24 +458,6 @@ def is_finite(payload: bytes) -> bool:
     """Whether all floats of a packet are finite; its type is one of TYPES_WITH_FLOATS."""
     numbers = _FLOATS[payload[TYPE_AT]].unpack_from(payload, HEADER_BYTES)
     return all(map(math.isfinite, numbers))
-
-
-def _packed(message: _TypedMessage, *values: float) -> bytes:
-    try:
-        body = message.BODY.pack(*values)
-        return packet(
-            message.TYPE, message.creator, message.from_, message.to, message.forward, body
-        )
-    except (struct.error, OverflowError, ValueError) as error:
-        raise PacketError(f"{message} does not fit its packet: {error}") from error
-
-
-def _unpacked(kind: MessageType, body: struct.Struct, payload: bytes) -> tuple:
-    _check_length(payload)
-    creator, from_, found, to, forward = payload[:HEADER_BYTES]
-    if found != kind:
-        raise PacketError(f"type {found} is not {kind.name} ({kind.value})")
-    return (creator, from_, to, forward, *body.unpack_from(payload, HEADER_BYTES))
 
 
 def _check_length(payload: bytes) -> None:
