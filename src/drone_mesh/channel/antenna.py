@@ -213,8 +213,8 @@ class PacketAntenna(IWirelessCommunication):
             return
         self._note(payload)
         train = place_in_train(payload, self._radio.node_id)
-        answered = received.to_all and is_answered(payload)
-        self._sender.heard(sender(payload), broadcast=answered, train=train)
+        answers = priority(payload) if received.to_all and is_answered(payload) else None
+        self._sender.heard(sender(payload), broadcast=answers, train=train)
         if received.to_all:
             payload = readdressed(payload, self._radio.node_id)
         if self._on_payload is not None:

@@ -12,7 +12,7 @@ module has those rules, without chips, threads and clocks. The driver and the fa
    its packets. This keeps ALOHA stable (Lam and Kleinrock, 1975: the retransmission rate must
    fall as the backlog grows). Without carrier sense, a node can judge only by its own failures.
 3. Packets that many nodes would send at the same moment get a random delay: broadcasts, and
-   answers to one (RFC 5148, jitter).
+   answers to one (RFC 5148, jitter). A broadcast of the mesh provokes no packets of users.
 4. A node leaves a gap after each of its packets, so that a burst of them (a check of all
    neighbours) does not occupy the channel as a block.
 5. Users' packets for one receiver follow each other in trains, without the gap between them: a pair
@@ -65,7 +65,7 @@ class MediumAccess:
         self._queue = PacketQueue()
         self._yielding = Yielding(rules)
         self._free_s = -math.inf  # the gap after the last packet ends
-        self._broadcast_heard_s = -math.inf
+        self._broadcast_heard_s = {priority: -math.inf for priority in Priority}
         self._train_left = 0  # packets that may still follow in the train that is being sent
         self._silent: set[int] = set()  # receivers that let a packet fail and were not heard since
         self._heard_s: dict[int, float] = {}
@@ -94,7 +94,7 @@ class MediumAccess:
         rules, not_before_s = self.rules, now_s
         if receiver == ALL_NODES:
             not_before_s += self._rng.random() * rules.broadcast_jitter_s
-        elif now_s - self._broadcast_heard_s < rules.answer_jitter_s:
+        elif now_s - self._broadcast_heard_s[priority] < rules.answer_jitter_s:
             not_before_s += self._rng.random() * rules.answer_jitter_s
         self._queue.add(OutgoingPacket(receiver, payload, priority, now_s, not_before_s))
         return True
@@ -108,19 +108,24 @@ class MediumAccess:
         return self.rules.data_queue_length - self._queue.data
 
     def heard(
-        self, sender: int, now_s: float, *, broadcast: bool, train: InTrain = InTrain.NO
+        self,
+        sender: int,
+        now_s: float,
+        *,
+        broadcast: Priority | None = None,
+        train: InTrain = InTrain.NO,
     ) -> None:
         """A packet came in; `train`: what it shows about its train.
 
-        `broadcast`: to several nodes, which may now all send answers.
+        `broadcast`: it went to several nodes, which may now all send answers of this priority.
         """
         self._silent.discard(sender)
         self._heard_s[sender] = now_s
         if train is not InTrain.NO:
             self._queue.hurry(sender, now_s)  # it will listen after its train
             self._yielding.heard(sender, train, now_s, wants_to_send=len(self._queue) > 0)
-        if broadcast:
-            self._broadcast_heard_s = now_s
+        if broadcast is not None:
+            self._broadcast_heard_s[broadcast] = now_s
 
     @property
     def next_try_s(self) -> float:

@@ -73,7 +73,7 @@ class Sender:
         with self._lock:
             return self._access.data_room()
 
-    def heard(self, sender: int, *, broadcast: bool, train: InTrain) -> None:
+    def heard(self, sender: int, *, broadcast: Priority | None, train: InTrain) -> None:
         """A packet of that node came in."""
         with self._lock:
             self._access.heard(sender, self._runtime.now_s(), broadcast=broadcast, train=train)

@@ -122,7 +122,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         if (
             kind == _PRESENT
             and creator == from_
-            and not self._frame.heard(creator, payload)
+            and not self._frame.heard(creator, messages.frame_digest(payload))
             and not self.complaints.foreign_neighbour(now_s)  # its digest may be part of a seal
         ):
             self.complaints.add("a neighbour has another origin", f"node {creator}", now_s)
@@ -208,13 +208,16 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
 
     def receive_requestlocation(self, payload: bytes, creator: int, from_: int) -> None:
         """Answer with this node's place; to a drone in flight also with those of silent ones."""
-        goal = messages.AskerPlace.from_payload(payload)
-        if goal is None or creator == self._node_id or self._frame.refuses(from_):
+        asker = messages.place_of_asker(payload)
+        if asker is None or creator == self._node_id or self._frame.refuses(from_):
             self._send_location(creator)
             return
-        self._on_place_of_asker(creator, goal.place)
+        place, flies_there = asker
+        self._neighbours.set_place(creator, place, self._deadlines.now_s)
+        self._on_place_taken(place)
         self._send_location(creator)
-        tell_last_places(self._parts, creator, goal, self._options.clearance_m)
+        if flies_there:
+            tell_last_places(self._parts, creator, place, self._options.clearance_m)
 
     def receive_last_place(self, payload: bytes, _creator: int, _from: int) -> None:
         """Where another node was last heard."""
@@ -257,9 +260,8 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def _drop(self, reason: str, payload: bytes) -> None:
         self.complaints.dropped(reason, payload, self._deadlines.now_s)
 
-    def _on_place_of_asker(self, asker: int, place: Location) -> None:
-        """A node that asks for places is at `place`, or flies there."""
-        self._neighbours.set_place(asker, place, self._deadlines.now_s)
+    def _on_place_taken(self, place: Location) -> None:
+        """A node that asks for places is there, or flies there."""
 
     def _on_last_place(self, last: LastPlace) -> None:
         """A node reports where another one was last heard."""

@@ -8,8 +8,6 @@ hops.
 
 from __future__ import annotations
 
-from drone_mesh.communication.messages import frame_digest
-
 NO_FRAME = 0  # the digest of a node without an origin, or without support for origins
 
 
@@ -21,11 +19,7 @@ class CommonFrame:
         self.digest = digest
         self._of: dict[int, int] = {}  # neighbour -> its digest
 
-    def heard(self, neighbour: int, present: bytes) -> bool:
-        """Record a neighbour's PRESENT; returns whether its frame is this node's."""
-        return self.heard_digest(neighbour, frame_digest(present))
-
-    def heard_digest(self, neighbour: int, digest: int) -> bool:
+    def heard(self, neighbour: int, digest: int) -> bool:
         """Record a neighbour's digest; returns whether its frame is this node's."""
         self._of[neighbour] = digest
         return digest == self.digest

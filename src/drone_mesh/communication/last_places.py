@@ -10,7 +10,6 @@ import struct
 from typing import NamedTuple
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.messages import AskerPlace
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeParts
 from drone_mesh.drone.location import Location
@@ -44,12 +43,10 @@ class LastPlace(NamedTuple):
         return cls(node, Location(*place), float(age))
 
 
-def tell_last_places(parts: NodeParts, asker: int, goal: AskerPlace, clearance_m: float) -> None:
+def tell_last_places(parts: NodeParts, asker: int, goal: Location, clearance_m: float) -> None:
     """Tell a drone in flight which nodes were last heard near its goal: it may not hear them."""
-    if not goal.flies_there:
-        return
     near = sorted(
-        (heard.place.distance_m(goal.place), node)
+        (heard.place.distance_m(goal), node)
         for node, heard in parts.neighbours.places().items()
         if node not in (asker, parts.node_id)
     )

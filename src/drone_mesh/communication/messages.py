@@ -180,7 +180,9 @@ _GATEWAY_PLACE_AT = {
     int(MessageType.GATEWAY_PLACE): HEADER_BYTES,
 }
 _OLDEST_AGE_S = 2**16 - 2
+_REQUEST = int(MessageType.REQUESTLOCATION)
 _ASKER_PLACE = struct.Struct("<ffH")  # latitude, longitude, height + 1 and whether it flies there
+_NEW_REQUEST = struct.Struct(f"<{HEADER_BYTES}BffH{BODY_BYTES - _ASKER_PLACE.size}x")
 _FLIES_THERE = 2**15
 _ORDER_NUMBER = struct.Struct("<H")
 _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
@@ -243,30 +245,6 @@ class GatewayPlace(NamedTuple):
         if age == 0 or not all(map(math.isfinite, place)):
             return None
         return cls(gateway, Location(*place), age - 1.0)
-
-
-class AskerPlace(NamedTuple):
-    """Where the creator of a REQUESTLOCATION is: the bytes after the header, zero if unknown."""
-
-    place: Location
-    flies_there: bool  # it is on its way to that place
-
-    def appended_to(self, request: bytes) -> bytes:
-        """The same REQUESTLOCATION with this place."""
-        latitude, longitude, height = self.place
-        code = 1 + max(0, min(_FLIES_THERE - 2, round(height)))
-        code |= _FLIES_THERE if self.flies_there else 0
-        body = _ASKER_PLACE.pack(latitude, longitude, code)
-        return request[:HEADER_BYTES] + body + request[HEADER_BYTES + len(body) :]
-
-    @classmethod
-    def from_payload(cls, request: bytes) -> AskerPlace | None:
-        """The place in a REQUESTLOCATION; None if there is no valid one."""
-        latitude, longitude, code = _ASKER_PLACE.unpack_from(request, HEADER_BYTES)
-        height = (code & ~_FLIES_THERE) - 1
-        if height < 0 or not (math.isfinite(latitude) and math.isfinite(longitude)):
-            return None
-        return cls(Location(latitude, longitude, height), bool(code & _FLIES_THERE))
 
 
 # Used for each packet: none of these calls a Python function.
@@ -359,6 +337,26 @@ def location(
     return _NEW_LOCATION.pack(
         creator, from_, _LOCATION, to, forward, latitude, longitude, height, time_s
     )
+
+
+def request_for_place(creator: int, to: int, place: Location | None, flies_there: bool) -> bytes:
+    """A new REQUESTLOCATION; `place`: of its creator, which is on its way to it if it flies."""
+    if place is None:
+        return _NEW_REQUEST.pack(creator, creator, _REQUEST, to, to, 0.0, 0.0, 0)
+    latitude, longitude, height = place
+    code = 1 + max(0, min(_FLIES_THERE - 2, round(height)))
+    if flies_there:
+        code |= _FLIES_THERE
+    return _NEW_REQUEST.pack(creator, creator, _REQUEST, to, to, latitude, longitude, code)
+
+
+def place_of_asker(request: bytes) -> tuple[Location, bool] | None:
+    """The place in a REQUESTLOCATION, and whether its creator flies there; None: no valid one."""
+    latitude, longitude, code = _ASKER_PLACE.unpack_from(request, HEADER_BYTES)
+    height = (code & ~_FLIES_THERE) - 1
+    if height < 0 or not (math.isfinite(latitude) and math.isfinite(longitude)):
+        return None
+    return Location(latitude, longitude, height), code >= _FLIES_THERE
 
 
 def present(sender: int, hops: int, know_gateway: bool) -> bytes:

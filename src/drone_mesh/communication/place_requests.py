@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import BROADCAST
-from drone_mesh.communication.messages import AskerPlace, packet
-from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.messages import request_for_place
 from drone_mesh.communication.parts import NodeParts
 
 
@@ -20,9 +19,6 @@ def ask_all_for_places(parts: NodeParts) -> None:
 
 def _request(parts: NodeParts, to: int) -> bytes:
     """A request with the place of this node: its destination, if it flies."""
-    me, pilot = parts.node_id, parts.pilot
-    request = packet(MessageType.REQUESTLOCATION, me, me, to, to)
-    place = pilot.goal or pilot.place()
-    if place is None:
-        return request
-    return AskerPlace(place, flies_there=pilot.goal is not None).appended_to(request)
+    goal = parts.pilot.goal
+    place = goal or parts.pilot.place()
+    return request_for_place(parts.node_id, to, place, flies_there=goal is not None)

@@ -115,6 +115,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def may_connect(self, node: int, know_gateway: bool) -> bool:
         """See ConnectionRepair; also for the functions below."""
+        if self._states.nothing_to_repair:  # it does not fly; most packets
+            return True
         return self._repair.may_connect(node, know_gateway)
 
     def on_connected(self) -> None:  # noqa: D102
@@ -158,8 +160,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self.places.update_next_hop(node, location, now_s)
         self._repair.on_place(node, location)
 
-    def _on_place_of_asker(self, asker: int, place: Location) -> None:
-        super()._on_place_of_asker(asker, place)
+    def _on_place_taken(self, place: Location) -> None:
         self._repair.on_taken(place)
 
     def _on_last_place(self, last: LastPlace) -> None:

@@ -247,8 +247,8 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
             return
         broadcast = packet.receiver == ALL_NODES
         train = place_in_train(packet.payload, self.node_id)
-        answered = broadcast and is_answered(packet.payload)
-        self.access.heard(sender_id, self._clock.now_s, broadcast=answered, train=train)
+        answers = packet.priority if broadcast and is_answered(packet.payload) else None
+        self.access.heard(sender_id, self._clock.now_s, broadcast=answers, train=train)
         payload = readdressed(packet.payload, self.node_id) if broadcast else packet.payload
         self._air.payloads += 1
         self._submit(lambda now_s: mesh.on_msg(payload, now_s))

@@ -143,7 +143,7 @@ def test_a_receiver_that_is_heard_again_gets_all_tries():
         return count
 
     assert [tries(), tries()] == [9, 3]
-    access.heard(7, now_s, broadcast=False)
+    access.heard(7, now_s)
     assert tries() == 9
 
 
@@ -198,9 +198,18 @@ def test_a_broadcast_and_the_answers_to_one_are_spread():
     assert 0.0 <= min(waits) < 0.1 * RULES.broadcast_jitter_s
     assert 0.9 * RULES.broadcast_jitter_s < max(waits) <= RULES.broadcast_jitter_s
     access = MediumAccess(RULES, random.Random(1))
-    access.heard(3, 1.0, broadcast=True)
+    access.heard(3, 1.0, broadcast=Priority.CONTROL)
     access.offer(3, PACKET, 1.0)
     assert access.next_try_s > 1.0
+
+
+@pytest.mark.parametrize("asked", Priority)
+@pytest.mark.parametrize("sent", Priority)
+def test_only_answers_wait_after_a_broadcast(asked, sent):
+    access = MediumAccess(RULES, random.Random(1))
+    access.heard(3, 1.0, broadcast=asked)
+    access.offer(3, PACKET, 1.0, sent)
+    assert (access.next_try_s > 1.0) == (asked is sent)
 
 
 def test_the_same_bytes_for_the_same_receiver_wait_only_once():
@@ -299,36 +308,36 @@ def test_after_a_train_there_is_time_for_an_answer():
 def test_a_node_that_hears_a_train_waits_for_its_end_but_not_for_ever():
     node = loaded(0, control=1)
     now_s = 1.0
-    node.heard(5, now_s, broadcast=False, train=InTrain.PERHAPS)
+    node.heard(5, now_s, train=InTrain.PERHAPS)
     while node.due(now_s) is None:
         assert now_s < 1.0 + 2 * RULES.most_yield_s, "it waits for ever"
         now_s += RULES.train_pause_s / 2
-        node.heard(5, now_s, broadcast=False, train=InTrain.PERHAPS)
+        node.heard(5, now_s, train=InTrain.PERHAPS)
     assert now_s >= 1.0 + RULES.most_yield_s - RULES.train_pause_s
     quiet = loaded(0, control=1)
-    quiet.heard(5, 1.0, broadcast=False, train=InTrain.PERHAPS)
+    quiet.heard(5, 1.0, train=InTrain.PERHAPS)
     assert quiet.due(1.0) is None
     assert quiet.due(1.0 + RULES.train_pause_s) is not None
 
 
 def test_a_relay_takes_no_pause_for_the_end_of_a_train_whose_end_is_announced():
     relay = loaded(1)
-    relay.heard(5, 1.0, broadcast=False, train=InTrain.MORE)
+    relay.heard(5, 1.0, train=InTrain.MORE)
     assert relay.due(1.0 + 2 * RULES.train_pause_s) is None
-    relay.heard(6, 1.01, broadcast=False, train=InTrain.LAST)  # the end of another one
+    relay.heard(6, 1.01, train=InTrain.LAST)  # the end of another one
     assert relay.due(1.01) is None
-    relay.heard(5, 1.02, broadcast=False, train=InTrain.LAST)
+    relay.heard(5, 1.02, train=InTrain.LAST)
     assert relay.due(1.02) is not None
 
 
 def test_a_relay_does_not_wait_for_ever_for_an_end_that_got_lost():
     relay = loaded(1)
-    relay.heard(5, 1.0, broadcast=False, train=InTrain.MORE)
+    relay.heard(5, 1.0, train=InTrain.MORE)
     assert relay.due(1.0 + RULES.train_hold_s) is not None
     now_s = 2.0
     while relay.due(now_s) is None or now_s == 2.0:
         assert now_s < 2.0 + 2 * RULES.most_hold_s, "it waits for ever"
-        relay.heard(5, now_s, broadcast=False, train=InTrain.MORE)
+        relay.heard(5, now_s, train=InTrain.MORE)
         now_s += RULES.train_pause_s
 
 
@@ -339,5 +348,5 @@ def test_what_waits_in_a_back_off_goes_when_its_receiver_has_been_heard():
         now_s = max(now_s, node.next_try_s)
         assert node.tried(node.due(now_s), False, now_s) is Fate.WAITS
     now_s += 10 * CYCLE_S
-    node.heard(5, now_s, broadcast=False, train=InTrain.PERHAPS)
+    node.heard(5, now_s, train=InTrain.PERHAPS)
     assert node.next_try_s <= now_s + RULES.train_pause_s

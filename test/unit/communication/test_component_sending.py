@@ -167,9 +167,13 @@ def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
     calls = []
 
     class Told(ChildTableTree):
-        def can_communicate_with_node(self, node):
-            calls.append(("can", node))
-            super().can_communicate_with_node(node)
+        def learn(self, creator, from_, kind, payload):
+            calls.append(("heard", from_))
+            return super().learn(creator, from_, kind, payload)
+
+        def sent(self, neighbour, ok, transmissions):
+            calls.append(("took it" if ok else "did not take it", neighbour))
+            super().sent(neighbour, ok, transmissions)
 
         def cant_communicate_with_node(self, node):
             calls.append(("cannot", node))
@@ -179,10 +183,10 @@ def test_the_routing_technique_learns_what_can_and_what_cannot_be_reached():
     mesh = MeshnetworkRouter(1, antenna, RigEngine(), Told(), AlwaysHalf())
     mesh.start(0.0)
     mesh.on_msg(packet(ASK), 0.0)
-    assert calls == [("can", 5), ("can", 5)]  # heard, and has taken the answer
+    assert calls == [("heard", 5), ("took it", 5)]
     antenna.dead = {5}
     mesh.on_msg(packet(ASK), 0.0)
-    assert calls[2:] == [("can", 5), ("cannot", 5)]
+    assert calls[2:] == [("heard", 5), ("did not take it", 5), ("cannot", 5)]
 
 
 def test_broadcasts_do_not_count_as_sent():

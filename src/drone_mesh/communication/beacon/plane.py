@@ -263,7 +263,7 @@ class BeaconPlane(IControlPlane):
             self._basics.complaints.dropped("a damaged beacon", payload, now_s)
             return
         if beacon.digest:
-            self._basics.frame.heard_digest(creator, beacon.digest)
+            self._basics.frame.heard(creator, beacon.digest)
         if self._basics.frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
         if routes.heard(creator, beacon):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
+
+_HEARTBEAT = int(MessageType.HEARTBEAT)
 
 
 class ChildTableTree(IRoutingTechnique):
@@ -64,6 +67,24 @@ class ChildTableTree(IRoutingTechnique):
         self._forget_holder(node, other)
         return int(node not in self._children_with and node not in self._children)
 
+    def learn(self, creator: int, from_: int, kind: int, payload: bytes) -> bool:
+        """As always; each packet comes here, so what is known costs no call."""
+        if from_ not in self._children:
+            self.can_communicate_with_node(from_)
+        if creator != from_:
+            if kind == _HEARTBEAT:
+                holders = self._children_with.get(creator)
+                if holders is None or from_ not in holders or len(holders) > 1:
+                    self.proven_path_to_node(from_, creator)
+            elif self.get_direction_to_node(creator) == NO_ROUTE:
+                self.other_can_communicate_with_node(from_, creator)
+        return True
+
+    def sent(self, neighbour: int, ok: bool, transmissions: int) -> None:
+        """A neighbour that took a packet is a child."""
+        if ok and neighbour not in self._children:
+            self.can_communicate_with_node(neighbour)
+
     def can_communicate_with_node(self, node: int) -> None:
         """`node` becomes a child."""
         if node not in self._children:
@@ -81,12 +102,8 @@ class ChildTableTree(IRoutingTechnique):
 
     def proven_path_to_node(self, other: int, node: int) -> None:
         """List `node` under `other` and under no other child."""
-        holders = self._children_with.get(node)
-        if holders is not None:
-            if other in holders and len(holders) == 1:
-                return
-            for child in holders - {other}:
-                self.other_cant_communicate_with_node(child, node)
+        for child in self._children_with.get(node, set()) - {other}:
+            self.other_cant_communicate_with_node(child, node)
         self.other_can_communicate_with_node(other, node)
 
     def get_table_size(self) -> int:
