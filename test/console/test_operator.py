@@ -169,10 +169,14 @@ def saved(page: Visit, button: str, folder: Path) -> Path:
 
 def test_table_and_charts_are_saved_as_csv_and_png(page, tmp_path):
     page.wait_for("a chart", lambda: page.page.inner_text("#share-now") == "100 %")
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.click("#power")
+    page.wait_for("a missing number", lambda: page.row(17, 4) == "–")
     nodes = saved(page, "#save-nodes", tmp_path).read_text().splitlines()
     assert nodes[0].startswith("node,role,condition,gateway,hops")
     assert len(nodes) == 1 + len(PLACES)
     assert nodes[1].startswith("0,gateway,connected,0,0")
+    assert "–" not in nodes[18]
     charts = saved(page, "#save-charts", tmp_path).read_text().splitlines()
     assert "routers_connected" in charts[0]
     assert len(charts) > 2

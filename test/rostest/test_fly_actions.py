@@ -76,7 +76,7 @@ class FlyActionsTest(unittest.TestCase):
     def test_1_the_example_follows_a_flight_to_its_end(self) -> None:
         example = self.example("2", "6", "4")
         self.assertEqual(example.returncode, 0, example.stdout)
-        self.assertRegex(example.stdout, r"under way: \d+ m and \d+ s left: x ")
+        self.assertRegex(example.stdout, r"under way, \d+ m and \d+ s left: x ")
         self.assertEqual(example.stdout.splitlines()[-1], "arrived")
         self.assertTrue(self.mesh.stands_at(2, 6.0, 4.0))
 

@@ -54,7 +54,7 @@ class FollowedOrder:
         if self.state is OrderState.ACCEPTED and node is not None and goal is not None:
             left = way_left(node, goal)
             if left is not None:
-                return f"under way: {left[0]:.0f} m and {left[1]:.0f} s left"
+                return f"under way, {left[0]:.0f} m and {left[1]:.0f} s left"
         return self.state.in_words(self.reason)
 
     def since(self, node: NodeStatus) -> str:

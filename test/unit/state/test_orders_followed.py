@@ -36,7 +36,7 @@ def test_an_order_is_followed_from_the_request_to_the_arrival():
 
 def test_a_drone_on_its_way_has_metres_and_seconds_left():
     flying = NodeStatus(5, position=(1.0, 10.0, 3.0), path=(1.0, 2.0, 3.0))
-    assert words(SENT, ACCEPTED, node=flying) == f"{SEVEN}: under way: 8 m and 3 s left"
+    assert words(SENT, ACCEPTED, node=flying) == f"{SEVEN}: under way, 8 m and 3 s left"
     elsewhere = NodeStatus(5, position=(1.0, 10.0, 3.0), path=(9.0, 9.0, 0.0))
     assert words(SENT, ACCEPTED, node=elsewhere) == f"{SEVEN}: accepted"
 

@@ -111,7 +111,8 @@ function showHead() {
     "clock",
     paused ? `${t.toFixed(1)} s, paused` : `${t.toFixed(1)} s, ${achieved.toFixed(1)}×`,
   );
-  setText("summary", summary);
+  const isOld = Boolean(mesh.link) || connection.silent;
+  setText("summary", isOld ? `last known: ${summary}` : summary);
   setText("standing", layouts.at(-1) ?? "");
   byId("standing").hidden = !layouts.length;
   byId("summary").dataset.severity = severity;
@@ -150,11 +151,14 @@ function showLink() {
   byId("link").hidden = !text;
 }
 
-mesh.addEventListener("frame", () => {
-  showHead();
-  showLink();
-});
-connection.addEventListener("change", showLink);
+for (const [source, what] of [
+  [mesh, "frame"],
+  [connection, "change"],
+])
+  source.addEventListener(what, () => {
+    showHead();
+    showLink();
+  });
 mesh.addEventListener("layouts", () => {
   byId("layout").replaceChildren(...mesh.layouts.map(([number, name]) => new Option(name, number)));
   byId("layout-form").hidden = !mesh.layouts.length;

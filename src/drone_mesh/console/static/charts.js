@@ -118,7 +118,7 @@ export class Charts {
     for (let value = 0; value <= top * 1.001; value += step) {
       context.moveTo(LEFT_PX, Math.round(y(value)) + 0.5);
       context.lineTo(width - RIGHT_PX, Math.round(y(value)) + 0.5);
-      context.fillText(Number(value.toPrecision(3)), LEFT_PX - 5, y(value) + 4);
+      context.fillText(label(value), LEFT_PX - 5, y(value) + 4);
     }
     context.stroke();
     const room = context.measureText(`${end.toFixed(0)} s`).width + BETWEEN_TIMES_PX;
@@ -184,6 +184,13 @@ function runsOf(points) {
     else if (runs[runs.length - 1].length) runs.push([]);
   }
   return runs.filter((run) => run.length);
+}
+
+/** A value beside an axis, in at most four characters up to a million: 5000, 15k. */
+function label(value) {
+  return value < 10000
+    ? String(Number(value.toPrecision(3)))
+    : `${Number((value / 1000).toPrecision(3))}k`;
 }
 
 /** Percent of the routers that are on; null while none is. */

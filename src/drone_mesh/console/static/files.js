@@ -1,24 +1,28 @@
 // Saves what the page shows: the table and the charts, as CSV and as pictures, and the places.
 
-import { orDash } from "./mesh.js";
+import { UNKNOWN } from "./mesh.js";
 
 const TEXT_PX = 12; // of the table's picture
 const PICTURE_SCALE = 2; // sharp in print and on a phone, whatever screen it was saved from
 const NODE_COLUMNS = {
-  node: (n) => n.id,
+  node: (n) => n.id, // a number that is not known is an empty field
   role: (n) => (n.role === 1 ? "gateway" : "router"),
   condition: (n) => n.condition,
-  gateway: (n) => orDash(n.gateway),
-  hops: (n) => orDash(n.hops),
-  next_hop: (n) => orDash(n.next_hop),
+  gateway: (n) => known(n.gateway),
+  hops: (n) => known(n.hops),
+  next_hop: (n) => known(n.next_hop),
   neighbours: (n) => n.neighbours,
-  known_nodes: (n) => n.known_nodes,
-  total_messages: (n) => n.total_messages,
-  fallback: (n) => orDash(n.fallback),
+  known_nodes: (n) => n.known_nodes ?? "",
+  total_messages: (n) => n.total_messages ?? "",
+  fallback: (n) => known(n.fallback),
   x_m: (n) => n.position?.[0] ?? "",
   y_m: (n) => n.position?.[1] ?? "",
   z_m: (n) => n.position?.[2] ?? "",
 };
+
+function known(id) {
+  return id === UNKNOWN ? "" : id;
+}
 
 /** The table of nodes. */
 export function nodesCsv(mesh) {
@@ -31,7 +35,9 @@ export function nodesPicture(mesh, colours) {
   const context = picture.getContext("2d");
   const font = `${TEXT_PX * PICTURE_SCALE}px system-ui, sans-serif`;
   const names = Object.keys(NODE_COLUMNS);
-  const rows = [names, ...nodeRows(mesh)].map((row) => row.map(String));
+  const rows = [names, ...nodeRows(mesh)].map((row) =>
+    row.map((value) => (value === "" ? "–" : String(value))),
+  );
   context.font = font;
   const gap = 2 * TEXT_PX;
   const widths = names.map(
@@ -59,7 +65,7 @@ export function chartsCsv(mesh) {
   const columns = Object.keys(mesh.samples[0] ?? { stamp_s: 0 });
   return csv(
     columns,
-    mesh.samples.map((sample) => columns.map((column) => sample[column])),
+    mesh.samples.map((sample) => columns.map((column) => sample[column] ?? "")),
   );
 }
 

@@ -38,9 +38,10 @@ export class Story {
     steps.forEach(({ t, text }, index) => {
       const row = list.children[index] ?? list.appendChild(this.#row());
       const [time, words] = row.children;
-      if (words.textContent === text) return;
-      time.textContent = `${t.toFixed(0)} s`;
-      words.textContent = text;
+      const at = `${t.toFixed(0)} s`;
+      if (words.textContent === text && time.textContent === at) return;
+      time.textContent = at;
+      if (words.textContent !== text) words.textContent = text;
       changed = true;
     });
     for (const row of list.children) {

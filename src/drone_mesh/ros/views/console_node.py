@@ -64,15 +64,17 @@ class MeshFeed:
     def watch_master(self, stop: StopRequest) -> None:
         """Keep the subscriptions alive until the program ends; for the main thread."""
         while not stop.wait(CHECK_PERIOD_S) and not rospy.is_shutdown():
+            is_silent = time.monotonic() - self._heard_s > OLD_STATE_S
             try:
                 run_id = rosgraph.Master(rospy.get_name()).getParam("/run_id")
             except (OSError, rosgraph.MasterException):
-                self._report("no ROS master: waiting for the simulation to start")
+                if is_silent:  # without a master, nodes that are connected still hear each other
+                    self._report("no ROS master: waiting for the simulation to start")
                 continue
             if run_id != self._run_id:
                 self._run_id = run_id
                 self._subscribe()
-            elif time.monotonic() - self._heard_s > OLD_STATE_S:
+            elif is_silent:
                 self._report("no data from the simulation")
             self._watch_packets()
 
