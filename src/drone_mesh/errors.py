@@ -51,3 +51,12 @@ class QueueFull(MessageRefused):
 
 class GoalRefused(MeshError):
     """A goal is invalid, out of bounds or unreachable. Nothing moves; report it to the sender."""
+
+
+class PlaceTaken(GoalRefused):
+    """Another drone is at the goal, or will be there. The order may say that this is meant."""
+
+    def __init__(self, reason: str, drone: int) -> None:
+        """`drone`: the other one."""
+        super().__init__(reason)
+        self.drone = drone

@@ -25,10 +25,20 @@ class FlightOrderAnswer(Message):
     SENT: Final = 1
     NO_ROUTE: Final = 2
     REFUSED: Final = 3
+    PLACE_TAKEN: Final = 4
     gateway: int
     drone: int
     outcome: int
-    def __init__(self, gateway: int = ..., drone: int = ..., outcome: int = ...) -> None: ...
+    reason: str
+    taken_by: int
+    def __init__(
+        self,
+        gateway: int = ...,
+        drone: int = ...,
+        outcome: int = ...,
+        reason: str = ...,
+        taken_by: int = ...,
+    ) -> None: ...
 
 class FlyAction(Message): ...
 

@@ -91,6 +91,30 @@ class FlyMission:
     _request_class = FlyMissionRequest
     _response_class = FlyMissionResponse
 
+class OrderFlightRequest(Message):
+    id: int
+    latitude: float
+    longitude: float
+    height: int
+    allow_shared_place: bool
+    def __init__(
+        self,
+        id: int = ...,
+        latitude: float = ...,
+        longitude: float = ...,
+        height: int = ...,
+        allow_shared_place: bool = ...,
+    ) -> None: ...
+
+class OrderFlightResponse(Message):
+    success: bool
+    message: str
+    def __init__(self, success: bool = ..., message: str = ...) -> None: ...
+
+class OrderFlight:
+    _request_class = OrderFlightRequest
+    _response_class = OrderFlightResponse
+
 class OrderLayoutRequest(Message):
     caseID: int
     def __init__(self, caseID: int = ...) -> None: ...

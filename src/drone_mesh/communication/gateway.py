@@ -23,6 +23,7 @@ from drone_mesh.communication.messages import (
 from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
+from drone_mesh.communication.orders.final_places import FinalPlaces
 from drone_mesh.communication.orders.messages import OrderReply
 from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
@@ -69,6 +70,9 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         self._reports = ReportBook()
         self._book = OrderBook(self._parts, self._may_find, self.control.search)
         self._orders.on_own_reply = self._book.on_outcome
+        self._final_places = FinalPlaces(
+            self._parts, self._book.records, self._reports.nodes, self._options.clearance_m
+        )
 
     def stop(self) -> None:
         """Stop the internet connection, the antenna and debugging."""
@@ -94,12 +98,19 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         return 0
 
     def send_goal_request_to_drone(
-        self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
+        self,
+        node_id: int,
+        latitude: float,
+        longitude: float,
+        height: int,
+        now_s: float,
+        allow_shared_place: bool = False,
     ) -> bool:
         """Send a drone to a place (metres).
 
         True: a next hop took the order, a search for the drone has begun, or it is its own drone.
-        Raises GoalRefused for an invalid node id or place, or if its own drone cannot fly.
+        Raises GoalRefused for an invalid node id or place, or if its own drone cannot fly, and
+        PlaceTaken for the place of another drone, unless `allow_shared_place`.
         """
         self._deadlines.now_s = now_s
         if not 0 <= node_id <= MAX_NODE_ID:
@@ -108,6 +119,8 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if height != int(height):
             raise GoalRefused(f"invalid height {height} m: must be in whole metres")
         goal = Location(latitude, longitude, height)
+        if not allow_shared_place:
+            self._final_places.check(node_id, goal)
         number = self._book.enter(node_id, goal)
         if node_id != self._node_id:
             return self._book.send(number)

@@ -95,9 +95,18 @@ class IGatewayCommands(abc.ABC):
 
     @abc.abstractmethod
     def send_goal_request_to_drone(
-        self, node_id: int, latitude: float, longitude: float, height: int, now_s: float
+        self,
+        node_id: int,
+        latitude: float,
+        longitude: float,
+        height: int,
+        now_s: float,
+        allow_shared_place: bool = False,
     ) -> bool:
         """Send a drone to a place (metres). Raises GoalRefused for an invalid order.
+
+        Raises PlaceTaken for the place of another drone, unless `allow_shared_place`: where it
+        stands, flies to or was last heard.
 
         True: a next hop took the order, or a search for the drone has begun. `get_orders` returns
         the outcome.

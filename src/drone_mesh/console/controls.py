@@ -19,7 +19,9 @@ class MeshControls(Protocol):
 
     def power(self, node: int, on: bool) -> str: ...
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str: ...
+    def fly(
+        self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False
+    ) -> str: ...
 
     def layout(self, case: int) -> str: ...
 
@@ -41,7 +43,9 @@ class RecordingControls:
         """Refused, like everything below."""
         raise OrderRefused(RECORDED)
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str:  # noqa: D102
+    def fly(  # noqa: D102
+        self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False
+    ) -> str:
         raise OrderRefused(RECORDED)
 
     def layout(self, case: int) -> str:  # noqa: D102

@@ -212,7 +212,7 @@ def _power(node_id: int, on: bool) -> Order:
 
 
 def _fly(node_id: int, x: float, y: float, z: float) -> Order:
-    return lambda controls: controls.fly(node_id, x, y, z)
+    return lambda controls: controls.fly(node_id, x, y, z, allow_shared_place=True)  # others leave
 
 
 def _speed(factor: float) -> Order:

@@ -32,10 +32,13 @@ class GatewayClient:
             raise GatewayGone(f"{self.url} is not a gateway of this version")
         return answer
 
-    def order(self, drone: int, latitude: float, longitude: float, height: int) -> None:
+    def order(
+        self, drone: int, latitude: float, longitude: float, height: int, allow_shared_place: bool
+    ) -> None:
         """Send a drone to a position in metres. Raises GatewayGone with the gateway's reason."""
         body = {"latitude": latitude, "longitude": longitude, "height": height}
-        self._ask("POST", f"/drones/{drone}/goal", json.dumps(body).encode())
+        shared = "?allow_shared_place=true" if allow_shared_place else ""
+        self._ask("POST", f"/drones/{drone}/goal{shared}", json.dumps(body).encode())
 
     def _ask(self, method: str, path: str, body: bytes | None = None) -> Any:
         try:
@@ -55,10 +58,10 @@ class GatewayControls:
     def __init__(self, client: GatewayClient) -> None:
         self._client = client
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str:
+    def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
         """Order a drone to a place, through the mesh."""
         try:
-            self._client.order(node, y, x, round(z))
+            self._client.order(node, y, x, round(z), allow_shared_place)
         except GatewayGone as error:
             raise OrderRefused(str(error)) from error
         return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"

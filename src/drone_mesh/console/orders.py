@@ -89,9 +89,10 @@ class _Fly(PageOrder):
     x: Coordinate
     y: Coordinate
     z: float = Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)
+    allow_shared_place: bool = False  # also to the place of another drone
 
     def carry_out(self, controls: MeshControls) -> str:
-        return controls.fly(self.node, self.x, self.y, self.z)
+        return controls.fly(self.node, self.x, self.y, self.z, self.allow_shared_place)
 
     def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
         return (self.node,)

@@ -250,7 +250,15 @@ class Network:
         if antenna.powered != on:
             antenna.switch_power(on)
 
-    def order(self, node_id: int, x: float, y: float, height: int = 0, gateway: int = 0) -> bool:
+    def order(
+        self,
+        node_id: int,
+        x: float,
+        y: float,
+        height: int = 0,
+        gateway: int = 0,
+        allow_shared_place: bool = False,
+    ) -> bool:
         """Order a drone to (x, y, height) metres through a gateway; like IGatewayCommands.
 
         Raises ValueError if `gateway` is not a gateway, and GoalRefused like IGatewayCommands.
@@ -258,7 +266,9 @@ class Network:
         node = self.nodes[gateway]
         if not isinstance(node.component, MeshnetworkGateway):
             raise ValueError(f"node {gateway} is a router; orders go through a gateway")
-        taken = node.component.send_goal_request_to_drone(node_id, y, x, height, self.clock.now_s)
+        taken = node.component.send_goal_request_to_drone(
+            node_id, y, x, height, self.clock.now_s, allow_shared_place
+        )
         node.plan()
         return taken
 

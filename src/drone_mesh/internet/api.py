@@ -33,6 +33,9 @@ Coordinate = Annotated[
     float,
     Path(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False, description="Metres."),
 ]
+SharedPlace = Annotated[
+    bool, Query(description="Also to a place where another drone is, flies to or was last heard.")
+]
 Height = Annotated[
     int,
     Path(ge=0, le=int(MAX_HEIGHT_M), description="Height of the drone's underside, whole metres."),
@@ -133,6 +136,7 @@ def make_api(
     refusals = REFUSALS
     order_refusals: Responses = {
         **refusals,
+        409: {"model": Refusal, "description": "The place of another drone, or no origin"},
         422: {"model": Refusal, "description": "Invalid drone id or place"},
     }
 
@@ -159,9 +163,11 @@ def make_api(
         longitude: Coordinate,
         height: Height,
         response: Response,
+        allow_shared_place: SharedPlace = False,
     ) -> OrderSent:
         """Send a drone to a place, through the mesh."""
-        await send(id, Location(latitude, longitude, float(height)), response)
+        place = Location(latitude, longitude, float(height))
+        await send(id, place, response, allow_shared_place)
         return OrderSent(drone=id, latitude=latitude, longitude=longitude, height=height)
 
     @app.post(
@@ -170,11 +176,13 @@ def make_api(
         responses={
             **order_refusals,
             400: {"model": Refusal, "description": "The body is not text"},
-            409: {"model": Refusal, "description": "No origin"},
         },
     )
     async def set_goal(
-        id: DroneId, goal: Union[FrameGoal, EarthGoal], response: Response
+        id: DroneId,
+        goal: Union[FrameGoal, EarthGoal],
+        response: Response,
+        allow_shared_place: SharedPlace = False,
     ) -> GoalSent:
         """Send a drone to a place, in metres or in degrees, through the mesh."""
         if isinstance(goal, FrameGoal):
@@ -186,7 +194,7 @@ def make_api(
             raise HTTPException(
                 409, "this gateway has no origin (--origin): give the goal in metres"
             )
-        await send(id, place, response)
+        await send(id, place, response, allow_shared_place)
         earth = None if origin is None else EarthGoal(**origin.to_earth(place)._asdict())
         return GoalSent(
             drone=id,
@@ -196,10 +204,10 @@ def make_api(
             earth=earth,
         )
 
-    async def send(drone: int, place: Location, response: Response) -> None:
+    async def send(drone: int, place: Location, response: Response, shared: bool) -> None:
         def order(gateway: IGatewayCommands, now_s: float) -> Tuple[bool, Sequence[OrderRecord]]:
             goal = (place.latitude, place.longitude, int(place.height))
-            taken = gateway.send_goal_request_to_drone(drone, *goal, now_s)
+            taken = gateway.send_goal_request_to_drone(drone, *goal, now_s, shared)
             return taken, gateway.get_orders()
 
         taken, orders = await desk.ask(order)

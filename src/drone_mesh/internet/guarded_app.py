@@ -19,7 +19,7 @@ from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
 from drone_mesh.communication.throttle import Throttle
-from drone_mesh.errors import GoalRefused
+from drone_mesh.errors import GoalRefused, PlaceTaken
 from drone_mesh.internet.asking import AnswerLate, NotCarriedOut
 from drone_mesh.internet.request_guard import RequestGuard
 from drone_mesh.web.access import Access, TooManyGuesses
@@ -103,6 +103,10 @@ def _answer_errors_with_a_reason(app: FastAPI) -> None:
     @app.exception_handler(GoalRefused)
     async def bad_goal(_request: Request, error: GoalRefused) -> JSONResponse:
         return refuse(422, str(error))
+
+    @app.exception_handler(PlaceTaken)
+    async def place_taken(_request: Request, error: PlaceTaken) -> JSONResponse:
+        return refuse(409, str(error))
 
     @app.exception_handler(NotCarriedOut)
     async def not_carried_out(_request: Request, error: NotCarriedOut) -> JSONResponse:

@@ -268,7 +268,9 @@ class Timeline:
         gateway = next(
             (g for g in gateways_of(self._network) if self._network.nodes[g].antenna.powered), None
         )
-        taken = gateway is not None and self._network.order(node, x, y, height, gateway)
+        taken = gateway is not None and self._network.order(
+            node, x, y, height, gateway, allow_shared_place=True
+        )
         self.orders.append(OrderAttempt(self._network.clock.now_s, node, taken))
 
     def _send(self, fault: Fault, _rng: random.Random) -> list[int]:

@@ -9,7 +9,7 @@ from rig import Rig, packet
 
 from drone_mesh.communication.interfaces import NO_ROUTE, KnownNode
 from drone_mesh.drone.location import Location
-from drone_mesh.errors import GoalRefused
+from drone_mesh.errors import GoalRefused, PlaceTaken
 
 
 def gateway_rig(node_id=1):
@@ -113,8 +113,8 @@ def test_an_order_goes_over_another_route_when_the_first_does_not_take_it():
     for child in (2, 3):
         rig.routing.other_can_communicate_with_node(child, 5)
     rig.antenna.dead = {2}
-    assert rig.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, rig.now_s)
-    assert rig.sent(6) == [packet("01 01 06 03 05 00 00 00 00 00 00 00 00 00 00 01 00")]
+    assert rig.mesh.send_goal_request_to_drone(5, 2.0, 0.0, 0, rig.now_s)
+    assert rig.sent(6) == [packet("01 01 06 03 05 00 00 00 40 00 00 00 00 00 00 01 00")]
 
 
 def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(caplog):
@@ -122,7 +122,7 @@ def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(caplog):
     rig.know_neighbour(2)
     caplog.clear()
     with caplog.at_level(logging.INFO):
-        assert not rig.mesh.send_goal_request_to_drone(77, 0.0, 0.0, 0, rig.now_s)
+        assert not rig.mesh.send_goal_request_to_drone(77, 2.0, 0.0, 0, rig.now_s)
     assert [record.getMessage() for record in caplog.records] == [
         "gateway 1: drone 77, order 1 to x 0.00 m, y 0.00 m, z 0 m: no route"
     ]
@@ -134,7 +134,79 @@ def test_an_order_without_an_acknowledgement_is_false():
     rig = gateway_rig()
     rig.know_neighbour(5)
     rig.antenna.dead = {5}
-    assert not rig.mesh.send_goal_request_to_drone(5, 0.0, 0.0, 0, rig.now_s)
+    assert not rig.mesh.send_goal_request_to_drone(5, 2.0, 0.0, 0, rig.now_s)
+
+
+# Places of other drones ------------------------------------------------------------------------
+
+NODE_5_AT_0_8 = "05 05 01 01 01 00 00 00 41"  # latitude 8
+
+
+def order(rig, drone, latitude, allow_shared_place=False):
+    return rig.mesh.send_goal_request_to_drone(
+        drone, latitude, 0.0, 0, rig.now_s, allow_shared_place
+    )
+
+
+def test_an_order_onto_a_drone_that_stands_there_is_refused_with_the_reason_unless_it_says_so():
+    rig = gateway_rig()
+    rig.know_neighbour(2, 5)
+    rig.hear(NODE_5_AT_0_8)
+    with pytest.raises(
+        PlaceTaken, match="^drone 5 stands 0.5 m from there; allow_shared_place"
+    ) as e:
+        order(rig, 2, 8.5)
+    assert e.value.drone == 5
+    assert rig.sent(6) == []
+    assert rig.mesh.get_orders() == []
+    assert order(rig, 2, 9.0)
+    assert order(rig, 2, 8.5, allow_shared_place=True)
+    assert order(rig, 5, 8.5, allow_shared_place=True)
+
+
+def test_its_own_place_refuses_no_drone_an_order():
+    rig = gateway_rig()
+    rig.know_neighbour(5)
+    rig.hear(NODE_5_AT_0_8)
+    assert order(rig, 5, 8.0)
+
+
+def test_an_order_onto_a_drone_that_is_silent_since_is_refused():
+    rig = gateway_rig()
+    rig.know_neighbour(2, 5)
+    rig.hear(NODE_5_AT_0_8)
+    rig.antenna.dead = {5}
+    rig.wait(30.0)
+    with pytest.raises(PlaceTaken, match="drone 5 was last heard 0.0 m from there"):
+        order(rig, 2, 8.0)
+
+
+def test_the_place_of_the_gateway_itself_is_taken():
+    rig = gateway_rig()
+    rig.know_neighbour(2)
+    with pytest.raises(PlaceTaken, match="drone 1 stands"):
+        order(rig, 2, 0.0)
+
+
+def test_only_the_final_place_of_a_drone_on_its_way_counts():
+    rig = gateway_rig()
+    rig.know_neighbour(2, 3, 5)
+    rig.hear(NODE_5_AT_0_8)
+    assert order(rig, 5, 20.0)
+    assert order(rig, 2, 8.0)
+    with pytest.raises(PlaceTaken, match="drone 5 flies to a place 0.0 m from there"):
+        order(rig, 3, 20.0)
+    rig.hear("05 05 40 01 01 01 00 03")  # order 1: arrived
+    with pytest.raises(PlaceTaken, match="drone 5 stands 0.0 m from there"):
+        order(rig, 3, 20.0)
+
+
+def test_a_drone_that_reports_another_place_has_left_the_first_one():
+    rig = gateway_rig()
+    rig.know_neighbour(2, 5)
+    rig.hear(NODE_5_AT_0_8)
+    rig.hear("05 05 02 01 01 00 00 c8 42 00 00 00 00 01 00")  # it asks, from latitude 100
+    assert order(rig, 2, 8.0)
 
 
 def test_an_order_for_its_own_drone_is_flown_and_the_landing_reported():

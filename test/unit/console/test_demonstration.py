@@ -27,7 +27,7 @@ class Fleet:
         self.is_off = self.is_off - {node} if on else self.is_off | {node}
         return ""
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str:
+    def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
         if not self.network.order(node, x, y, round(z)):
             raise OrderRefused(f"no gateway has a route to drone {node}")
         return ""

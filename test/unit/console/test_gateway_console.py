@@ -170,6 +170,12 @@ def test_an_order_of_the_page_is_posted_and_a_refusal_comes_back(gateway):
         controls.fly(3, 0.0, 0.0, 0.0)
 
 
+def test_an_order_onto_the_place_of_another_drone_says_so_to_the_gateway(gateway):
+    controls = GatewayControls(GatewayClient(gateway.url))
+    controls.fly(3, 1.5, -2.0, 4.0, allow_shared_place=True)
+    assert gateway.requests[0][1] == "/drones/3/goal?allow_shared_place=true"
+
+
 def test_orders_that_only_a_simulation_knows_are_refused():
     controls = GatewayControls(GatewayClient("http://127.0.0.1:1"))
     for refused in (

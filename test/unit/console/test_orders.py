@@ -28,8 +28,8 @@ class Notebook:
         self.done.append(("power", node, on))
         return "done"
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str:
-        self.done.append(("fly", node, x, y, z))
+    def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
+        self.done.append(("fly", node, x, y, z, *["shared"] * allow_shared_place))
         return "done"
 
     def layout(self, case: int) -> str:
@@ -92,6 +92,10 @@ def test_an_invalid_mission_is_refused(wrong: dict[str, object]) -> None:
     [
         ({"do": "power", "node": 3, "on": False}, ("power", 3, False)),
         ({"do": "fly", "node": 253, "x": -1.5, "y": 2, "z": 0}, ("fly", 253, -1.5, 2.0, 0.0)),
+        (
+            {"do": "fly", "node": 2, "x": 1, "y": 2, "z": 0, "allow_shared_place": True},
+            ("fly", 2, 1.0, 2.0, 0.0, "shared"),
+        ),
         ({"do": "layout", "case": 202}, ("layout", 202)),
         ({"do": "speed", "paused": True, "factor": 0}, ("speed", True, 0.0)),
         ({"do": "add", "x": 1.5, "y": -2}, ("add", None, False, 1.5, -2.0)),

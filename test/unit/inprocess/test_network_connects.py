@@ -175,7 +175,7 @@ def test_a_drone_that_cannot_be_reached_does_not_move():
     network = line(2, spacing=8.0)
     network.add_router(9, 100.0, 0.0)
     network.run_for(20.0)
-    assert not network.order(9, x=0.0, y=0.0)
+    assert not network.order(9, x=50.0, y=0.0)
     assert events(network, "NO_ROUTE")[0][1:] == (0, 9)
     network.run_for(20.0)
     assert network.location(9).longitude == 100.0
@@ -265,7 +265,7 @@ RECORDED = [
     "66.240 3 LANDED 255",
     "66.252 3 CONNECTED 0 2 hops",
 ]
-RECORDED_PACKETS = 171
+RECORDED_PACKETS = 175
 
 
 def test_a_recorded_run_of_layout_201_without_node_2():

@@ -120,4 +120,4 @@ def test_every_drone_is_reached_by_one_gateway_or_the_other():
     network = fleet(16, gridsize=4, gateways=2)
     network.run_for(30.0)
     for node in range(2, 18):
-        assert any(network.order(node, x=0.0, y=0.0, gateway=gateway) for gateway in (0, 1))
+        assert any(network.order(node, x=2.0 * node, y=50.0, gateway=g) for g in (0, 1))

@@ -107,7 +107,7 @@ def test_all_nodes_learn_that_a_node_is_missing_and_that_it_is_back():
     network.run_for(20.0)
     network.power(4, False)
     network.run_for(20.0)
-    assert not network.order(4, x=0.0, y=0.0)
+    assert not network.order(4, x=24.0, y=1.0)
     network.power(4, True)
     network.run_for(12.0)
     assert network.order(4, x=24.0, y=1.0)

@@ -41,5 +41,7 @@ def test_the_description_names_all_operations_and_what_may_come_back(mesh):
         ("get", "/orders"): sorted(always),
         ("get", "/orders/{id}"): sorted(always | {"404", "422"}),
         ("post", "/drones/{id}/goal"): sorted(always | {"409", "422"}),
-        ("post", "/DroneMovement/{id}/{latitude}/{longitude}/{height}"): sorted(always | {"422"}),
+        ("post", "/DroneMovement/{id}/{latitude}/{longitude}/{height}"): sorted(
+            always | {"409", "422"}
+        ),
     }

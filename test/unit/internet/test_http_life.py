@@ -29,7 +29,7 @@ class SlowGateway(IGatewayCommands):
     def __init__(self):
         self.begun, self.go_on = threading.Event(), threading.Event()
 
-    def send_goal_request_to_drone(self, node_id, latitude, longitude, height, now_s):
+    def send_goal_request_to_drone(self, node_id, latitude, longitude, height, now_s, shared=False):
         self.begun.set()
         assert self.go_on.wait(PATIENCE_S)
         return True

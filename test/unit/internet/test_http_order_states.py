@@ -19,7 +19,7 @@ def test_an_order_is_followed_to_its_arrival_where_its_location_header_points(ma
 
 def test_an_order_without_a_route_is_in_the_list_with_that_state(make_mesh):
     mesh = make_mesh()
-    assert mesh.client.post("/DroneMovement/99/0/0/0").status_code == 503
+    assert mesh.client.post("/DroneMovement/99/0/50/0").status_code == 503
     answer = mesh.client.get("/orders").json()
     assert answer["gateway"] == 0
     assert [(order["drone"], order["state"]) for order in answer["orders"]] == [(99, "no route")]

@@ -52,6 +52,7 @@ class GatewayConnection:
         self._relay_check = RelayCheck(parts, self._detours)
         self._unanswered = 0  # heartbeats in a row
         self._asked_neighbour_s = -math.inf  # for its gateway
+        self._moved = False  # since the gateway was last asked for its place
 
     def next_hop(self) -> int:
         """The next hop to the preferred gateway, or NO_ROUTE."""
@@ -229,7 +230,8 @@ class GatewayConnection:
         age_s = self._parts.now_s - places.gateway_seen_s
         too_old = age_s >= (MAX_AGE_PERIODS - 1) * self._parts.timing.check_period_s
         unsure = places.gateway is None or next_hop == self.gateway or too_old
-        if unsure and not gateway_asked:
+        if (unsure and not gateway_asked) or self._moved:  # the request tells where this node is
+            self._moved = False
             ask_for_place(self._parts, self.gateway)
         if next_hop not in (self.gateway, NO_ROUTE):
             ask_for_place(self._parts, next_hop)
@@ -239,6 +241,7 @@ class GatewayConnection:
     def end(self, event: RouterEvent) -> None:
         """Disconnect because of `event`; earlier hop counts are void."""
         self._states.happened(event)
+        self._moved = self._moved or event is RouterEvent.LANDED
         self.hops = NO_ROUTE
         self._shortcut = None
         self._heartbeat_sent_s = self._answered_s = -math.inf

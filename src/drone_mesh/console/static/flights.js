@@ -57,14 +57,19 @@ export class Flights extends EventTarget {
     send?.();
   }
 
-  /** The drones farthest from the gateway first, so that relays leave last. */
+  /**
+   * The drones farthest from the gateway first, so that relays leave last. A place that another of these drones leaves is
+   * free; for the place of any other drone, the user is asked.
+   */
   async #order(moves) {
     const hops = ({ id }) => this.mesh.nodes.get(id)?.hops ?? 0;
+    const leaving = new Set(moves.map((move) => move.id));
     const failed = [];
     let text = "";
     for (const { id, x, y, z } of [...moves].sort((a, b) => hops(b) - hops(a))) {
+      const request = { do: "fly", node: id, x: metres(x), y: metres(y), z };
       try {
-        text = await this.order({ do: "fly", node: id, x: metres(x), y: metres(y), z });
+        text = await this.#sendOne(request, leaving);
       } catch (error) {
         failed.push(`${id}: ${error.message}`);
       }
@@ -73,6 +78,20 @@ export class Flights extends EventTarget {
       text = `ordered ${moves.length - failed.length} of ${moves.length} drones`;
     if (failed.length) this.toast(failed.slice(0, 3).join("; "), true);
     if (failed.length < moves.length) this.toast(text, false);
+  }
+
+  /** Sends one order, and again if it leads to the place of a drone that leaves, or if the user agrees. */
+  async #sendOne(request, leaving) {
+    try {
+      return await this.order(request);
+    } catch (error) {
+      const taken = /^drone (\d+) .*allow_shared_place/.exec(error.message);
+      if (!taken) throw error;
+      const reason = error.message.split(";")[0];
+      const question = `Drone ${request.node}: ${reason}. Send it all the same?`;
+      if (!leaving.has(Number(taken[1])) && !(await agreed(question, "Send"))) throw error;
+      return this.order({ ...request, allow_shared_place: true });
+    }
   }
 
   /** Whether no drone flies far, or the user agrees. */

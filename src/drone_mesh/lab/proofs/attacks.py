@@ -201,7 +201,7 @@ def _replay(
     network = stranger.network
     stranger.listen()
     for place in (HERE, THERE):
-        network.order(1, place.longitude, place.latitude)
+        network.order(1, place.longitude, place.latitude, allow_shared_place=True)
         network.run_until(lambda at=place: network.location(1) == at, within_s=120.0)  # type: ignore[misc]
     network.run_for(15.0)
     meanwhile()

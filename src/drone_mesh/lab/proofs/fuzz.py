@@ -53,8 +53,8 @@ def fuzz(
     taps = {node: Tap(network, node, record) for node in network.nodes}
     for node, tap in taps.items():
         network.nodes[node].receiver = tap
-    network.order(1, 3.0, 0.0)
-    network.order(1, 0.0, 0.0)
+    network.order(1, 3.0, 0.0, allow_shared_place=True)
+    network.order(1, 0.0, 0.0, allow_shared_place=True)
     network.run_for(60.0)
     models = [recorded.payload for recorded in record]
     for node, tap in taps.items():

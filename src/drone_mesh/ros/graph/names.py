@@ -16,9 +16,11 @@ BROADCAST_SERVICE = "SignalSimulator/broadcast"
 
 LAYOUTS_PARAM = "DroneManager/casus"  # the file of the layouts; empty or not set: the package's
 GATEWAY_TOPIC = "gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
+SHARED_PLACE_TOPIC = "gateway/shared_place"  # the same, also to places of other drones
 GATEWAY_ANSWERS_TOPIC = "gateway/answers"  # FlightOrderAnswer: each gateway -> DroneManager
 REQUEST_MOVEMENT_SERVICE = "DroneManager/requestDroneMovement"
 SET_TO_CASUS_SERVICE = "DroneManager/SetToCasus"
+ORDER_FLIGHT_SERVICE = "DroneManager/orderFlight"  # OrderFlight
 ORDER_LAYOUT_SERVICE = "DroneManager/orderLayout"  # OrderLayout
 WITHDRAW_LAYOUT_SERVICE = "DroneManager/withdrawLayout"  # WithdrawLayout
 LAYOUT_ACTION = "DroneManager/layout"  # Layout

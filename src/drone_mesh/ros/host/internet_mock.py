@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 
 import rospy
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
-from drone_mesh.errors import GoalRefused
+from drone_mesh.errors import GoalRefused, PlaceTaken
 from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
@@ -19,8 +20,10 @@ _log = logging.getLogger(__name__)
 
 
 class RosInternetMock(IInternetConnection):
-    """Subscribes /gateway (RequestGatewayDroneFlight), and passes each order to its gateway.
+    """Passes orders to its gateway.
 
+    Subscribes: /gateway (RequestGatewayDroneFlight), and /gateway/shared_place (the same type) for
+    orders that may lead to the place of another drone.
     Publishes /gateway/answers (FlightOrderAnswer): the outcome of each order.
 
     `connect` and `disconnect` are for the executor's worker, to which orders are submitted.
@@ -30,48 +33,69 @@ class RosInternetMock(IInternetConnection):
         """`node_id` is the gateway's."""
         self._node_id = node_id
         self._slot = slot
-        self._subscriber: rospy.Subscriber | None = None
+        self._subscribers: list[rospy.Subscriber] = []
         self._answers: rospy.Publisher | None = None
 
     def connect(self, commands: IGatewayCommands) -> None:
         """Subscribe; orders go to `commands`."""
 
-        def order(request: RequestGatewayDroneFlight) -> None:
-            self._slot.submit(lambda now_s: self._order(commands, request, now_s))
+        def order(allow_shared_place: bool, request: RequestGatewayDroneFlight) -> None:
+            self._slot.submit(
+                lambda now_s: self._order(commands, request, allow_shared_place, now_s)
+            )
 
         self.disconnect()
         self._answers = rospy.Publisher(
             names.GATEWAY_ANSWERS_TOPIC, FlightOrderAnswer, tcp_nodelay=True, queue_size=_QUEUE
         )
-        self._subscriber = rospy.Subscriber(
-            names.GATEWAY_TOPIC, RequestGatewayDroneFlight, order, tcp_nodelay=True
-        )
+        self._subscribers = [
+            rospy.Subscriber(
+                topic, RequestGatewayDroneFlight, partial(order, shared), tcp_nodelay=True
+            )
+            for topic, shared in ((names.GATEWAY_TOPIC, False), (names.SHARED_PLACE_TOPIC, True))
+        ]
 
     def disconnect(self) -> None:
-        """Leave both topics. A second call changes nothing."""
-        if self._subscriber is not None and self._answers is not None:
-            self._subscriber.unregister()
+        """Leave the topics. A second call changes nothing."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        if self._answers is not None:
             self._answers.unregister()
-        self._subscriber = self._answers = None
+        self._subscribers, self._answers = [], None
 
     def _order(
-        self, commands: IGatewayCommands, request: RequestGatewayDroneFlight, now_s: float
+        self,
+        commands: IGatewayCommands,
+        request: RequestGatewayDroneFlight,
+        allow_shared_place: bool,
+        now_s: float,
     ) -> None:
         if self._answers is None:
             return  # the gateway has ended
         goal = location_of(request)
         try:
             taken = commands.send_goal_request_to_drone(
-                request.ID, request.latitude, request.longitude, request.height, now_s
+                request.ID,
+                request.latitude,
+                request.longitude,
+                request.height,
+                now_s,
+                allow_shared_place,
             )
+        except PlaceTaken as error:
+            _log.warning("gateway %d: order for drone %d: %s", self._node_id, request.ID, error)
+            self._answer(request.ID, FlightOrderAnswer.PLACE_TAKEN, str(error), error.drone)
+            return
         except GoalRefused as error:
             _log.warning("gateway %d: order for drone %d: %s", self._node_id, request.ID, error)
-            self._answer(request.ID, FlightOrderAnswer.REFUSED)
+            self._answer(request.ID, FlightOrderAnswer.REFUSED, str(error))
             return
         self._answer(request.ID, FlightOrderAnswer.SENT if taken else FlightOrderAnswer.NO_ROUTE)
         if taken:
             _log.info("gateway %d sent drone %d to %s", self._node_id, request.ID, goal.in_words())
 
-    def _answer(self, drone: int, outcome: int) -> None:
+    def _answer(self, drone: int, outcome: int, reason: str = "", taken_by: int = 0) -> None:
         if self._answers is not None:
-            self._answers.publish(FlightOrderAnswer(self._node_id, drone, outcome))
+            self._answers.publish(
+                FlightOrderAnswer(self._node_id, drone, outcome, reason, taken_by)
+            )

@@ -14,7 +14,7 @@ from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.errors import GoalRefused
 from drone_mesh.layouts import Layouts, Order, UnknownCase
-from drone_mesh.msg import RequestGatewayDroneFlight
+from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
 from drone_mesh.ros.graph.conversions import flight_order, location_of
@@ -23,13 +23,16 @@ from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
 from drone_mesh.ros.graph.master_watch import MasterWatch
 from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
-from drone_mesh.ros.services.order_answers import OrderAnswers
+from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
 from drone_mesh.ros.services.standing_layouts import StandingLayouts
 from drone_mesh.srv import (
     Casus,
     CasusRequest,
     CasusResponse,
+    OrderFlight,
+    OrderFlightRequest,
+    OrderFlightResponse,
     OrderLayout,
     OrderLayoutRequest,
     OrderLayoutResponse,
@@ -44,6 +47,7 @@ from drone_mesh.srv import (
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
 POLL_PERIOD_S = 0.05
+NO_GATEWAY = "no gateway is running to take the order"
 ORDERS_IN_QUEUE = 512  # two whole fleets
 
 _log = logging.getLogger(__name__)
@@ -53,12 +57,12 @@ class DroneManager:
     """Passes orders from users and layouts to the gateways.
 
     Parameters (private): ~casus (a YAML file of layouts; config/casus.yaml by default)
-    Publishes:  /gateway (RequestGatewayDroneFlight)
+    Publishes:  /gateway, /gateway/shared_place (RequestGatewayDroneFlight)
     Subscribes: /gateway/answers (FlightOrderAnswer)
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
                 (Casus), also as /requestDroneMovement and /SetToCasus;
-                /DroneManager/orderLayout (OrderLayout), /DroneManager/withdrawLayout
-                (WithdrawLayout)
+                /DroneManager/orderFlight (OrderFlight), /DroneManager/orderLayout (OrderLayout),
+                /DroneManager/withdrawLayout (WithdrawLayout)
     Standing orders: see StandingLayouts
     """
 
@@ -66,11 +70,11 @@ class DroneManager:
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts = layouts
-        self._gateways = rospy.Publisher(
-            names.GATEWAY_TOPIC,
-            RequestGatewayDroneFlight,
-            tcp_nodelay=True,
-            queue_size=ORDERS_IN_QUEUE,
+        self._gateways, self._sharing = (
+            rospy.Publisher(
+                topic, RequestGatewayDroneFlight, tcp_nodelay=True, queue_size=ORDERS_IN_QUEUE
+            )
+            for topic in (names.GATEWAY_TOPIC, names.SHARED_PLACE_TOPIC)
         )
         self._answers = OrderAnswers()
         self._standing = StandingLayouts(self._publish, self._carry_out)
@@ -78,32 +82,50 @@ class DroneManager:
             rospy.Service(name, RequestDroneFlight, self._request_movement)
         for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
             rospy.Service(name, Casus, self._set_to_casus)
+        rospy.Service(names.ORDER_FLIGHT_SERVICE, OrderFlight, self._order_flight)
         rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
         rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, self._withdraw_layout)
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
         """Status 1: a gateway has the order; 2: no gateway has a route; 0: there is no gateway."""
-        goal = location_of(request)
         try:
-            check_goal(*goal)
+            why_not = self._order_one(Order(request.ID, location_of(request)), False)
         except GoalRefused as error:
             raise rospy.ServiceException(str(error)) from None
-        if request.ID > MAX_NODE_ID:
-            raise rospy.ServiceException(f"invalid drone id {request.ID}: must be 0..{MAX_NODE_ID}")
+        if why_not == NO_GATEWAY:
+            return RequestDroneFlightResponse(status=0)
+        return RequestDroneFlightResponse(status=2 if why_not else 1)
+
+    def _order_flight(self, request: OrderFlightRequest) -> OrderFlightResponse:
+        order = Order(request.id, location_of(request))
+        try:
+            why_not = self._order_one(order, request.allow_shared_place)
+        except GoalRefused as error:
+            raise rospy.ServiceException(str(error)) from None
+        return OrderFlightResponse(success=not why_not, message=why_not)
+
+    def _order_one(self, order: Order, allow_shared_place: bool) -> str:
+        """Why the order was not sent; empty if it was. Raises GoalRefused if it was refused."""
+        drone, goal = order
+        check_goal(*goal)
+        if drone > MAX_NODE_ID:
+            raise GoalRefused(f"invalid drone id {drone}: must be 0..{MAX_NODE_ID}")
         fleet = drones_if_known()
-        if fleet is not None and request.ID not in fleet.roles:
-            raise rospy.ServiceException(
-                f"drone {request.ID} is not in this fleet: its ids are {ids_in_words(fleet.roles)}"
+        if fleet is not None and drone not in fleet.roles:
+            raise GoalRefused(
+                f"drone {drone} is not in this fleet: its ids are {ids_in_words(fleet.roles)}"
             )
         if not self._gateway_is_there():
-            _log.warning("drone %d: order dropped: no gateway is running", request.ID)
-            return RequestDroneFlightResponse(status=0)
-        _sent, no_route = self._order([Order(request.ID, goal)], fleet)
-        if no_route:
-            _log.warning("drone %d: no gateway has a route to it", request.ID)
-        else:
-            self._standing.replace(request.ID)
-        return RequestDroneFlightResponse(status=2 if no_route else 1)
+            _log.warning("drone %d: order dropped: no gateway is running", drone)
+            return NO_GATEWAY
+        outcomes = self._order([order], fleet, allow_shared_place)
+        for answer in outcomes.refused.values():
+            raise GoalRefused(answer.reason)
+        if not outcomes.no_route:
+            self._standing.replace(drone)
+            return ""
+        _log.warning("drone %d: no gateway has a route to it", drone)
+        return f"no gateway has a route to drone {drone}"
 
     def _set_to_casus(self, request: CasusRequest) -> CasusResponse:
         self._carry_out(request.caseID)
@@ -135,27 +157,58 @@ class DroneManager:
         known = [o for o in orders if fleet is None or o.node_id in fleet.roles]
         missing = [order.node_id for order in orders if order not in known]
         number = self._standing.give(case, orders, handle)
-        sent, no_route = self._order(known, fleet)
-        summary = OrderSummary(sent, no_route, missing)
-        complete = len(sent) == len(orders)
+        summary = self._order_all(known, fleet, missing)
+        complete = len(summary.sent) == len(orders)
         _log.log(
             logging.INFO if complete else logging.WARNING, "case %d: %s", case, summary.in_words()
         )
         return number, summary
 
-    def _publish(self, orders: Sequence[Order]) -> None:
+    def _publish(self, orders: Sequence[Order], allow_shared_place: bool = False) -> None:
+        checked = not (allow_shared_place and self._sharing.get_num_connections())
+        topic = self._gateways if checked else self._sharing  # a gateway of 2019 only has the first
         for node_id, goal in orders:
-            self._gateways.publish(flight_order(node_id, goal))
+            topic.publish(flight_order(node_id, goal))
+
+    def _order_all(
+        self, orders: Sequence[Order], fleet: PresentDrones | None, missing: Sequence[int]
+    ) -> OrderSummary:
+        """Order the drones of a layout, in which only the final places matter.
+
+        A drone that is refused because another one of the layout stands at its place is ordered
+        again: the other one leaves that place.
+        """
+        outcomes = self._order(orders, fleet)
+        members = {order.node_id for order in orders} - set(outcomes.no_route)
+        leaving = {
+            drone
+            for drone, answer in outcomes.refused.items()
+            if answer.outcome == FlightOrderAnswer.PLACE_TAKEN and answer.taken_by in members
+        }
+        again = self._order([o for o in orders if o.node_id in leaving], fleet, True)
+        refused = {**outcomes.refused, **again.refused}
+        return OrderSummary(
+            outcomes.sent + again.sent,
+            outcomes.no_route + again.no_route,
+            missing,
+            {
+                drone: answer.reason
+                for drone, answer in refused.items()
+                if drone not in leaving or drone in again.refused
+            },
+        )
 
     def _order(
-        self, orders: Sequence[Order], fleet: PresentDrones | None
-    ) -> tuple[list[int], list[int]]:
-        """Publish these orders in sequence; returns the ids (sent, without a route)."""
-
+        self,
+        orders: Sequence[Order],
+        fleet: PresentDrones | None,
+        allow_shared_place: bool = False,
+    ) -> Outcomes:
+        """Publish these orders in sequence, and collect the gateways' answers."""
         gateways = self._gateways.get_num_connections() if fleet is None else len(fleet.gateways)
         drones = [order.node_id for order in orders]
         return self._answers.await_outcomes(
-            drones, lambda: self._publish(orders), gateways, ANSWERS_TIMEOUT_S
+            drones, lambda: self._publish(orders, allow_shared_place), gateways, ANSWERS_TIMEOUT_S
         )
 
     def _gateway_is_there(self) -> bool:

@@ -7,7 +7,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import whole_metres
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
-from drone_mesh.srv import RequestDroneFlight, RequestDroneFlightRequest
+from drone_mesh.srv import OrderFlight, OrderFlightRequest
 
 
 class FlightNotOrdered(MeshError):
@@ -15,21 +15,18 @@ class FlightNotOrdered(MeshError):
 
 
 class FlightRefused(FlightNotOrdered):
-    """The DroneManager refuses the order: it can never be carried out."""
+    """The order is refused: it is invalid, or leads to the place of another drone."""
 
 
-def request_flight(drone: int, goal: Location) -> None:
+def request_flight(drone: int, goal: Location, allow_shared_place: bool = False) -> None:
     """Order a drone to a place, through the mesh. Raises FlightNotOrdered. Any thread."""
-    request = RequestDroneFlightRequest(
-        drone, goal.latitude, goal.longitude, whole_metres(goal.height)
-    )
+    height = whole_metres(goal.height)
+    request = OrderFlightRequest(drone, goal.latitude, goal.longitude, height, allow_shared_place)
     try:
-        status = call_once(names.REQUEST_MOVEMENT_SERVICE, RequestDroneFlight, request).status
+        answer = call_once(names.ORDER_FLIGHT_SERVICE, OrderFlight, request)
     except ServiceGone as error:
         raise FlightNotOrdered(f"{error}: is the simulation running?") from None
     except ServiceRefused as error:
         raise FlightRefused(str(error)) from None
-    if status == 0:
-        raise FlightNotOrdered("no gateway is running")
-    if status == 2:
-        raise FlightNotOrdered(f"no gateway has a route to drone {drone}")
+    if not answer.success:
+        raise FlightNotOrdered(answer.message)

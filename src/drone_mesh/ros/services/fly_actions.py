@@ -67,7 +67,7 @@ class FlyActions:
     """Offers the flight of each drone as an action: /Drones/<id>/fly (Fly).
 
     Subscribes: /mesh/events (MeshEvent); while a drone flies also /mesh/state (MeshState)
-    Calls:      /DroneManager/requestDroneMovement (RequestDroneFlight)
+    Calls:      /DroneManager/orderFlight (OrderFlight)
     """
 
     # One node for all drones, and no thread per drone: an action server of actionlib repeats its
@@ -182,7 +182,8 @@ class FlyActions:
             if node is None or not math.isfinite(node.position[0]):
                 raise FlightNotOrdered("its place is not known")
             x, y, z = node.position
-            request_flight(flight.drone, Location.from_vector((x, y, max(0.0, z))))
+            here = Location.from_vector((x, y, max(0.0, z)))
+            request_flight(flight.drone, here, allow_shared_place=True)  # above all, it stops
             why = f"ordered to stop at x {x:.1f} m, y {y:.1f} m, z {max(0.0, z):.0f} m"
         except FlightNotOrdered as error:
             why = f"the drone continues its flight: {error}"

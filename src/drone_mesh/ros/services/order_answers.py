@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Callable, Collection
+from typing import Callable, Collection, NamedTuple
 
 import rospy
 
@@ -12,17 +12,25 @@ from drone_mesh.msg import FlightOrderAnswer
 from drone_mesh.ros.graph import names
 
 
+class Outcomes(NamedTuple):
+    """What the gateways did with the orders of a batch; lists of ids."""
+
+    sent: list[int]
+    no_route: list[int]
+    refused: dict[int, FlightOrderAnswer]  # by drone: one of the answers
+
+
 class _Waiter:
-    """The answers to one batch of orders. `condition` guards `outcomes`."""
+    """The answers to one batch of orders. `condition` guards `answers`."""
 
     def __init__(self, drones: Collection[int]) -> None:
         self.condition = threading.Condition()
-        self.outcomes: dict[int, list[int]] = {drone: [] for drone in drones}
+        self.answers: dict[int, list[FlightOrderAnswer]] = {drone: [] for drone in drones}
 
     def take(self, answer: FlightOrderAnswer) -> None:
         with self.condition:
-            if answer.drone in self.outcomes:
-                self.outcomes[answer.drone].append(answer.outcome)
+            if answer.drone in self.answers:
+                self.answers[answer.drone].append(answer)
                 self.condition.notify()
 
 
@@ -38,12 +46,12 @@ class OrderAnswers:
 
     def await_outcomes(
         self, drones: Collection[int], order: Callable[[], None], gateways: int, timeout_s: float
-    ) -> tuple[list[int], list[int]]:
-        """Call `order`, then wait for the answers; returns the ids (sent, without a route).
+    ) -> Outcomes:
+        """Call `order`, then wait for the answers.
 
-        A drone counts as sent as soon as one gateway has sent the order, and as without a route
-        when all `gateways` report that. A drone without a full set of answers after `timeout_s`
-        (wall) counts as sent, because a gateway need not answer.
+        A drone counts as sent as soon as one gateway has sent the order, and as refused or without
+        a route when all `gateways` have answered otherwise. A drone without a full set of answers
+        after `timeout_s` (wall) counts as sent, because a gateway need not answer.
         """
         waiter = _Waiter(drones)
         with self._lock:
@@ -54,15 +62,23 @@ class OrderAnswers:
         finally:
             with self._lock:
                 self._waiters.discard(waiter)
-        lost = [drone for drone in drones if _is_lost(waiter.outcomes[drone], gateways)]
-        return [drone for drone in drones if drone not in lost], lost
+        outcomes = Outcomes([], [], {})
+        for drone in drones:
+            answers = waiter.answers[drone]
+            refusals = [answer for answer in answers if answer.outcome in _REFUSALS]
+            if _is_sent(answers) or len(answers) < max(1, gateways):
+                outcomes.sent.append(drone)
+            elif refusals:
+                outcomes.refused[drone] = refusals[0]
+            else:
+                outcomes.no_route.append(drone)
+        return outcomes
 
     @staticmethod
     def _wait(waiter: _Waiter, gateways: int, deadline_s: float) -> None:
         def is_complete() -> bool:
             return all(
-                FlightOrderAnswer.SENT in outcomes or len(outcomes) >= gateways
-                for outcomes in waiter.outcomes.values()
+                _is_sent(answers) or len(answers) >= gateways for answers in waiter.answers.values()
             )
 
         with waiter.condition:
@@ -79,5 +95,8 @@ class OrderAnswers:
             waiter.take(answer)
 
 
-def _is_lost(outcomes: list[int], gateways: int) -> bool:
-    return FlightOrderAnswer.SENT not in outcomes and len(outcomes) >= max(1, gateways)
+_REFUSALS = (FlightOrderAnswer.REFUSED, FlightOrderAnswer.PLACE_TAKEN)
+
+
+def _is_sent(answers: list[FlightOrderAnswer]) -> bool:
+    return any(answer.outcome == FlightOrderAnswer.SENT for answer in answers)

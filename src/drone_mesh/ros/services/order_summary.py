@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Sequence
+from dataclasses import dataclass, field
+from typing import Mapping, Sequence
 
 from drone_mesh.drone.fleet import ids_in_words
 
@@ -15,13 +15,16 @@ class OrderSummary:
     sent: Sequence[int]
     no_route: Sequence[int]
     not_in_fleet: Sequence[int]
+    refused: Mapping[int, str] = field(default_factory=dict)  # by drone: the reason
 
     def in_words(self) -> str:
         """One line, for example: ordered 16 of 17 drones; drone 17 is not in this fleet."""
-        total = len(self.sent) + len(self.no_route) + len(self.not_in_fleet)
+        others = (self.no_route, self.not_in_fleet, self.refused)
+        total = len(self.sent) + sum(map(len, others))
         parts = [f"ordered {len(self.sent)} of {_counted(total, 'drone')}"]
         if self.no_route:
             parts.append(f"no route yet to {_named(self.no_route)}")
+        parts += [f"drone {drone} stays: {reason}" for drone, reason in self.refused.items()]
         if self.not_in_fleet:
             verb = "is" if len(self.not_in_fleet) == 1 else "are"
             parts.append(f"{_named(self.not_in_fleet)} {verb} not in this fleet")

@@ -46,10 +46,10 @@ class RosControls:
         _call(names.power_switch(node), PowerSwitch, PowerSwitchRequest(power=on))
         return f"node {node} is {'on' if on else 'off'}"
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str:
+    def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
         """Order a drone to a place, through the mesh."""
         try:
-            request_flight(node, Place(latitude=y, longitude=x, height=z))
+            request_flight(node, Place(latitude=y, longitude=x, height=z), allow_shared_place)
         except FlightNotOrdered as error:
             raise OrderRefused(str(error)) from error
         return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"

@@ -25,7 +25,7 @@ def gateway_rig(medium=SHARED):
 
 
 def order(rig, drone=5):
-    return rig.mesh.send_goal_request_to_drone(drone, 1.0, 0.0, 0, rig.now_s)
+    return rig.mesh.send_goal_request_to_drone(drone, float(drone), 0.0, 0, rig.now_s)
 
 
 def searches(rig):
