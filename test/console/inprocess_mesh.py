@@ -11,6 +11,7 @@ from typing import Sequence
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.dots import Dot
 from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.errors import PlaceTaken
 from drone_mesh.inprocess.network import Network
 from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.missions import Mission
@@ -99,9 +100,9 @@ class InProcessMesh:
             self._network.power(node, on)
         return f"node {node} is {'on' if on else 'off'}"
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str:
+    def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
         with self._lock:
-            taken = self._network.order(node, x, y, round(z))
+            taken = self._network.order(node, x, y, round(z), allow_shared_place=allow_shared_place)
         if not taken:
             raise OrderRefused(f"the gateway has no route to drone {node}")
         return f"drone {node} is sent to ({x:g}, {y:g}, {z:g})"
@@ -114,7 +115,8 @@ class InProcessMesh:
         with self._lock:
             for node, goal in orders:
                 if node in self._network.nodes:
-                    self._network.order(node, goal.longitude, goal.latitude, int(goal.height))
+                    place = (goal.longitude, goal.latitude, int(goal.height))
+                    self._network.order(node, *place, allow_shared_place=True)
         return f"ordered layout {case}"
 
     def speed(self, paused: bool, factor: float) -> str:

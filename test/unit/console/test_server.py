@@ -51,7 +51,7 @@ class PromptControls:
     def power(self, node: int, on: bool) -> str:
         return f"{node} {on}"
 
-    def fly(self, node: int, x: float, y: float, z: float) -> str:
+    def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
         return "flies"
 
     def layout(self, case: int) -> str:
