@@ -101,8 +101,13 @@ class InProcessMesh:
         return f"node {node} is {'on' if on else 'off'}"
 
     def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
-        with self._lock:
-            taken = self._network.order(node, x, y, round(z), allow_shared_place=allow_shared_place)
+        try:
+            with self._lock:
+                taken = self._network.order(
+                    node, x, y, round(z), allow_shared_place=allow_shared_place
+                )
+        except PlaceTaken as error:
+            raise OrderRefused(str(error)) from error
         if not taken:
             raise OrderRefused(f"the gateway has no route to drone {node}")
         return f"drone {node} is sent to ({x:g}, {y:g}, {z:g})"

@@ -101,6 +101,24 @@ def test_a_flight_of_more_than_fifty_metres_is_confirmed(page):
     page.wait_for("13 flies", lambda: page.row(13, STATE) == "flying")
 
 
+def test_an_order_onto_the_place_of_another_drone_is_confirmed(page):
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.fill("#fly-x", str(PLACES[16][0] + 0.5))
+    page.page.fill("#fly-y", str(PLACES[16][1]))
+    page.answer_held("#held-now")
+    page.page.click("#fly-form button")
+    page.wait_for("the question", lambda: page.page.is_visible("#confirm"))
+    question = "Drone 17: drone 16 stands 0.5 m from there. Send it all the same?"
+    assert page.page.inner_text("#confirm-text") == question
+    page.page.click("#confirm >> text=Cancel")
+    page.page.wait_for_timeout(500)
+    assert page.row(17, STATE) == "connected"
+    page.answer_held("#held-now")
+    page.page.click("#fly-form button")
+    page.page.click("#confirm button >> text=Send")
+    page.wait_for("17 flies", lambda: page.row(17, STATE) == "flying")
+
+
 def test_several_drones_are_switched_together(page):
     page.page.click("#nodes tr[data-id='6']")
     for node in (12, 17):  # not by mouse: the panel above the table grows when its facts arrive

@@ -6,14 +6,15 @@ from __future__ import annotations
 import math
 import time
 import unittest
-from typing import Container
+from types import MappingProxyType
+from typing import Container, Mapping
 
 import rospy
 import rostest
 from rostest_support import LogWatch, call, wait_for
 
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
-from drone_mesh.srv import Casus, OrderLayout, RequestDroneFlight
+from drone_mesh.srv import Casus, OrderFlight, OrderLayout, RequestDroneFlight
 
 
 def request(node_id: int, latitude: float, longitude: float, height: int) -> int:
@@ -29,25 +30,38 @@ class ManagerTest(unittest.TestCase):
 
     def setUp(self) -> None:
         self.orders: list[RequestGatewayDroneFlight] = []
-        self.gateway: rospy.Subscriber | None = None
+        self.sharing: list[int] = []  # the drones that were ordered onto others' places
 
-    def tearDown(self) -> None:
-        if self.gateway is not None:
-            self.gateway.unregister()
+    def listen(
+        self, no_route: Container[int] = (), taken: Mapping[int, int] = MappingProxyType({})
+    ) -> None:
+        """Subscribe as a gateway does, and answer. Orders to drone 250 show that they arrive.
 
-    def listen(self, no_route: Container[int] = ()) -> None:
-        """Subscribe as a gateway does, and answer. Orders to drone 250 show that they arrive."""
+        `taken`: by whom the place of an order is taken.
+        """
         answers = rospy.Publisher("/gateway/answers", FlightOrderAnswer, queue_size=100)
         wait_for("the manager to subscribe", 10, lambda: answers.get_num_connections() > 0)
         trials: list[RequestGatewayDroneFlight] = []
 
         def order(order: RequestGatewayDroneFlight) -> None:
             (trials if order.ID == 250 else self.orders).append(order)
+            if order.ID in taken:
+                by = taken[order.ID]
+                why = f"drone {by} stands there"
+                answers.publish(0, order.ID, FlightOrderAnswer.PLACE_TAKEN, why, by)
+                return
             lost = order.ID in no_route
             outcome = FlightOrderAnswer.NO_ROUTE if lost else FlightOrderAnswer.SENT
-            answers.publish(FlightOrderAnswer(0, order.ID, outcome))
+            answers.publish(FlightOrderAnswer(gateway=0, drone=order.ID, outcome=outcome))
 
-        self.gateway = rospy.Subscriber("/gateway", RequestGatewayDroneFlight, order)
+        def share(order: RequestGatewayDroneFlight) -> None:
+            self.sharing.append(order.ID)
+            answers.publish(FlightOrderAnswer(0, order.ID, FlightOrderAnswer.SENT, "", 0))
+
+        for topic, take in (("/gateway", order), ("/gateway/shared_place", share)):
+            gateway = rospy.Subscriber(topic, RequestGatewayDroneFlight, take)
+            self.addCleanup(gateway.unregister)
+            wait_for("the manager to connect", 10, lambda at=gateway: at.get_num_connections() > 0)
         wait_for("no order arrived", 10, lambda: request(250, 1, 1, 1) == 1 and trials)
 
     def test_an_order_reaches_the_gateway_as_it_was_given(self) -> None:
@@ -63,6 +77,24 @@ class ManagerTest(unittest.TestCase):
         self.assertEqual(request(3, 1, 1, 0), 2)
         self.assertEqual(request(4, 1, 1, 0), 1)
         wait_for("a line", 5, lambda: self.log.lines("drone 3: no gateway has a route to it"))
+
+    def test_an_order_onto_the_place_of_another_drone_is_refused_unless_it_says_so(self) -> None:
+        self.listen(taken={3: 5})
+        with self.assertRaisesRegex(rospy.ServiceException, "drone 5 stands there"):
+            request(3, 1, 1, 0)
+        answer = call("/DroneManager/orderFlight", OrderFlight, 3, 1, 1, 0, False)
+        self.assertEqual((answer.success, answer.message), (False, "drone 5 stands there"))
+        self.assertEqual(self.sharing, [])
+        self.assertTrue(call("/DroneManager/orderFlight", OrderFlight, 3, 1, 1, 0, True).success)
+        self.assertEqual(self.sharing, [3])
+
+    def test_in_a_layout_a_place_that_another_of_its_drones_leaves_is_free(self) -> None:
+        self.listen(taken={6: 5, 3: 99})
+        answer = call("/DroneManager/orderLayout", OrderLayout, 101)
+        self.assertEqual(self.sharing, [6])
+        self.assertEqual(list(answer.sent), [5, 4, 2, 1, 6])
+        reason = "drone 3 stays: drone 99 stands there"
+        self.assertEqual(answer.message, f"ordered 5 of 6 drones; {reason}")
 
     def test_a_gateway_that_does_not_answer_counts_as_one_that_sent(self) -> None:
         silent = rospy.Subscriber("/gateway", RequestGatewayDroneFlight, self.orders.append)
