@@ -82,8 +82,8 @@ class ManagerTest(unittest.TestCase):
         self.listen(taken={3: 5})
         with self.assertRaisesRegex(rospy.ServiceException, "drone 5 stands there"):
             request(3, 1, 1, 0)
-        answer = call("/DroneManager/orderFlight", OrderFlight, 3, 1, 1, 0, False)
-        self.assertEqual((answer.success, answer.message), (False, "drone 5 stands there"))
+        with self.assertRaisesRegex(rospy.ServiceException, "drone 5 stands there"):
+            call("/DroneManager/orderFlight", OrderFlight, 3, 1, 1, 0, False)
         self.assertEqual(self.sharing, [])
         self.assertTrue(call("/DroneManager/orderFlight", OrderFlight, 3, 1, 1, 0, True).success)
         self.assertEqual(self.sharing, [3])
