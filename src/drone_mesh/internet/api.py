@@ -6,6 +6,7 @@ Python 3.8.
 
 import logging
 import math
+import time
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 from fastapi import FastAPI, Path, Query, Response
@@ -15,6 +16,7 @@ from typing_extensions import Annotated
 
 from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE, IGatewayCommands, KnownNode
 from drone_mesh.communication.order_record import OrderRecord
+from drone_mesh.communication.throttle import Throttle
 from drone_mesh.drone.geodesy import EarthPlace, Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
 from drone_mesh.drone.location import Location
@@ -25,6 +27,11 @@ from drone_mesh.internet.orders import add_order_requests
 from drone_mesh.internet.status import ReadStatus, add_status_request
 from drone_mesh.users.desk import UsersDesk
 from drone_mesh.web.access import Access
+from drone_mesh.web.rate_limit import RateLimit
+
+MOST_ORDERS_AT_ONCE = 300  # our choice: a whole fleet
+ORDER_PERIOD_S = 0.05  # our choice, wall: of further orders; a full channel carries fewer
+ORDER_LOG_PERIOD_S = 10.0  # our choice: between two lines about one drone
 
 _log = logging.getLogger(__name__)
 
@@ -204,7 +211,15 @@ def make_api(
             earth=earth,
         )
 
+    limit = RateLimit(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)
+    log_lines = Throttle(ORDER_LOG_PERIOD_S)
+
     async def send(drone: int, place: Location, response: Response, shared: bool) -> None:
+        if limit.is_over():
+            most = f"{1 / ORDER_PERIOD_S:g} orders a second"
+            raise HTTPException(429, f"more than {most}: not sent", headers={"Retry-After": "1"})
+        limit.note()
+
         def order(gateway: IGatewayCommands, now_s: float) -> Tuple[bool, Sequence[OrderRecord]]:
             goal = (place.latitude, place.longitude, int(place.height))
             taken = gateway.send_goal_request_to_drone(drone, *goal, now_s, shared)
@@ -217,7 +232,8 @@ def make_api(
             raise HTTPException(
                 503, f"the gateway has no route to drone {drone}: the order was not sent"
             )
-        _log.info("drone %d: order sent, to %s", drone, place.in_words())
+        if log_lines.count(f"drone {drone}", time.monotonic()):
+            _log.info("drone %d: order sent, to %s", drone, place.in_words())
 
     not_found: Responses = {
         404: {"model": Refusal, "description": "No such order, or no longer remembered"},

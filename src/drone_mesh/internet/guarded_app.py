@@ -44,7 +44,7 @@ REFUSALS: Responses = {
     411: {"model": Refusal, "description": "A body of unknown length"},
     413: {"model": Refusal, "description": "Body too large; no request needs one"},
     414: {"model": Refusal, "description": "Address too long"},
-    429: {"model": Refusal, "description": "Too many wrong tokens from this address; wait 1 s"},
+    429: {"model": Refusal, "description": "Too many orders, or wrong tokens; wait 1 s"},
     431: {"model": Refusal, "description": "Headers too large"},
     503: {"model": Refusal, "description": "Not done; nothing was sent"},
     504: {"model": Refusal, "description": "Started, but not finished in time"},

@@ -16,9 +16,11 @@ from urllib.parse import urlsplit
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.web import LOOPBACK
-from drone_mesh.web.guesses import GuessLimit
+from drone_mesh.web.rate_limit import RateLimit, client_of
 
 SHORTEST_TOKEN = 16  # characters; our choice: too long to be guessed over a network
+FREE_GUESSES = 10  # our choice: an old cookie or a typing error costs no time
+GUESS_PERIOD_S = 1.0  # our choice: of further wrong tokens of one address
 
 
 class AccessDenied(MeshError):
@@ -39,7 +41,9 @@ class Access:
 
     token: str | None = None
     names: frozenset[str] = frozenset()
-    guesses: GuessLimit = field(default_factory=GuessLimit, compare=False, repr=False)
+    guesses: RateLimit = field(
+        default_factory=lambda: RateLimit(FREE_GUESSES, GUESS_PERIOD_S), compare=False, repr=False
+    )
 
     def check_host(self, host: str) -> None:
         """Check the Host header. Raises AccessDenied."""
@@ -66,11 +70,12 @@ class Access:
             return True
         if not token:
             return False
-        if self.guesses.is_over(address):
+        client = client_of(address)
+        if self.guesses.is_over(client):  # otherwise the answer to a right token would tell
             raise TooManyGuesses(f"too many wrong tokens from {address}: try again in a second")
         if hmac.compare_digest(token.encode(), self.token.encode()):
             return True
-        self.guesses.note_wrong(address)
+        self.guesses.note(client)
         return False
 
 

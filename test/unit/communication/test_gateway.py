@@ -124,7 +124,8 @@ def test_an_order_without_a_route_is_false_and_one_line_names_the_drone(caplog):
     with caplog.at_level(logging.INFO):
         assert not rig.mesh.send_goal_request_to_drone(77, 2.0, 0.0, 0, rig.now_s)
     assert [record.getMessage() for record in caplog.records] == [
-        "gateway 1: drone 77, order 1 to x 0.00 m, y 2.00 m, z 0 m: no route"
+        "node 1: an order for drone 77 failed: order 1 to x 0.00 m, y 2.00 m, z 0 m: no route "
+        "(1 so far)"
     ]
     assert rig.tried() == []
     assert (rig.events[-1].kind.name, rig.events[-1].peer) == ("NO_ROUTE", 77)

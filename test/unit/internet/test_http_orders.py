@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import re
 
 import pytest
+
+from drone_mesh.internet import api
 
 
 def test_ready_names_the_gateway(mesh):
@@ -28,6 +31,19 @@ def test_an_order_for_a_drone_without_a_route_is_answered_503_with_the_reason(me
     reason = "the gateway has no route to drone 99: the order was not sent"
     assert answer.json() == {"detail": reason}
     assert mesh.sent() == sent
+
+
+def test_more_orders_than_a_mesh_can_carry_are_not_sent(make_mesh, monkeypatch, caplog):
+    monkeypatch.setattr(api, "MOST_ORDERS_AT_ONCE", 3)
+    caplog.set_level(logging.INFO)
+    mesh = make_mesh()
+    answers = [mesh.client.post("/DroneMovement/1/1/1/0") for _ in range(10)]
+    statuses = [answer.status_code for answer in answers]
+    assert statuses[:3] == [200] * 3
+    refused = answers[statuses.index(429)]
+    assert refused.json() == {"detail": "more than 20 orders a second: not sent"}
+    assert refused.headers["Retry-After"] == "1"
+    assert len([line for line in caplog.messages if "order sent" in line]) == 1
 
 
 def test_an_order_for_the_gateway_itself_flies_its_own_drone(make_mesh):

@@ -5,7 +5,6 @@ docs/protocol.md, "Orders".
 
 from __future__ import annotations
 
-import logging
 import math
 from dataclasses import dataclass, field
 from typing import Callable, Iterable
@@ -27,8 +26,6 @@ FOUND_WITHIN_S = 1.0  # our choice: a search passes through 100 nodes within hal
 MOST_SEARCHES = 3  # our choice: per order; the path that a search found may break at once
 QUERY_PERIOD_S = 15.0  # our choice: period of queries to a drone under way
 MOST_QUERIES = 20  # our choice: without an answer: five minutes
-
-_log = logging.getLogger(__name__)
 
 
 EVENT_OF = {
@@ -252,8 +249,8 @@ class OrderBook:
         what = f"order {order.number} to {order.goal.in_words()}"
         if order.state in _FAILURES:
             words = order.state.in_words(order.reason)
-            me = self._parts.node_id
-            _log.warning("gateway %d: drone %d, %s: %s", me, order.drone, what, words)
+            reason = f"an order for drone {order.drone} failed"
+            self._parts.complaints.add(reason, f"{what}: {words}", self._parts.now_s)
         detail = f"{what}: {order.reason}" if order.reason else what
         self._parts.report(EVENT_OF[order.state], order.drone, detail)
 

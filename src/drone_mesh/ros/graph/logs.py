@@ -33,6 +33,10 @@ class ThrottledLog:
         """Count `reason`; log it with `text` unless it was logged within the last period."""
         self._complain(logging.WARNING, reason, text)
 
+    def info(self, reason: str, text: str) -> None:
+        """Like `warning`, at level info."""
+        self._complain(logging.INFO, reason, text)
+
     def error(self, reason: str, text: str) -> None:
         """Like `warning`, at level error."""
         self._complain(logging.ERROR, reason, text)

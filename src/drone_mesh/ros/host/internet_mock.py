@@ -13,8 +13,13 @@ from drone_mesh.execution import ExecutorSlot
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_of
+from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.web.rate_limit import RateLimit
 
 _QUEUE = 512  # answers that may wait for a slow DroneManager: two whole fleets
+
+MOST_ORDERS_AT_ONCE = 512  # our choice: two whole fleets
+ORDER_PERIOD_S = 0.05  # our choice, wall: of further orders; the world waits for each
 
 _log = logging.getLogger(__name__)
 
@@ -35,11 +40,17 @@ class RosInternetMock(IInternetConnection):
         self._slot = slot
         self._subscribers: list[rospy.Subscriber] = []
         self._answers: rospy.Publisher | None = None
+        self._limit = RateLimit(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)  # for the subscriber's thread
+        self._throttled_log = ThrottledLog(_log)
 
     def connect(self, commands: IGatewayCommands) -> None:
         """Subscribe; orders go to `commands`."""
 
         def order(allow_shared_place: bool, request: RequestGatewayDroneFlight) -> None:
+            if self._limit.is_over():
+                self._refuse(request.ID, f"more than {1 / ORDER_PERIOD_S:g} orders a second")
+                return
+            self._limit.note()
             self._slot.submit(
                 lambda now_s: self._order(commands, request, allow_shared_place, now_s)
             )
@@ -83,16 +94,24 @@ class RosInternetMock(IInternetConnection):
                 allow_shared_place,
             )
         except PlaceTaken as error:
-            _log.warning("gateway %d: order for drone %d: %s", self._node_id, request.ID, error)
-            self._answer(request.ID, FlightOrderAnswer.PLACE_TAKEN, str(error), error.drone)
+            self._refuse(request.ID, str(error), FlightOrderAnswer.PLACE_TAKEN, error.drone)
             return
         except GoalRefused as error:
-            _log.warning("gateway %d: order for drone %d: %s", self._node_id, request.ID, error)
-            self._answer(request.ID, FlightOrderAnswer.REFUSED, str(error))
+            self._refuse(request.ID, str(error))
             return
         self._answer(request.ID, FlightOrderAnswer.SENT if taken else FlightOrderAnswer.NO_ROUTE)
         if taken:
-            _log.info("gateway %d sent drone %d to %s", self._node_id, request.ID, goal.in_words())
+            self._throttled_log.info(
+                f"gateway {self._node_id}: order for drone {request.ID}", f"to {goal.in_words()}"
+            )
+
+    def _refuse(
+        self, drone: int, why: str, outcome: int = FlightOrderAnswer.REFUSED, taken_by: int = 0
+    ) -> None:
+        self._throttled_log.warning(
+            f"gateway {self._node_id}: order refused", f"for drone {drone}: {why}"
+        )
+        self._answer(drone, outcome, why, taken_by)
 
     def _answer(self, drone: int, outcome: int, reason: str = "", taken_by: int = 0) -> None:
         if self._answers is not None:

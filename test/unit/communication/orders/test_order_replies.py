@@ -359,7 +359,7 @@ def test_an_order_that_cannot_be_sent_leaves_the_one_before_as_it_was(caplog):
     rig.antenna.dead = {5}
     assert not rig.mesh.send_goal_request_to_drone(5, 2.0, 0.0, 0, rig.now_s)
     assert states(rig) == ["accepted", "no route"]
-    assert "drone 5, order 2 to x 0.00 m, y 2.00 m, z 0 m: no route" in caplog.text
+    assert "drone 5 failed: order 2 to x 0.00 m, y 2.00 m, z 0 m: no route" in caplog.text
     rig.antenna.dead = set()
     rig.hear("05 05 40 00 00 01 00 03")
     assert states(rig) == ["arrived", "no route"]

@@ -1,0 +1,43 @@
+"""Limits how often something happens, per client."""
+
+from __future__ import annotations
+
+import ipaddress
+import time
+from typing import Callable
+
+MOST_CLIENTS = 1024
+
+
+class RateLimit:
+    """So many times at once per client, then once per period. One thread at a time."""
+
+    def __init__(
+        self, at_once: int, period_s: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._slack_s = (at_once - 1) * period_s
+        self._period_s = period_s
+        self._clock = clock
+        self._used_up_s: dict[str, float] = {}  # by client: until then what it did counts
+
+    def is_over(self, client: str = "") -> bool:
+        """Whether this client has to wait."""
+        return self._used_up_s.get(client, 0.0) - self._clock() > self._slack_s
+
+    def note(self, client: str = "") -> None:
+        """This client did it once more."""
+        until_s = max(self._clock(), self._used_up_s.pop(client, 0.0))
+        self._used_up_s[client] = until_s + self._period_s
+        if len(self._used_up_s) > MOST_CLIENTS:
+            del self._used_up_s[next(iter(self._used_up_s))]  # it has been quiet for longest
+
+
+def client_of(address: str) -> str:
+    """What counts as one client: an address, of IPv6 a whole /64."""
+    try:
+        parsed = ipaddress.ip_address(address)
+    except ValueError:  # a socket of this machine
+        return address
+    if isinstance(parsed, ipaddress.IPv6Address):
+        return str(int(parsed) >> 64)
+    return address
