@@ -27,7 +27,7 @@ from drone_mesh.internet.orders import add_order_requests
 from drone_mesh.internet.status import ReadStatus, add_status_request
 from drone_mesh.users.desk import UsersDesk
 from drone_mesh.web.access import Access
-from drone_mesh.web.rate_limit import RateLimit
+from drone_mesh.web.allowance import Allowance
 
 MOST_ORDERS_AT_ONCE = 300  # our choice: a whole fleet
 ORDER_PERIOD_S = 0.05  # our choice, wall: of further orders; a full channel carries fewer
@@ -211,7 +211,7 @@ def make_api(
             earth=earth,
         )
 
-    limit = RateLimit(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)
+    limit = Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)
     log_lines = Throttle(ORDER_LOG_PERIOD_S)
 
     async def send(drone: int, place: Location, response: Response, shared: bool) -> None:

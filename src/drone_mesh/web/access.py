@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.web import LOOPBACK
-from drone_mesh.web.rate_limit import RateLimit, client_of
+from drone_mesh.web.allowance import Allowance, client_of
 
 SHORTEST_TOKEN = 16  # characters; our choice: too long to be guessed over a network
 FREE_GUESSES = 10  # our choice: an old cookie or a typing error costs no time
@@ -41,8 +41,8 @@ class Access:
 
     token: str | None = None
     names: frozenset[str] = frozenset()
-    guesses: RateLimit = field(
-        default_factory=lambda: RateLimit(FREE_GUESSES, GUESS_PERIOD_S), compare=False, repr=False
+    guesses: Allowance = field(
+        default_factory=lambda: Allowance(FREE_GUESSES, GUESS_PERIOD_S), compare=False, repr=False
     )
 
     def check_host(self, host: str) -> None:

@@ -14,7 +14,7 @@ from drone_mesh.web.access import (
     TooManyGuesses,
     access_for,
 )
-from drone_mesh.web.rate_limit import MOST_CLIENTS, RateLimit
+from drone_mesh.web.allowance import MOST_CLIENTS, Allowance
 
 TOKEN = "0123456789abcdef"
 HERE = "127.0.0.1"
@@ -51,7 +51,7 @@ def test_the_right_token_is_accepted():
 
 def test_an_address_that_guesses_gets_one_guess_a_second_and_others_do_not_wait():
     clock = [1000.0]
-    access = Access(TOKEN, guesses=RateLimit(FREE_GUESSES, 1.0, lambda: clock[0]))
+    access = Access(TOKEN, guesses=Allowance(FREE_GUESSES, 1.0, lambda: clock[0]))
     for _ in range(FREE_GUESSES):
         assert not access.is_right("wrong", "10.0.0.1")
     with pytest.raises(TooManyGuesses, match=r"from 10\.0\.0\.1: try again"):
@@ -76,7 +76,7 @@ def test_a_network_of_ipv6_counts_as_one_address():
 
 
 def test_only_so_many_addresses_are_remembered():
-    limit = RateLimit(1, 1.0, lambda: 0.0)
+    limit = Allowance(1, 1.0, lambda: 0.0)
     for number in range(2 * MOST_CLIENTS):
         limit.note(f"client {number}")
     assert len(limit._used_up_s) == MOST_CLIENTS

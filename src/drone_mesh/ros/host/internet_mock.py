@@ -14,7 +14,7 @@ from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_of
 from drone_mesh.ros.graph.logs import ThrottledLog
-from drone_mesh.web.rate_limit import RateLimit
+from drone_mesh.web.allowance import Allowance
 
 _QUEUE = 512  # answers that may wait for a slow DroneManager: two whole fleets
 
@@ -40,7 +40,7 @@ class RosInternetMock(IInternetConnection):
         self._slot = slot
         self._subscribers: list[rospy.Subscriber] = []
         self._answers: rospy.Publisher | None = None
-        self._limit = RateLimit(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)  # for the subscriber's thread
+        self._limit = Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)  # for the subscriber's thread
         self._throttled_log = ThrottledLog(_log)
 
     def connect(self, commands: IGatewayCommands) -> None:

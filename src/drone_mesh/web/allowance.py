@@ -1,4 +1,4 @@
-"""Limits how often something happens, per client."""
+"""Allowance: how often a client may do something."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Callable
 MOST_CLIENTS = 1024
 
 
-class RateLimit:
+class Allowance:
     """So many times at once per client, then once per period. One thread at a time."""
 
     def __init__(
