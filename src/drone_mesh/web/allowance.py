@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import threading
 import time
 from typing import Callable
 
@@ -10,7 +11,7 @@ MOST_CLIENTS = 1024
 
 
 class Allowance:
-    """So many times at once per client, then once per period. One thread at a time."""
+    """So many times at once per client, then once per period. Any thread."""
 
     def __init__(
         self, at_once: int, period_s: float, clock: Callable[[], float] = time.monotonic
@@ -18,6 +19,7 @@ class Allowance:
         self._slack_s = (at_once - 1) * period_s
         self._period_s = period_s
         self._clock = clock
+        self._lock = threading.Lock()  # held while something is noted
         self._used_up_s: dict[str, float] = {}  # by client: until then what it did counts
 
     def is_over(self, client: str = "") -> bool:
@@ -26,10 +28,11 @@ class Allowance:
 
     def note(self, client: str = "") -> None:
         """This client did it once more."""
-        until_s = max(self._clock(), self._used_up_s.pop(client, 0.0))
-        self._used_up_s[client] = until_s + self._period_s
-        if len(self._used_up_s) > MOST_CLIENTS:
-            del self._used_up_s[next(iter(self._used_up_s))]  # it has been quiet for longest
+        with self._lock:
+            until_s = max(self._clock(), self._used_up_s.pop(client, 0.0))
+            self._used_up_s[client] = until_s + self._period_s
+            if len(self._used_up_s) > MOST_CLIENTS:
+                del self._used_up_s[next(iter(self._used_up_s))]  # it has been quiet for longest
 
 
 def client_of(address: str) -> str:

@@ -40,7 +40,7 @@ class RosInternetMock(IInternetConnection):
         self._slot = slot
         self._subscribers: list[rospy.Subscriber] = []
         self._answers: rospy.Publisher | None = None
-        self._limit = Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)  # for the subscriber's thread
+        self._limit = Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)
         self._throttled_log = ThrottledLog(_log)
 
     def connect(self, commands: IGatewayCommands) -> None:
