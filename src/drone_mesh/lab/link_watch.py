@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import AbstractSet
 
 from drone_mesh.air.graph import Graph
 from drone_mesh.lab.network_sample import NetworkSample
@@ -21,6 +22,9 @@ class LinkWatch:
     router_s: float = 0.0  # live routers times seconds
     reachable_s: float = 0.0  # of these, with a path over existing links
     served_s: float = 0.0  # of these, served
+    shares: list[float] = field(default_factory=list)  # of each sample: served of those with a path
+    lapses_s: list[float] = field(default_factory=list)  # times with a path, but not served
+    _lapsing: dict[int, float] = field(default_factory=dict, repr=False)  # node -> since when
     _links: set[tuple[int, int]] | None = field(default=None, repr=False)
     _last_s: float = field(default=0.0, repr=False)
 
@@ -40,4 +44,14 @@ class LinkWatch:
             self.router_s += len(sample.alive) * passed_s
             self.reachable_s += len(reachable) * passed_s
             self.served_s += len(sample.served & reachable) * passed_s
+            self._follow_lapses(sample, reachable)
         self._links, self._last_s = links, sample.now_s
+
+    def _follow_lapses(self, sample: NetworkSample, reachable: AbstractSet[int]) -> None:
+        lapsing = reachable - sample.served
+        if reachable:
+            self.shares.append(1.0 - len(lapsing) / len(reachable))
+        for node in self._lapsing.keys() - lapsing:  # served again, off, or without any path
+            self.lapses_s.append(sample.now_s - self._lapsing.pop(node))
+        for node in lapsing - self._lapsing.keys():
+            self._lapsing[node] = sample.now_s

@@ -279,10 +279,12 @@ class Battery(Part):
 
 
 class Churn(Part):
-    """Deaths and returns at random times."""
+    """Deaths and returns at random times; or many at once, periodically."""
 
     deaths_per_min: AtLeast0 = 0.0
     births_per_min: AtLeast0 = 0.0
+    switched: Annotated[int, Field(ge=0, le=MAX_DRONES)] = 0  # random drones: off, or on again
+    every_s: Above0 = 60.0  # period of `switched`
     for_s: Optional[Above0] = None
 
 
@@ -413,6 +415,7 @@ class Scenario(Part):
     layout: Layout = Layout()
     range_m: Above0 = MAX_DISTANCE_M
     radio: Radio = Radio()
+    key: bool = False  # a gateway has a mesh key, each router its own keys
     routing: str = DEFAULT_ROUTING
     repair: str = DEFAULT_REPAIR
     repair_options: Repair = Repair()

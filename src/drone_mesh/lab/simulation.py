@@ -13,6 +13,7 @@ import numpy as np
 from drone_mesh.air.graph import Graph
 from drone_mesh.channel.statistics import RadioStatistics
 from drone_mesh.communication.repair.options import LostPlace, RepairOptions
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.positions import PositionErrors
@@ -46,6 +47,8 @@ FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m a
 
 ABLE_WITHIN_M = 1.0  # a place believed to be so near to the range leads to the gateway
 
+_KEY = MeshKey(b"the key of a lab")
+
 OnStatus = Callable[[MeshStatus], None]
 Stopwatch = Callable[[], float]
 """Processor time of this process, in seconds."""
@@ -73,7 +76,8 @@ class Simulation:
         self._probes = ProbeSender(
             self.network, scenario.probes, scenario.duration_s, streams.of("probes")
         )
-        is_watched = scenario.probes.per_s or scenario.mobility.kind != "none"
+        churns = any(fault.churn is not None for fault in scenario.faults)
+        is_watched = churns or scenario.probes.per_s or scenario.mobility.kind != "none"
         self._links = LinkWatch(scenario.probes.from_s) if is_watched else None
         self._samples: list[NetworkSample] = []
         self._start_places = self._places()
@@ -285,7 +289,7 @@ def _network(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> 
         timing=timing,
         routing=scenario.routing,
         max_distance_m=scenario.range_m,
-        **_options(scenario, streams),
+        **_options(scenario, streams, places),
     )
     grounded = streams.of("grounded")
     for place in places:
@@ -303,7 +307,7 @@ def _places(scenario: Scenario, streams: Streams) -> list[StartPoint]:
     return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
 
 
-def _options(scenario: Scenario, streams: Streams) -> dict[str, Any]:
+def _options(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> dict[str, Any]:
     """The arguments that differ from the network's defaults."""
     options: dict[str, Any] = {
         "repair": scenario.repair,
@@ -313,6 +317,9 @@ def _options(scenario: Scenario, streams: Streams) -> dict[str, Any]:
             lost_place=LostPlace(scenario.repair_options.lost_place),
         ),
     }
+    if scenario.key:
+        gateways = {place.node_id for place in places if place.gateway}
+        options["key"] = lambda node: _KEY if node in gateways else _KEY.for_node(node)
     if scenario.positions != Positions():
         options["positions"] = PositionErrors(**scenario.positions.model_dump())
     if scenario.radio.kind == "disc":

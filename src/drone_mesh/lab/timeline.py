@@ -217,7 +217,23 @@ class Timeline:
                 if at_s >= end_s:
                     break
                 clock.call_at(at_s, self._churn_one, (alive, rng.random()))
+        routers = sorted(set(self._network.nodes) - set(gateways_of(self._network)))
+        at_s = clock.now_s
+        while what.switched and at_s < end_s:
+            chosen = sorted(rng.sample(routers, min(what.switched, len(routers))))
+            clock.call_at(at_s, self._switch, chosen)
+            at_s += what.every_s
         return []
+
+    def _switch(self, chosen: list[int]) -> None:
+        powered = [n for n in chosen if self._network.nodes[n].antenna.powered]
+        for action, nodes in (
+            ("death", powered),
+            ("birth", [n for n in chosen if n not in powered]),
+        ):
+            with self.disruption(action, nodes):
+                for node in nodes:
+                    self._network.power(node, action == "birth")
 
     def _churn_one(self, what: tuple[bool, float]) -> None:
         alive, draw = what

@@ -177,3 +177,29 @@ def test_a_trace_is_read_beside_the_experiment(tmp_path: Path) -> None:
 def test_motion_that_cannot_be_is_refused(mobility: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         Scenario.model_validate({"mobility": mobility})
+
+
+def test_many_drones_at_once_are_switched_off_and_on_again_each_minute() -> None:
+    record = run(
+        mobility={"kind": "none"},
+        probes={"from_s": 5.0},
+        key=True,
+        faults=[{"at_s": 10, "churn": {"switched": 4, "every_s": 10}}],
+    )
+    batches = {at_s: 0 for at_s in (10.0, 20.0, 30.0)}
+    off: set[int] = set()
+    for item in record.happened:
+        if item.action in ("death", "birth"):
+            assert off.isdisjoint(item.nodes) == (item.action == "death" or not item.nodes)
+            off ^= set(item.nodes)
+            batches[item.at_s] += len(item.nodes)
+    assert set(batches.values()) == {4}
+
+
+def test_lapses_are_the_times_in_which_a_router_has_a_path_and_is_not_served() -> None:
+    watch = LinkWatch(0.0)
+    line = Graph({0: [1], 1: [0, 2], 2: [1]})
+    for now_s, served in ((0, {1, 2}), (1, {1}), (2, {1}), (3, {1, 2}), (4, set()), (5, {1, 2})):
+        watch.look(NetworkSample(float(now_s), frozenset({1, 2}), frozenset(served)), line, [0])
+    assert sorted(watch.lapses_s) == [1.0, 1.0, 2.0]
+    assert watch.shares == [0.5, 0.5, 1.0, 0.0, 1.0]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import statistics
+from typing import Sequence
 
 from drone_mesh.lab.metrics.registry import NAN, metric
 from drone_mesh.lab.record import RunRecord
@@ -32,6 +34,26 @@ def reachable(run: RunRecord) -> float:
 def served(run: RunRecord) -> float:
     watch = run.links
     return NAN if watch is None or not watch.reachable_s else watch.served_s / watch.reachable_s
+
+
+@metric("share", "the same share at the worst of 20 moments (5th percentile)", better="more")
+def served_p5(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.shares, 0.05)
+
+
+@metric("share", "the same share, median over time", better="more")
+def served_p50(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.shares, 0.5)
+
+
+@metric("s", "median time that a router has a path and is not served", better="less")
+def lapse_p50_s(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.lapses_s, 0.5)
+
+
+@metric("s", "99th percentile of these times", better="less")
+def lapse_p99_s(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.lapses_s, 0.99)
 
 
 @metric(
@@ -77,6 +99,11 @@ def control_frame_rate(run: RunRecord) -> float:
     if run.frames is None:
         return NAN
     return run.frames["control"] / run.end_s / len(run.start.places)
+
+
+def _percentile(values: Sequence[float], share: float) -> float:
+    """The least value that so large a share of the values does not exceed; NaN: no values."""
+    return sorted(values)[max(0, math.ceil(share * len(values)) - 1)] if values else NAN
 
 
 def _arrived(run: RunRecord, kind: str) -> float:
