@@ -95,7 +95,8 @@ class FactoryConfiguration:
     lost_place: Literal["beside", "above", "below", "exact"] = Field("beside")
     check_period: float = Field(MeshTiming.check_period_s, ge=0.1, le=3600, description="seconds")
     connection_lost_after: float = Field(
-        MeshTiming.connection_lost_after_s, ge=0.1, le=3600, description="seconds"
+        MeshTiming.connection_lost_after_s,
+        description="seconds, 0.1..3600, or 0 for those of the routing technique",
     )
     report_period: float = Field(
         MeshTiming.report_period_s,
@@ -114,6 +115,13 @@ class FactoryConfiguration:
     @classmethod
     def _zero_or_in_bounds(cls, value: float) -> float:
         if value != 0 and not MIN_REAL_TIME_FACTOR <= value <= MAX_REAL_TIME_FACTOR:
+            raise ValueError("out of bounds")
+        return value
+
+    @field_validator("connection_lost_after")
+    @classmethod
+    def _zero_or_a_time(cls, value: float) -> float:
+        if value != 0 and not 0.1 <= value <= 3600:
             raise ValueError("out of bounds")
         return value
 

@@ -40,7 +40,7 @@ def test_the_shipped_file_holds_the_documented_numbers():
         clearance=1.0,
         lost_place="beside",
         check_period=10.0,
-        connection_lost_after=30.0,
+        connection_lost_after=0.0,
         report_period=0.0,
         debug=True,
     )
@@ -121,6 +121,10 @@ def test_as_fast_as_possible_is_a_factor_of_zero(write):
         ("check_period: 0", "invalid check_period 0: expected seconds, 0.1..3600"),
         ("report_period: 29", "invalid report_period 29: expected seconds, 30..3600, or 0"),
         ("report_period: -1", "invalid report_period -1: expected seconds, 30..3600, or 0"),
+        (
+            "connection_lost_after: 0.05",
+            "invalid connection_lost_after 0.05: expected",
+        ),
         ("connection_lost_after: soon", "invalid connection_lost_after 'soon': expected seconds"),
         ("debug: maybe", "invalid debug 'maybe': expected true or false"),
         ("gui: 2", "invalid gui 2: expected true or false"),

@@ -23,7 +23,14 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import is_answered, priority, readdressed, receiver, sender
+from drone_mesh.communication.messages import (
+    is_answered,
+    is_jittered,
+    priority,
+    readdressed,
+    receiver,
+    sender,
+)
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.execution import PacketInbox
 
@@ -154,7 +161,7 @@ class PacketAntenna(IWirelessCommunication):
         """Queue one frame for all; each receiver's antenna puts its own id into byte 3."""
         if self.powered and not self._silent and len(payload) == PAYLOAD_BYTES:
             packet = readdressed(payload, BROADCAST)
-            self._sender.offer(ALL_NODES, packet, priority(payload))
+            self._sender.offer(ALL_NODES, packet, priority(payload), is_jittered(payload))
 
     def limit_tries(self, most: int) -> None:
         self._sender.limit_tries(most)

@@ -79,9 +79,16 @@ class MediumAccess:
         return len(self._queue)
 
     def offer(
-        self, receiver: int, payload: bytes, now_s: float, priority: Priority = Priority.CONTROL
+        self,
+        receiver: int,
+        payload: bytes,
+        now_s: float,
+        priority: Priority = Priority.CONTROL,
+        jittered: bool = True,
     ) -> bool:
         """Queue a packet for a node, or for ALL_NODES. False: too many packets wait already.
+
+        Without `jittered`, the sender of a broadcast has chosen a random moment itself.
 
         Bytes that already wait for the same receiver are not queued twice.
         """
@@ -93,7 +100,7 @@ class MediumAccess:
             return False
         rules, not_before_s = self.rules, now_s
         if receiver == ALL_NODES:
-            not_before_s += self._rng.random() * rules.broadcast_jitter_s
+            not_before_s += self._rng.random() * rules.broadcast_jitter_s * jittered
         elif now_s - self._broadcast_heard_s[priority] < rules.answer_jitter_s:
             not_before_s += self._rng.random() * rules.answer_jitter_s
         self._queue.add(OutgoingPacket(receiver, payload, priority, now_s, not_before_s))

@@ -54,12 +54,18 @@ class Sender:
         if task is not None:
             task.join()
 
-    def offer(self, receiver: int, payload: bytes, priority: Priority = Priority.CONTROL) -> bool:
+    def offer(
+        self,
+        receiver: int,
+        payload: bytes,
+        priority: Priority = Priority.CONTROL,
+        jittered: bool = True,
+    ) -> bool:
         """Queue a packet for a node or ALL_NODES. False: the queue is full or closed."""
         if self._closed:
             return False
         with self._lock:
-            taken = self._access.offer(receiver, payload, self._runtime.now_s(), priority)
+            taken = self._access.offer(receiver, payload, self._runtime.now_s(), priority, jittered)
         self._wake()
         return taken
 

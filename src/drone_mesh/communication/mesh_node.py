@@ -75,7 +75,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         self._antenna = antenna
         seals = antenna if isinstance(antenna, IMeshSeals) else NO_SEALS
         self._rng = rng
-        self._timing = timing or routing.timing
+        self._timing = (timing or MeshTiming()).lost_after(routing.connection_lost_after_s)
         self._options = options or RepairOptions()
         self._debug = debug
         self._deadlines = Deadlines()

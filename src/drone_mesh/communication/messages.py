@@ -23,6 +23,7 @@ from drone_mesh.communication.packet_types import (
     DATA_TYPES,
     TYPES_WITH_FLOATS,
     UNANSWERED,
+    UNJITTERED,
     MessageType,
     Priority,
 )
@@ -285,6 +286,11 @@ type_of: Callable[[bytes], int] = operator.itemgetter(TYPE_AT)
 
 addressee: Callable[[bytes], int] = operator.itemgetter(FORWARD_AT)
 """The final addressee of a packet, or BROADCAST."""
+
+
+def is_jittered(payload: bytes) -> bool:
+    """Whether a broadcast of this type has to wait for a random time."""
+    return payload[TYPE_AT] not in UNJITTERED
 
 
 def is_answered(payload: bytes) -> bool:

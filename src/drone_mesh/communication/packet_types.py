@@ -56,6 +56,7 @@ class PacketType(NamedTuple):
     made_of: str = "Message"  # the class that encodes it
     priority: Priority = Priority.CONTROL
     answered: bool = True  # whether a broadcast of it makes several nodes send
+    jittered: bool = True  # whether many nodes would broadcast it at the same moment
 
     @property
     def floats(self) -> int:
@@ -123,9 +124,14 @@ class MessageType(enum.IntEnum):
         PacketType(PacketKind.REPAIR, _NODE, "float32 cost", "MovementNegotiationMessage"),
     )
     # The technique beacon: how a node stands to its gateway, neighbours and the nodes below it
-    BEACON = 40, PacketType(PacketKind.INTRODUCTION, _CONTROL, _BEACON, "Beacon", answered=False)
+    BEACON = (
+        40,
+        PacketType(
+            PacketKind.INTRODUCTION, _CONTROL, _BEACON, "Beacon", answered=False, jittered=False
+        ),
+    )
     # It looks for a node; that or a neighbour of it answers; a question for a sign of life
-    SEARCH = 41, PacketType(PacketKind.REPORT, _CONTROL, _SEARCH, "Search")
+    SEARCH = 41, PacketType(PacketKind.REPORT, _CONTROL, _SEARCH, "Search", answered=False)
     FOUND = 42, PacketType(PacketKind.REPORT, _CONTROL, "uint8 node", "Found")
     PROBE = 43, PacketType(PacketKind.HEARTBEAT, _CONTROL)
     # A drone's reply to a numbered order, and the question for it
@@ -174,6 +180,8 @@ TYPES_WITH_FLOATS = {number: ABOUT[number].floats for number in range(256) if AB
 """The numbers of the types whose bodies start with floats, and how many."""
 
 UNANSWERED = frozenset(number for number in range(256) if not ABOUT[number].answered)
+
+UNJITTERED = frozenset(number for number in range(256) if not ABOUT[number].jittered)
 
 TYPES_WITH_PLACES = frozenset(number for number in range(256) if ABOUT[number].has_place)
 

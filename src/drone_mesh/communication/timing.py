@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drone_mesh.errors import ConfigurationError
 
@@ -18,7 +18,8 @@ class MeshTiming:
     """Adjustable numbers of one node; the defaults are those of docs/protocol.md."""
 
     check_period_s: float = 10.0  # how often a node checks its routes and its connection
-    connection_lost_after_s: float = 30.0  # time without a gateway until the emergency
+    connection_lost_after_s: float = 0.0  # time without a gateway until the emergency; 0: as the
+    # routing technique says
     send_attempts: int = 3  # failed transmissions of a packet, in total
     report_period_s: float = 0.0  # how often a node reports to its gateway; 0: never
 
@@ -28,10 +29,10 @@ class MeshTiming:
             raise ConfigurationError(
                 f"invalid check_period {self.check_period_s}: must be above 0 seconds"
             )
-        if not self.connection_lost_after_s > 0:
+        if not self.connection_lost_after_s >= 0:
             raise ConfigurationError(
                 f"invalid connection_lost_after {self.connection_lost_after_s}: "
-                "must be above 0 seconds"
+                "must be above 0 seconds, or 0 for that of the technique"
             )
         if self.send_attempts < 1:
             raise ConfigurationError(
@@ -42,3 +43,9 @@ class MeshTiming:
                 f"invalid report_period {self.report_period_s}: must be 0 (no reports) or at "
                 f"least {MIN_REPORT_PERIOD_S:g} seconds"
             )
+
+    def lost_after(self, seconds: float) -> MeshTiming:
+        """The same; without a gateway for `seconds` is an emergency, unless these set it."""
+        return (
+            self if self.connection_lost_after_s else replace(self, connection_lost_after_s=seconds)
+        )

@@ -5,13 +5,12 @@ from __future__ import annotations
 import abc
 
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.timing import MeshTiming
 
 
 class ITechnique(abc.ABC):  # noqa: B024 (what each kind must do differs)
     """What `routing:=` names: an IRoutingTechnique or an IControlTechnique."""
 
-    timing = MeshTiming()  # of a node whose user does not set it
+    connection_lost_after_s = 30.0  # where the timing of a node leaves it to the technique
 
 
 class IDelivery(abc.ABC):

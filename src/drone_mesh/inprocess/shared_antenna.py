@@ -12,7 +12,13 @@ from drone_mesh.channel.statistics import ChannelMeter, RadioStatistics
 from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import MAX_NODE_ID, IMeshDebugInfo, IMeshNetwork
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import is_answered, priority, readdressed, receiver
+from drone_mesh.communication.messages import (
+    is_answered,
+    is_jittered,
+    priority,
+    readdressed,
+    receiver,
+)
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import Host, IInProcessAntenna
 from drone_mesh.inprocess.shared_air import SharedAir, SharedRadio, Transmission
@@ -98,7 +104,9 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
         """Queue one frame for all nodes."""
         self._air.on_packet(payload)
         if self.powered:
-            self.access.offer(ALL_NODES, payload, self._clock.now_s, priority(payload))
+            self.access.offer(
+                ALL_NODES, payload, self._clock.now_s, priority(payload), is_jittered(payload)
+            )
             self._plan()
 
     def limit_tries(self, most: int) -> None:

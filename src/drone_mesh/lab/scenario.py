@@ -199,7 +199,7 @@ class Timing(Part):
     """The adjustable times of the protocol, as in MeshTiming."""
 
     check_period_s: Above0 = MeshTiming.check_period_s
-    connection_lost_after_s: Above0 = MeshTiming.connection_lost_after_s
+    connection_lost_after_s: AtLeast0 = MeshTiming.connection_lost_after_s  # 0: the technique's
     send_attempts: Annotated[int, Field(ge=1, le=20)] = MeshTiming.send_attempts
 
 

@@ -189,7 +189,8 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         type=float,
         default=MeshTiming.connection_lost_after_s,
         metavar="SECONDS",
-        help="time without a gateway before the node starts a repair (default: %(default)g)",
+        help="time without a gateway before the node starts a repair; 0: as the routing "
+        "technique says, 30 s or with beacon 10 s (default: %(default)g)",
     )
     mesh.add_argument(
         "--report-period",

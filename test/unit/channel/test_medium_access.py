@@ -212,6 +212,12 @@ def test_only_answers_wait_after_a_broadcast(asked, sent):
     assert (access.next_try_s > 1.0) == (asked is sent)
 
 
+def test_a_broadcast_at_a_random_time_of_its_sender_does_not_wait():
+    access = MediumAccess(RULES, random.Random(1))
+    access.offer(ALL_NODES, PACKET, 1.0, jittered=False)
+    assert access.next_try_s == 1.0
+
+
 def test_the_same_bytes_for_the_same_receiver_wait_only_once():
     access = MediumAccess(RULES, random.Random(1))
     assert access.offer(7, PACKET, 0.0)

@@ -7,10 +7,12 @@ import math
 
 import pytest
 
+from drone_mesh.communication.beacon.packets import Beacon
 from drone_mesh.communication.data.ticket import TicketState
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
 from drone_mesh.mobility import Area, Mobility, tracks_of
 
@@ -90,6 +92,19 @@ def test_beacons_become_rarer_while_nothing_changes():
     assert 9 <= len(sent) <= 13
 
 
+def test_a_drone_that_turns_tells_its_neighbours_at_once():
+    network = grid(radio="disc")
+    network.run_for(20.0)
+    sent = []
+    network.nodes[5].antenna.broadcast_message = sent.append
+    start = network.location(5)
+    for step in range(16):
+        network.nodes[5].drone.put(start._replace(height=0.15 * step))
+        network.run_for(0.1)
+    motion = Beacon.from_body(sent[-1][5:], start).motion
+    assert motion.velocity[2] == pytest.approx(1.5, abs=0.1)
+
+
 def test_a_drone_that_others_fly_stays_reachable():
     echoes, served = arrivals(moving(), 30)
     assert echoes >= 0.95
@@ -160,7 +175,7 @@ def test_after_the_death_of_a_relay_the_others_take_another_way_within_three_sec
 def test_a_dead_gateway_is_noticed_and_another_one_is_taken():
     network = Network(seed=1, **CHANNEL)
     network.add_gateway(0, 0.0, 0.0)
-    network.add_gateway(9, 18.0, 0.0)
+    network.add_gateway(9, 18.0, 0.0, start_s=2.0)
     for node, x in ((1, 6.0), (2, 12.0)):
         network.add_router(node, x, 0.0)
     network.run_for(5.0)
@@ -179,6 +194,13 @@ def test_a_router_that_is_cut_off_knows_it_within_four_seconds():
     network.run_for(5.0)
     network.power(0, False)
     assert network.run_until(lambda: not network.connected(1), within_s=4.0)
+
+
+@pytest.mark.parametrize(("given_s", "waits_s"), [(None, 10.0), (0.0, 10.0), (20.0, 20.0)])
+def test_a_router_waits_ten_seconds_before_its_repair_unless_the_user_sets_it(given_s, waits_s):
+    timing = None if given_s is None else MeshTiming(connection_lost_after_s=given_s)
+    network = grid(radio="disc", timing=timing)
+    assert network.nodes[1].component._timing.connection_lost_after_s == waits_s
 
 
 def test_an_ordered_flight_does_not_end_the_membership():

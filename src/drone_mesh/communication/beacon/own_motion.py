@@ -10,6 +10,7 @@ from drone_mesh.communication.beacon.packets import Motion
 from drone_mesh.drone.location import Location
 
 OVER_S = 2.0  # our choice: noise of a receiver and turns of a drone cancel out
+TURN_S = 0.5  # our choice: only so long before a turn is noticed count samples for the new velocity
 STANDS_S = 10.0  # our choice: a drone that has not moved for this long stands
 AGAIN_S = 0.1  # our choice: a receiver for satellites gives ten positions per second
 
@@ -26,10 +27,17 @@ class OwnMotion:
         self._samples: deque[tuple[float, Location]] = deque()
         self._motion: Motion | None = None
         self._asked_s = -AGAIN_S
+        self._least_s = OVER_S / 2
 
     def stands(self, now_s: float) -> bool:
         """Whether it is at rest, as far as it knows its place."""
         return now_s - self._moved_s >= STANDS_S
+
+    def has_turned(self, now_s: float) -> None:
+        """It is not where its velocity led: forget the one before."""
+        self._least_s = TURN_S
+        while self._samples and now_s - self._samples[0][0] > TURN_S:
+            self._samples.popleft()
 
     def at(self, now_s: float) -> Motion | None:
         """Position and velocity now; None while the position is unknown."""
@@ -49,7 +57,7 @@ class OwnMotion:
         while now_s - samples[1][0] >= OVER_S if len(samples) > 1 else False:
             samples.popleft()
         since_s, before = samples[0]
-        seconds = max(now_s - since_s, OVER_S / 2)  # a short time would exaggerate the noise
+        seconds = max(now_s - since_s, self._least_s)  # a short time would exaggerate the noise
         self._motion = Motion(
             place,
             (

@@ -18,7 +18,7 @@ _PLACE_M = 0.1  # unit of a place
 _WRAP = 2**16
 _FASTEST_M_S = 50.0  # a velocity is coded by its square root, so slow ones are precise
 
-_END = b"\xff"  # of the new nodes below, if they do not fill the packet
+_END = b"\xff"  # of the new nodes below and of the neighbours, if they do not fill the packet
 _COUNT, _HAS_PLACE, _HAS_DIGEST, _HAS_GATEWAY_PLACE, _LOOKS = 0x0F, 0x10, 0x20, 0x40, 0x80
 _PLACE = struct.Struct("<3H3b")
 _GATEWAY_PLACE = struct.Struct("<3H")
@@ -82,6 +82,7 @@ class Beacon(NamedTuple):
     digest: int = 0  # of the origin of its places; see CommonFrame
     looks: bool = False  # asks for the beacons of its neighbours
     below: Below = NONE_BELOW
+    near: tuple[int, ...] = ()  # some of its neighbours
 
     def to_body(self, room: int) -> bytes:
         """Its `room` bytes. It has to fit: see `room_below`."""
@@ -107,15 +108,22 @@ class Beacon(NamedTuple):
             bytes(self.ancestors),
         )
         body += bytes((self.below.after, *self.below.listed, *self.below.new))
-        return (head + body).ljust(room, _END)
+        return (head + body + _END + bytes(self.near))[:room].ljust(room, _END)
 
     def room_below(self, room: int) -> int:
         """How many nodes below fit into `room` bytes with the rest; negative: that does not fit."""
+        return min(_COUNT, self._room(room))
+
+    def room_near(self, room: int) -> int:
+        """How many neighbours fit behind the nodes below."""
+        return self._room(room) - len(self.below.listed) - len(self.below.new) - len(_END)
+
+    def _room(self, room: int) -> int:
         used = _HEAD.size + 1
         used += 0 if self.motion is None else _PLACE.size
         used += _DIGEST.size if self.digest else 0
         used += 0 if self.gateway_place is None else _GATEWAY_PLACE.size
-        return min(_COUNT, room - used)
+        return room - used
 
     @classmethod
     def from_body(cls, body: bytes, here: Location | None) -> Beacon | None:
@@ -144,7 +152,8 @@ class Beacon(NamedTuple):
             if here is not None:
                 gateway_place = _place(units, here)
         after, end = at, at + 1 + (flags & _COUNT)
-        new = body[end:].split(_END, 1)[0]
+        new, _end, rest = body[end:].partition(_END)
+        near = rest.split(_END, 1)[0]
         return cls(
             gateway,
             number,
@@ -157,6 +166,7 @@ class Beacon(NamedTuple):
             digest,
             bool(flags & _LOOKS),
             Below(body[after], tuple(body[after + 1 : end]), tuple(new)),
+            tuple(near),
         )
 
 

@@ -6,9 +6,9 @@ import math
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.own_motion import OwnMotion
-from drone_mesh.communication.beacon.packets import Beacon, Found, Search
+from drone_mesh.communication.beacon.packets import Beacon, Found, Motion, Search
 from drone_mesh.communication.beacon.routes import BeaconRoutes
-from drone_mesh.communication.beacon.search import Searches
+from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
 from drone_mesh.communication.beacon.trickle import Trickle
 from drone_mesh.communication.control_plane import IControlHost, IControlPlane, IControlTechnique
 from drone_mesh.communication.courier import DROP, HOLD, Courier, Transit
@@ -18,7 +18,6 @@ from drone_mesh.communication.observer import MeshEventKind, in_hops
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.router_states import RepairState, RouterEvent, RouterStates
-from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.location import Location
 
 HELD_S = 2.5  # our choice: a packet without a next hop waits this long
@@ -28,10 +27,13 @@ LATE = 1.3  # intervals, with their jitter: then a beacon of the parent was lost
 LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
 GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
 DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
+MOST_WAYS = 3  # our choice: to which one node sends a packet down; after that it searches
+SEARCHES_S = 0.6  # our choice: a relay without a way searches for so long, then returns a packet
 NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent again
 SEALED_ROOM = 20  # bytes of a beacon with a seal
-MOVED = 0.05  # of the range: a drone further from where it stood is on a flight
-DRIVER_TRIES = 6  # per hop: more delay the packets behind, and another neighbour may do better
+MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
+# others expect it, it has turned
+DRIVER_TRIES = 4  # per hop: nearly all that fail four are out of reach; more delay the others
 
 
 class BeaconPlane(IControlPlane):
@@ -45,7 +47,9 @@ class BeaconPlane(IControlPlane):
         self._routes = self.routes = BeaconRoutes(
             self._me, states is None, basics.range_m, basics.neighbours.place_of
         )
-        self._motion = OwnMotion(basics.pilot.place, MOVED * basics.range_m)
+        self._step_m = MOVED * basics.range_m
+        self._motion = OwnMotion(basics.pilot.place, self._step_m)
+        self._shown: tuple[float, Motion] | None = None  # what the others expect of this drone
         self._courier = self.delivery = Courier(
             self._me,
             self._antenna,
@@ -193,7 +197,14 @@ class BeaconPlane(IControlPlane):
 
     def _set_time(self) -> None:
         self._routes.now_s = now_s = self._deadlines.now_s
-        self._routes.motion = self._motion.at(now_s)
+        self._routes.motion = motion = self._motion.at(now_s)
+        if motion is None or self._shown is None:
+            return
+        shown_s, shown = self._shown
+        if shown.after(now_s - shown_s).distance_m(motion.place) > self._step_m:
+            self._motion.has_turned(now_s)
+            self._shown = None
+            self._trickle.hurry(now_s)
 
     def _plan(self) -> None:
         """Schedule the next call of `on_time`."""
@@ -237,7 +248,11 @@ class BeaconPlane(IControlPlane):
         elif beacon.room_below(self._room) < len(routes.below()) and self._sent % 2 == 0:
             beacon = beacon._replace(motion=beacon.motion if self._room > SEALED_ROOM else None)
         below = routes.to_announce(beacon.room_below(self._room))
-        body = beacon._replace(below=below).to_body(self._room)
+        beacon = beacon._replace(below=below)
+        near = routes.to_show(beacon.room_near(self._room))
+        body = beacon._replace(near=near).to_body(self._room)
+        if beacon.motion is not None:
+            self._shown = now_s, beacon.motion
         self._broadcast(MessageType.BEACON, self._me, body)
 
     def _gateway_place(self) -> Location | None:
@@ -268,6 +283,8 @@ class BeaconPlane(IControlPlane):
             beacon = beacon._replace(motion=None, gateway_place=None)
         if routes.heard(creator, beacon):
             self._trickle.reset(now_s)
+        if routes.has_news and not routes.is_gateway:
+            self._trickle.hurry(now_s)
         self._take_places(creator, beacon)
         self._choose()
         if creator == routes.parent:
@@ -338,7 +355,9 @@ class BeaconPlane(IControlPlane):
         """The next hop of a packet, HOLD or DROP."""
         routes = self._routes
         routes.now_s = now_s = self._deadlines.now_s
-        for to, shown_s in routes.next_hops(transit.addressee, transit.came_from):
+        is_up = transit.addressee == routes.gateway
+        ways = routes.next_hops(transit.addressee, transit.came_from)
+        for to, shown_s in ways if is_up or len(transit.sent_s) < MOST_WAYS else ways[:1]:
             if to == transit.came_from or shown_s <= transit.sent_s.get(to, -math.inf):
                 continue
             failed_s = transit.failed_s.get(to)
@@ -346,20 +365,22 @@ class BeaconPlane(IControlPlane):
                 return to
         if now_s - transit.seen_s >= HELD_S or transit.kind in NOT_HELD:
             return DROP
-        if transit.addressee != routes.gateway:
-            if transit.came_from != NO_ROUTE:
-                return self._back(transit)
-            self._searches.search(transit.addressee)
+        if not is_up:
+            is_own = transit.came_from == NO_ROUTE
+            if not is_own and now_s - transit.seen_s >= SEARCHES_S and self._may_return(transit):
+                return transit.came_from
+            self._searches.search(transit.addressee, MOST_HOPS if is_own else HOPS_AROUND)
         self._retry_s = min(max(self._retry_s, now_s), now_s + RETRY_S)
         return HOLD
 
-    def _back(self, transit: Transit) -> int:
-        """A packet that no neighbour leads to returns: its sender may know another way."""
+    def _may_return(self, transit: Transit) -> bool:
+        """Whether the sender of a packet, who may know another way, can get it back."""
         to = transit.came_from
-        neighbour = self._routes.neighbours.get(to)
-        if neighbour is None or to in transit.sent_s or to in transit.failed_s:
-            return DROP
-        return to
+        return (
+            to in self._routes.neighbours
+            and to not in transit.sent_s
+            and to not in transit.failed_s
+        )
 
     def _retry(self, now_s: float) -> None:
         self._retry_s = now_s + RETRY_S
@@ -428,7 +449,7 @@ def _late_after_s(interval_s: float) -> float:
 class BeaconTechnique(IControlTechnique):
     """The technique `beacon`, by name."""
 
-    timing = MeshTiming(connection_lost_after_s=10.0)  # it notices a loss within seconds
+    connection_lost_after_s = 10.0  # it notices a loss within seconds
 
     def control_plane(
         self, basics: NodeBasics, host: IControlHost, states: RouterStates | None

@@ -29,6 +29,7 @@ LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will b
 ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
 LINGERS = 4.0  # intervals: a node that has left is still announced for so long
 SEEN_S = 10.0  # our choice: an older place of a node does not tell the way to it
+NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
 HINT_S = 3.0  # a packet that came from a node shows the way to it for this long
 
 
@@ -44,7 +45,7 @@ class Neighbour:
 
     __slots__ = (
         "alive_s", "announced_s", "apart_m", "beacon", "failed_s", "heard_s", "listed_s", "motion",
-        "node", "reported_s",
+        "near_s", "node", "reported_s",
     )  # fmt: skip
 
     def __init__(self, node: int) -> None:
@@ -56,6 +57,7 @@ class Neighbour:
         self.apart_m = 0.0  # then
         self.announced_s: dict[int, float] = {}  # the nodes below it, and since when
         self.listed_s: dict[int, float] = {}  # and when it listed them last
+        self.near_s: dict[int, float] = {}  # its own neighbours, and when it showed them
 
     @property
     def usable(self) -> bool:
@@ -72,9 +74,11 @@ class Neighbour:
         before = dict(self.announced_s)
         for node in filter(below.covers, before):
             del self.announced_s[node]
-        for node in (*below.listed, *below.new):
+        for node in below.listed:
             self.announced_s[node] = before.get(node, now_s)
-            self.listed_s[node] = now_s
+        self.announced_s.update(dict.fromkeys(below.new, now_s))
+        self.listed_s.update(dict.fromkeys((*below.listed, *below.new), now_s))
+        self.near_s.update(dict.fromkeys(beacon.near, now_s))
 
     def until_s(self) -> float:
         """Until when it counts as a neighbour without a further sign of life."""
@@ -93,7 +97,7 @@ class BeaconRoutes(IRoutes):
     ) -> None:
         """`place_of`: where a node was seen last."""
         self._node_id = node_id
-        self._is_gateway = is_gateway
+        self.is_gateway = is_gateway
         self._range_m = range_m
         self.neighbours: dict[int, Neighbour] = {}
         self.gateway = node_id if is_gateway else NO_ROUTE
@@ -106,7 +110,8 @@ class BeaconRoutes(IRoutes):
         self._newest: dict[int, tuple[int, float]] = {}  # by gateway: number, when it came
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._announced: set[int] = set()  # of the nodes below
-        self._announced_last = 0
+        self._new: set[int] = set()  # below, since this node has announced it last
+        self._announced_last = self._shown_last = 0
         self._place_of = place_of
         self._below_s: dict[int, float] = {}  # the nodes below, and when they were last
 
@@ -118,6 +123,10 @@ class BeaconRoutes(IRoutes):
         is_new = neighbour is None
         if neighbour is None:
             neighbour = self.neighbours[node] = Neighbour(node)
+        if beacon.parent == self._node_id:
+            if is_new or neighbour.beacon.parent != self._node_id:
+                self._new.add(node)
+            self._new.update(beacon.below.new)
         neighbour.heard(beacon, self.motion, self.now_s)
         gateway = beacon.gateway
         if gateway not in (NO_ROUTE, self._node_id):
@@ -160,7 +169,7 @@ class BeaconRoutes(IRoutes):
 
     def choose(self) -> bool:
         """Choose the parent; returns whether parent, gateway or hops have changed."""
-        if self._is_gateway:
+        if self.is_gateway:
             return False
         before = self.gateway, self.parent, self.hops
         best = min(map(self._rank, self._candidates()), default=None)
@@ -217,7 +226,7 @@ class BeaconRoutes(IRoutes):
 
     def next_hops(self, node: int, came_from: int) -> list[Way]:
         """The neighbours to try for a packet to `node`, the best first."""
-        if node == self.gateway and not self._is_gateway:
+        if node == self.gateway and not self.is_gateway:
             ranks = sorted(map(self._rank, self._candidates()))
             return [Way(rank[-1], self.neighbours[rank[-1]].heard_s) for rank in ranks]
         found: dict[int, Way] = {}  # in order
@@ -228,6 +237,8 @@ class BeaconRoutes(IRoutes):
                 found[node] = way
             else:
                 last.append(way)
+        for way in self._next_to(node):
+            found.setdefault(way.neighbour, way)
         hint, at_s = self._hints.get(node, (NO_ROUTE, -math.inf))
         if hint in self.neighbours and self.now_s - at_s < HINT_S:
             found.setdefault(hint, Way(hint, at_s))
@@ -238,6 +249,16 @@ class BeaconRoutes(IRoutes):
         for way in (*self._nearer(node), *last):
             found.setdefault(way.neighbour, way)
         return list(found.values())
+
+    def _next_to(self, node: int) -> list[Way]:
+        """The neighbours that hear `node` themselves, the one that showed it last first."""
+        shown = []
+        for neighbour in self.neighbours.values():
+            at_s = neighbour.near_s.get(node, -math.inf)
+            age_s = self.now_s - at_s
+            if age_s < NEAR * neighbour.beacon.interval_s and neighbour.usable:
+                shown.append((age_s + self.risk(neighbour), Way(neighbour.node, at_s)))
+        return [way for _rank, way in sorted(shown)]
 
     def _announcements(self, node: int) -> Iterator[tuple[tuple[bool, float], Way]]:
         """The neighbours that announce `node` below them; a child, and the latest, first."""
@@ -296,7 +317,9 @@ class BeaconRoutes(IRoutes):
         """The next part of the nodes below, at most so many, and those that came to it."""
         below, after = self.below(), self._announced_last
         self._announced &= below
-        new = sorted(below - self._announced)[: most - 1] if len(below) > most else []
+        self._new = self._new & below | below - self._announced
+        new = sorted(self._new)[: max(0, most - 1)]
+        self._new.difference_update(new)
         turn = sorted(below.difference(new), key=lambda node: (node - after - 1) % 256)
         listed = tuple(turn[: most - len(new)])
         if listed:
@@ -305,6 +328,20 @@ class BeaconRoutes(IRoutes):
             after = self._announced_last  # once round
         self._announced.update(listed, new)
         return Below(after, listed, tuple(new))
+
+    @property
+    def has_news(self) -> bool:
+        """Whether a node has come from elsewhere and is not announced yet."""
+        return bool(self._new)
+
+    def to_show(self, most: int) -> tuple[int, ...]:
+        """The next part of the neighbours with whom the link will last, at most so many."""
+        lasting = [n for n, one in self.neighbours.items() if one.usable and not self.risk(one)]
+        lasting.sort(key=lambda node: (node - self._shown_last - 1) % 256)
+        if most < 1 or not lasting:
+            return ()
+        self._shown_last = lasting[:most][-1]
+        return tuple(lasting[:most])
 
     # IRoutes -----------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from drone_mesh.communication.packet_types import MessageType
 
 AGAIN_S = 0.6  # our choice: broadcasts are not acknowledged
 MOST_HOPS = 12  # our choice
+HOPS_AROUND = 2  # our choice: of a search by a relay, which was near the node a moment ago
 SAME_S = 5.0  # our choice: far longer than a search takes to pass through a mesh
 MOST_IN_VAIN = 5  # our choice: searches in a row for a node
 PAUSE_S = 10.0  # our choice: after them
@@ -29,8 +30,8 @@ class Searches:
         self._searched: dict[int, tuple[float, int]] = {}  # by node: when, how often in vain
         self._seen_s: dict[tuple[int, int], float] = {}  # creator, number
 
-    def search(self, node: int) -> None:
-        """Search for `node`, unless that was done a moment ago."""
+    def search(self, node: int, hops: int) -> None:
+        """Search for `node`, unless that was done a moment ago; `hops` times repeated at most."""
         now_s = self._routes.now_s
         at_s, in_vain = self._searched.get(node, (-math.inf, 0))
         if now_s - at_s >= PAUSE_S:
@@ -39,7 +40,7 @@ class Searches:
             return
         self._searched[node] = now_s, in_vain + 1
         self._number = (self._number + 1) % 2**16
-        search = Search(node, self._number, MOST_HOPS)
+        search = Search(node, self._number, hops)
         self._broadcast(MessageType.SEARCH, self._node_id, search.to_body())
 
     def heard(self, creator: int, from_: int, body: bytes) -> bool:

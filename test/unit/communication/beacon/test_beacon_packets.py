@@ -34,6 +34,15 @@ def test_a_beacon_has_these_bytes():
     assert ROUTER.to_body(27) == bytes.fromhex(FULL)
 
 
+def test_neighbours_stand_behind_the_nodes_below():
+    shows = ROUTER._replace(near=(3, 14))
+    assert shows.room_near(27) == 3
+    body = bytes.fromhex(FULL[:-8] + "03 0e ff")
+    assert shows.to_body(27) == body
+    assert Beacon.from_body(body, HERE).near == (3, 14)
+    assert Beacon.from_body(body, HERE).below == ROUTER.below
+
+
 def test_a_beacon_is_decoded_relative_to_the_place_of_its_receiver():
     decoded = Beacon.from_body(bytes.fromhex(FULL), HERE)
     assert decoded._replace(motion=None) == ROUTER._replace(motion=None)

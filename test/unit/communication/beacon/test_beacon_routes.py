@@ -22,10 +22,12 @@ def routes():
     return BeaconRoutes(9, False, 10.0, lambda _node: None)
 
 
-def beacon(hops=1, parent=0, number=5, gateway=0, x=None, east=0.0, below=NONE_BELOW, others=()):
+def beacon(
+    hops=1, parent=0, number=5, gateway=0, x=None, east=0.0, below=NONE_BELOW, others=(), near=()
+):
     ancestors = (*others, *NO_ANCESTORS)[:3]
     motion = None if x is None else Motion(Location(0.0, x, 0.0), (0.0, east, 0.0))
-    return Beacon(gateway, number, hops, parent, ancestors, 1.0, motion, below=below)
+    return Beacon(gateway, number, hops, parent, ancestors, 1.0, motion, below=below, near=near)
 
 
 def ways(routes, node, came_from=255):
@@ -157,6 +159,42 @@ def test_a_packet_down_follows_the_child_that_announced_the_node_last(routes):
     routes.now_s = 0.5
     routes.heard(2, beacon(hops=3, parent=9, below=Below(20, (20,))))
     assert ways(routes, 20) == [2, 1]
+
+
+def test_a_node_that_came_back_to_an_earlier_relay_is_looked_for_there(routes):
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (20,))))
+    routes.now_s = 0.5
+    routes.heard(2, beacon(hops=3, parent=9, below=Below(20, (20,))))
+    routes.now_s = 1.0
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(20, (), (20,))))
+    assert ways(routes, 20) == [1, 2]
+
+
+def test_a_child_that_returns_is_announced_as_new_once_more(routes):
+    routes.heard(1, beacon(hops=3, parent=9))
+    routes.to_announce(4)
+    assert not routes.has_news
+    routes.heard(1, beacon(hops=3, parent=8))
+    routes.heard(1, beacon(hops=3, parent=9))
+    assert routes.has_news
+    assert routes.to_announce(4).new == (1,)
+    assert routes.to_announce(4).listed == (1,)
+
+
+def test_a_neighbour_that_hears_a_node_leads_to_it_until_that_is_two_intervals_old(routes):
+    routes.heard(1, beacon(hops=3, parent=9, below=Below(50, (50,))))
+    routes.heard(2, beacon(hops=4, parent=7, near=(50,)))
+    assert ways(routes, 50) == [2, 1]
+    routes.now_s = 2.1
+    routes.heard(2, beacon(hops=4, parent=7))
+    assert ways(routes, 50) == [1]
+
+
+def test_neighbours_are_shown_in_turn(routes):
+    for node in (3, 5, 7):
+        routes.heard(node, beacon(hops=3, parent=8))
+    assert [routes.to_show(2) for _ in range(3)] == [(3, 5), (7, 3), (5, 7)]
+    assert routes.to_show(0) == ()
 
 
 def test_a_packet_for_an_unknown_node_goes_up_only_if_it_came_from_below(routes):

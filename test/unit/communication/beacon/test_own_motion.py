@@ -42,6 +42,16 @@ def test_a_place_that_jumps_at_the_start_is_no_great_velocity(drone, motion):
     assert motion.at(0.1).velocity == pytest.approx((0.0, 1.0, 0.0))
 
 
+def test_after_a_turn_the_velocity_is_that_of_the_new_leg(drone, motion):
+    fly(drone, motion, 6.0, 0.5)
+    for tick in range(30, 34):
+        drone.place = Location(2.0 * (tick - 29) / 5, 2.9, 0.0)
+        motion.at(tick / 5)
+    motion.has_turned(6.6)
+    drone.place = Location(2.0, 2.9, 0.0)
+    assert motion.at(6.8).velocity == pytest.approx((2.0, 0.0, 0.0))
+
+
 def test_an_unknown_place_has_no_motion(drone, motion):
     drone.place = None
     assert motion.at(0.0) is None
