@@ -10,7 +10,7 @@ import time
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 from fastapi import FastAPI, Path, Query, Response
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import BaseModel, BeforeValidator, Discriminator, Field, Tag
 from starlette.exceptions import HTTPException
 from typing_extensions import Annotated
 
@@ -88,6 +88,20 @@ class EarthGoal(BaseModel, extra="forbid"):
     altitude_m: Number = Field(
         allow_inf_nan=False, description="metres above sea level, as in the origin"
     )
+
+
+def _form_of(goal: object) -> str:
+    """The form in which a goal was begun: by its fields, and in metres if it has none of these."""
+    in_degrees = isinstance(goal, EarthGoal) or (
+        isinstance(goal, dict) and not goal.keys().isdisjoint(EarthGoal.model_fields)
+    )
+    return "degrees" if in_degrees else "metres"
+
+
+Goal = Annotated[
+    Union[Annotated[FrameGoal, Tag("metres")], Annotated[EarthGoal, Tag("degrees")]],
+    Discriminator(_form_of),
+]
 
 
 class OrderSent(BaseModel):
@@ -187,7 +201,7 @@ def make_api(
     )
     async def set_goal(
         id: DroneId,
-        goal: Union[FrameGoal, EarthGoal],
+        goal: Goal,
         response: Response,
         allow_shared_place: SharedPlace = False,
     ) -> GoalSent:

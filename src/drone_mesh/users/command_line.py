@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Callable
 
-from drone_mesh.communication.data.packets import MAX_DATA_PORT
+from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYTES
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
@@ -80,6 +80,15 @@ def count(text: str) -> int:
     """A number of times, at least 1, for argparse."""
     if not text.isdigit() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"invalid number {text!r}: must be 1 or more")
+    return int(text)
+
+
+def size(text: str) -> int:
+    """The size of a message in bytes, for argparse."""
+    if not text.isdigit() or not 1 <= int(text) <= MAX_MESSAGE_BYTES:
+        raise argparse.ArgumentTypeError(
+            f"invalid size {text!r}: must be 1..{MAX_MESSAGE_BYTES} bytes"
+        )
     return int(text)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import sys
 from typing import Any, Sequence
@@ -24,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--json",
         action="store_true",
-        help="print one JSON object per line, with the payload in hex",
+        help="print one JSON object per line, with the payload in base64",
     )
     parsed = parser.parse_args(arguments)
 
@@ -41,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _as_json(message: dict[str, Any]) -> str:
-    return json.dumps({**message, "payload": message["payload"].hex()})
+    return json.dumps({**message, "payload": base64.b64encode(message["payload"]).decode()})
 
 
 def _as_text(message: dict[str, Any]) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Sequence
 
+from drone_mesh.communication.data.packets import MAX_DATA_PORT
 from drone_mesh.communication.observer import in_hops
 from drone_mesh.stopping import quiet_on_closed_pipe
 from drone_mesh.users import command_line
@@ -32,6 +34,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="SECONDS",
         help="time between two requests (default: %(default)g)",
     )
+    parser.add_argument(
+        "-s",
+        "--size",
+        type=command_line.size,
+        metavar="BYTES",
+        help="instead, send reliable messages of this size, and time their acknowledgements; "
+        f"programs on the node receive them on port {MAX_DATA_PORT}",
+    )
     parsed = parser.parse_args(arguments)
     round_trips_s: list[float] = []
     asked = 0
@@ -42,7 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         while parsed.count is None or asked < parsed.count:
             if asked:
                 time.sleep(parsed.interval)
-            _ask(node, parsed.id, asked + 1, parsed.timeout, round_trips_s)
+            ask = _ask if parsed.size is None else partial(_ask_with, b"\0" * parsed.size)
+            ask(node, parsed.id, asked + 1, parsed.timeout, round_trips_s)
             asked += 1
         return 0 if round_trips_s else 1
 
@@ -67,6 +78,26 @@ def _ask(
     round_trips_s.append(answer["round_trip_s"])
     milliseconds, hops = 1e3 * answer["round_trip_s"], answer["hops"]
     print(f"node {to}: number {number}, {in_hops(hops)}, {milliseconds:.1f} ms", flush=True)
+
+
+def _ask_with(
+    payload: bytes,
+    node: LocalClient,
+    to: int,
+    number: int,
+    timeout_s: float,
+    round_trips_s: list[float],
+) -> None:
+    begun_s = time.monotonic()
+    try:
+        arrived, ticket = node.send(to, payload, port=MAX_DATA_PORT, wait_s=timeout_s)
+    except Refused as error:
+        arrived, ticket = False, str(error)
+    took_s = time.monotonic() - begun_s
+    if arrived:
+        round_trips_s.append(took_s)
+        ticket = f"{len(payload)} bytes, {1e3 * took_s:.1f} ms"
+    print(f"node {to}: number {number}, {ticket}", flush=True)
 
 
 def _summary(asked: int, round_trips_s: list[float]) -> str:

@@ -63,3 +63,18 @@ def test_degrees_need_an_origin(mesh):
     answer = mesh.client.post("/drones/1/goal", json=goal)
     assert answer.status_code == 409
     assert "no origin" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    ("goal", "detail"),
+    [
+        ({"latitude": 1, "longitude": 0}, "height: Field required"),
+        ({}, "latitude: Field required; longitude: Field required; height: Field required"),
+        ({"latitude_deg": 52.0, "longitude_deg": 5.0}, "altitude_m: Field required"),
+        ({"latitude": 1, "longitude": 0, "height": 701}, "height: Input should be less than or "),
+    ],
+)
+def test_what_is_wrong_with_a_goal_is_named_once_in_the_form_that_was_begun(mesh, goal, detail):
+    named = mesh.client.post("/drones/1/goal", json=goal).json()["detail"]
+    assert named.startswith(detail)
+    assert ";" not in named[len(detail) :]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import socket
 import sys
 import threading
@@ -97,6 +98,14 @@ def test_an_error_about_a_message_is_one_line(rig, capsys, arguments, reason):
     assert (said.out + said.err).count("\n") == 1
 
 
+def test_a_ping_with_a_size_times_messages_of_that_size(rig, capsys):
+    assert ping_command.main(["--node", "2", "-c", "1", "-s", "200", "0"]) == 0
+    said = capsys.readouterr().out
+    assert re.match(r"node 0: number 1, 200 bytes, [\d.]+ ms\n1 sent, 1 answered, 0 % lost; ", said)
+    (message,) = rig.network.received[0]
+    assert (len(message.payload), message.port) == (200, 255)
+
+
 def test_listen_prints_what_arrives_as_text_or_as_json(rig, capsys):
     lines = []
     for options in ([], ["--json"]):
@@ -113,7 +122,7 @@ def test_listen_prints_what_arrives_as_text_or_as_json(rig, capsys):
         while rig.desks[0]._receivers:
             listening.join(0.01)
     assert lines[0] == "node 1 port 3: one\n"
-    assert json.loads(lines[1])["payload"] == b"one".hex()
+    assert json.loads(lines[1])["payload"] == "b25l"  # "one" in base64
 
 
 def test_without_a_node_the_command_says_what_to_start(capsys):
