@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from typing import Sequence
 
+import rospy
+
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.drone.location import Location as Place
 from drone_mesh.missions import Mission
@@ -133,6 +135,7 @@ def _call(name: str, service_class: ServiceClass[Request, Response], request: Re
         return call_once(name, service_class, request)
     except ServiceGone as error:
         log.warning("console: order failed: %s", error)
-        raise OrderRefused(f"no answer from {name}: is the simulation running?") from error
+        full = rospy.resolve_name(name)
+        raise OrderRefused(f"no answer from {full}: is the simulation running?") from error
     except ServiceRefused as error:
         raise OrderRefused(str(error)) from error
