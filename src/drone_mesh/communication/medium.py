@@ -23,9 +23,11 @@ class Medium:
     * a node that looks for a gateway searches again after `search_s`, and then after twice as long
       each time (Trickle, RFC 6206), since broadcasts are not acknowledged;
     * a router asks one neighbour at a time for its gateway, for `answer_s`;
-    * what is known to work is not probed in each round; see IWirelessCommunication.patience. A
-      gateway's answer that a router forwards proves its own connection, too (the data-path
+    * what is known to work is not probed in each round: a neighbour that was heard within
+      `heard_periods` check periods, or longer on a busy channel (IWirelessCommunication.patience).
+      A gateway's answer that a router forwards proves its own connection, too (the data-path
       validation of CTP: Gnawali et al., Collection Tree Protocol, 2009);
+    * a place is asked for again after `place_periods` check periods;
     * a gateway counts as lost after `heartbeats` unanswered ones.
     """
 
@@ -38,6 +40,8 @@ class Medium:
     search_s: float = 0.0
     missing_quiet_s: float = 0.0
     silence_s: float = 0.0  # a neighbour heard within this time survives one undelivered packet
+    heard_periods: float = 0.0
+    place_periods: float = 0.0
     data_pause_s: float = 0.005  # between bursts of users' packets
 
     @classmethod
@@ -54,6 +58,8 @@ class Medium:
             search_s=800 * hop_s,
             missing_quiet_s=fast.stretched(5.0),
             silence_s=fast.stretched(3.0),
+            heard_periods=1.05,
+            place_periods=2.5,
             data_pause_s=4 * hop_s,
         )
 

@@ -72,6 +72,8 @@ def test_on_an_nrf24_no_time_of_the_mesh_is_stretched(rate, hop_s):
         search_s=800 * hop_s,
         missing_quiet_s=5.0,
         silence_s=3.0,
+        heard_periods=1.05,
+        place_periods=2.5,
         data_pause_s=4 * hop_s,
     )
     assert medium.stretched(0.3) == UNDISTURBED.stretched(0.3) == 0.3

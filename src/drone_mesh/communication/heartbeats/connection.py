@@ -213,27 +213,31 @@ class GatewayConnection:
         asked = self._relay_check.run(self.gateway, self.next_hop(), self.hops)
         if self.proven(patience):
             return
-        self._ask_for_places(gateway_asked=asked)
+        fresh_periods = self._parts.antenna.medium.place_periods
+        self._ask_for_places(fresh_periods * self._parts.timing.check_period_s, asked)
         self.send_heartbeat()
 
     def gateway_sent_place(self) -> None:
         """The preferred gateway itself reported its place."""
         self._relay_check.gateway_sent_place()
 
-    def _ask_for_places(self, gateway_asked: bool = False) -> None:
+    def _ask_for_places(self, fresh_s: float = 0.0, gateway_asked: bool = False) -> None:
         """Ask the next hop where it is, and the gateway if that is unknown or may have moved.
 
+        `fresh_s`: a place that was reported within that time is known well enough;
         `gateway_asked`: the gateway was asked a moment ago.
         """
-        next_hop = self.next_hop()
-        places = self._parts.places
-        age_s = self._parts.now_s - places.gateway_seen_s
-        too_old = age_s >= (MAX_AGE_PERIODS - 1) * self._parts.timing.check_period_s
-        unsure = places.gateway is None or next_hop == self.gateway or too_old
+        next_hop, places, now_s = self.next_hop(), self._parts.places, self._parts.now_s
+        enough_s = fresh_s
+        if next_hop != self.gateway:  # relays report its place, too
+            period_s = self._parts.timing.check_period_s
+            enough_s = max((MAX_AGE_PERIODS - 1) * period_s, 2.0 * fresh_s)
+        unsure = places.gateway is None or now_s - places.gateway_seen_s >= enough_s
         if (unsure and not gateway_asked) or self._moved:  # the request tells where this node is
             self._moved = False
             ask_for_place(self._parts, self.gateway)
-        if next_hop not in (self.gateway, NO_ROUTE):
+        is_old = next_hop != places.good_id or now_s - places.good_seen_s >= fresh_s
+        if is_old and next_hop not in (self.gateway, NO_ROUTE):
             ask_for_place(self._parts, next_hop)
 
     # The end of a connection -----------------------------------------------------------------

@@ -164,7 +164,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
         On a busy channel, skip neighbours that were heard recently.
         """
-        patience = self._antenna.patience()
+        patience = max(self._antenna.patience(), self._antenna.medium.heard_periods)
         if patience > 0.0:
             since_s = self._deadlines.now_s - patience * self._parts.timing.check_period_s
             heard_s = self._neighbours.last_heard_s

@@ -77,8 +77,13 @@ def pdr_echo(run: RunRecord) -> float:
 
 @metric("ms", "median time of these messages that arrived, up and down", better="less")
 def delay_ms(run: RunRecord) -> float:
-    delays = [p.delay_s for p in run.probes if p.kind != "echo" and p.delay_s is not None]
-    return 1000.0 * statistics.median(delays) if delays else NAN
+    delays = _delays_ms(run)
+    return statistics.median(delays) if delays else NAN
+
+
+@metric("ms", "the time within which 95 % of them arrived", better="less")
+def delay_p95_ms(run: RunRecord) -> float:
+    return _percentile(_delays_ms(run), 0.95)
 
 
 @metric("hops", "mean hops of an echo beyond the shortest path at its time", better="less")
@@ -104,6 +109,11 @@ def control_frame_rate(run: RunRecord) -> float:
 def _percentile(values: Sequence[float], share: float) -> float:
     """The least value that so large a share of the values does not exceed; NaN: no values."""
     return sorted(values)[max(0, math.ceil(share * len(values)) - 1)] if values else NAN
+
+
+def _delays_ms(run: RunRecord) -> list[float]:
+    fates = [probe for probe in run.probes if probe.kind != "echo"]
+    return [1000.0 * fate.delay_s for fate in fates if fate.delay_s is not None]
 
 
 def _arrived(run: RunRecord, kind: str) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from rig import FROM_0, Rig, packet
 
@@ -547,6 +549,42 @@ def test_a_router_whose_only_route_is_gone_asks_around_at_once():
     rig.hear("02 02 05 01 01 00")
     assert not rig.mesh.get_connected_to_gateway()
     assert packet("01 01 03 fe fe 02 00") in rig.broadcasts()
+
+
+def test_a_neighbour_that_was_just_heard_is_not_probed():
+    """At the checks after 5 and 15 s; node 3 is heard 4 s before the second one, node 4 is not."""
+    rig = shared_rig()
+    rig.antenna.medium = replace(rig.antenna.medium, heard_periods=0.9)
+    rig.know_neighbour(3, 4)
+    rig.wait_until(11.0)
+    rig.know_neighbour(3)
+    rig.wait_until(15.0)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 04 04 00 ff")]
+
+
+@pytest.mark.parametrize(("place_periods", "asked_s"), [(0.0, [5, 15, 25, 35]), (2.5, [5, 35])])
+def test_a_router_asks_for_a_place_that_it_knows_only_from_time_to_time(place_periods, asked_s):
+    rig = shared_rig()
+    rig.antenna.medium = replace(rig.antenna.medium, place_periods=place_periods)
+    rig.connect_through(2)
+    asked = []
+    for check_s in (5, 15, 25, 35):
+        rig.wait_until(check_s)
+        if any(request[3:5] == b"\2\2" for request in rig.sent(REQUEST)):
+            asked.append(check_s)
+            rig.hear("02 02 01 01 01 00 00 80 3f")
+        rig.hear("00 02 04 01 01 01 00 01")  # the gateway answers
+    assert asked == asked_s
+
+
+def test_another_next_hop_is_asked_for_its_place_at_the_next_check():
+    rig = shared_rig()
+    rig.antenna.medium = replace(rig.antenna.medium, place_periods=2.5)
+    rig.connect_through(2)
+    rig.hear("02 02 01 01 01 00 00 80 3f")
+    rig.connect_through(3)
+    rig.wait_until(5.0)
+    assert packet("01 01 02 03 03 00 00 00 00 00 00 00 00 01") in rig.sent(REQUEST)
 
 
 def test_a_queued_packet_teaches_the_routes_when_the_antenna_reports_its_outcome():
