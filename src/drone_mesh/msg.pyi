@@ -121,13 +121,15 @@ class LayoutFeedback(Message):
 
 class LayoutGoal(Message):
     caseID: int
-    def __init__(self, caseID: int = ...) -> None: ...
+    at_once: bool
+    def __init__(self, caseID: int = ..., at_once: bool = ...) -> None: ...
 
 class LayoutProgress(Message):
     id: int
     case_id: int
     arrived: bytes
     flying: bytes
+    later: bytes
     waiting: bytes
     refused: bytes
     reasons: Sequence[str]
@@ -141,6 +143,7 @@ class LayoutProgress(Message):
         case_id: int = ...,
         arrived: bytes | Sequence[int] = ...,
         flying: bytes | Sequence[int] = ...,
+        later: bytes | Sequence[int] = ...,
         waiting: bytes | Sequence[int] = ...,
         refused: bytes | Sequence[int] = ...,
         reasons: Sequence[str] = ...,

@@ -117,11 +117,13 @@ class OrderFlight:
 
 class OrderLayoutRequest(Message):
     caseID: int
-    def __init__(self, caseID: int = ...) -> None: ...
+    at_once: bool
+    def __init__(self, caseID: int = ..., at_once: bool = ...) -> None: ...
 
 class OrderLayoutResponse(Message):
     id: int
     sent: bytes
+    later: bytes
     no_route: bytes
     not_in_fleet: bytes
     message: str
@@ -129,6 +131,7 @@ class OrderLayoutResponse(Message):
         self,
         id: int = ...,
         sent: bytes | Sequence[int] = ...,
+        later: bytes | Sequence[int] = ...,
         no_route: bytes | Sequence[int] = ...,
         not_in_fleet: bytes | Sequence[int] = ...,
         message: str = ...,
@@ -147,6 +150,36 @@ class PowerSwitchResponse(Message): ...
 class PowerSwitch:
     _request_class = PowerSwitchRequest
     _response_class = PowerSwitchResponse
+
+class PreviewLayoutRequest(Message):
+    caseID: int
+    at_once: bool
+    def __init__(self, caseID: int = ..., at_once: bool = ...) -> None: ...
+
+class PreviewLayoutResponse(Message):
+    duration: float
+    least_connected: float
+    out_of_reach: bytes
+    cut_off: bytes
+    stay: bytes
+    reasons: Sequence[str]
+    not_in_fleet: bytes
+    message: str
+    def __init__(
+        self,
+        duration: float = ...,
+        least_connected: float = ...,
+        out_of_reach: bytes | Sequence[int] = ...,
+        cut_off: bytes | Sequence[int] = ...,
+        stay: bytes | Sequence[int] = ...,
+        reasons: Sequence[str] = ...,
+        not_in_fleet: bytes | Sequence[int] = ...,
+        message: str = ...,
+    ) -> None: ...
+
+class PreviewLayout:
+    _request_class = PreviewLayoutRequest
+    _response_class = PreviewLayoutResponse
 
 class RemoveDroneRequest(Message):
     id: int

@@ -90,7 +90,7 @@ class ManagerTest(unittest.TestCase):
 
     def test_in_a_layout_a_place_that_another_of_its_drones_leaves_is_free(self) -> None:
         self.listen(taken={6: 5, 3: 99})
-        answer = call("/DroneManager/orderLayout", OrderLayout, 101)
+        answer = call("/DroneManager/orderLayout", OrderLayout, 101, True)
         self.assertEqual(self.sharing, [6])
         self.assertEqual(list(answer.sent), [5, 4, 2, 1, 6])
         reason = "drone 3 stays: drone 99 stands there"
@@ -103,7 +103,7 @@ class ManagerTest(unittest.TestCase):
 
     def test_a_layout_reports_what_became_of_its_orders(self) -> None:
         self.listen(no_route=[2, 5])
-        answer = call("/DroneManager/orderLayout", OrderLayout, 101)
+        answer = call("/DroneManager/orderLayout", OrderLayout, 101, True)
         self.assertEqual((list(answer.sent), list(answer.no_route)), ([6, 4, 3, 1], [5, 2]))
         self.assertEqual(list(answer.not_in_fleet), [])
         self.assertEqual(answer.message, "ordered 4 of 6 drones; no route yet to drones 2, 5")

@@ -46,7 +46,7 @@ class StandingLayoutsTest(unittest.TestCase):
         cls.progress[progress.id] = progress
 
     def order(self, case: int) -> int:
-        return int(call("/DroneManager/orderLayout", OrderLayout, case).id)
+        return int(call("/DroneManager/orderLayout", OrderLayout, case, False).id)
 
     def wait_until_over(self, number: int) -> LayoutProgress:
         what = f"standing order {number} is over"
@@ -70,7 +70,7 @@ class StandingLayoutsTest(unittest.TestCase):
         client = actionlib.SimpleActionClient("/DroneManager/layout", LayoutAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(60)), "no action server")
         heard: list[LayoutFeedback] = []
-        client.send_goal(LayoutGoal(0), feedback_cb=heard.append)
+        client.send_goal(LayoutGoal(0, False), feedback_cb=heard.append)
         self.assertTrue(client.wait_for_result(rospy.Duration(600)), "the layout did not end")
         self.assertEqual(client.get_state(), GoalStatus.SUCCEEDED, client.get_goal_status_text())
         self.assertEqual(client.get_result().message, "17 of 17 at their places")
@@ -79,7 +79,7 @@ class StandingLayoutsTest(unittest.TestCase):
     def test_3_an_unknown_layout_is_refused_with_a_list_of_those_that_exist(self) -> None:
         client = actionlib.SimpleActionClient("/DroneManager/layout", LayoutAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(60)), "no action server")
-        client.send_goal_and_wait(LayoutGoal(77))
+        client.send_goal_and_wait(LayoutGoal(77, False))
         self.assertEqual(client.get_state(), GoalStatus.ABORTED)
         self.assertIn("unknown case 77", client.get_result().message)
 
@@ -103,7 +103,7 @@ class StandingLayoutsTest(unittest.TestCase):
         self.mesh.wait("1 and 2 connected", 60, lambda: self.mesh.connected((1, 2)))
         flight = run("fly", "1", "-1.5", "2", "0")
         self.assertEqual(flight.returncode, 0, flight.stdout + flight.stderr)
-        self.assertRegex(flight.stdout, r"under way: \d+\.\d m left\n(.*\n)*arrived\n")
+        self.assertRegex(flight.stdout, r"under way, \d+ m and \d+ s left\n(.*\n)*arrived\n")
         done = run("layout", "1")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("1 of 1 at their place", done.stdout)
@@ -125,9 +125,10 @@ class StandingLayoutsTest(unittest.TestCase):
         return [progress for progress in self.progress.values() if not progress.over]
 
     def waiting(self, number: int) -> bytes | None:
-        """Its drones without a route, once no drone flies any more."""
+        """Its drones without a route, once no other drone is to fly any more."""
         progress = self.progress.get(number)
-        return bytes(progress.waiting) if progress and not progress.flying else None
+        moves = progress is None or progress.flying or progress.later
+        return None if moves else bytes(progress.waiting)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """StandingOrders: formations as goals, kept until each drone is at its place.
 
-docs/ros.md, "Drone manager". An order through the mesh is lost on a drone that has no route at
-that moment, and a drone in flight has none: what has not been accepted is ordered again.
+docs/ros.md, "Formations". An order through the mesh is lost on a drone that has no route at that
+moment, and a drone in flight has none: what has not been accepted is ordered again. Departures
+decides which drones set out when.
 """
 
 from __future__ import annotations
@@ -15,18 +16,20 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
+from drone_mesh.state.departures import AT_PLACE_M, Departures, FlightRules
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, position_is_known
 from drone_mesh.state.orders import CLOCKS_DIFFER_S
 
-AT_PLACE_M = 0.5  # our choice: heights are rounded to whole metres, and physics moves drones
 FIRST_PAUSE_S = 5.0  # our choice, simulated: an order over 100 nodes takes less than a second
 LONGEST_PAUSE_S = 40.0  # our choice: each try costs a packet per hop
+UNDER_WAY_S = 30.0  # a gateway repeats an order for as long: the drone may still set out
 
 
 class PartState(enum.Enum):
     """How far one drone of a standing order has come."""
 
     WAITING = "without a route"
+    LATER = "waiting to set out"
     FLYING = "flying"
     ARRIVED = "at its place"
     REFUSED = "refused"
@@ -36,7 +39,7 @@ class PartState(enum.Enum):
     @property
     def is_open(self) -> bool:
         """Whether the drone may still reach its place because of this order."""
-        return self in (PartState.WAITING, PartState.FLYING, PartState.REFUSED)
+        return self not in (PartState.ARRIVED, PartState.ABSENT, PartState.REPLACED)
 
 
 @dataclass
@@ -48,6 +51,18 @@ class _Part:
     reason: str = ""  # of a refusal
     pause_s: float = FIRST_PAUSE_S
     due_s: float = -math.inf  # when to order it next
+    sent_to: Location | None = None  # by an order that it may still follow
+    sent_s: float = -math.inf
+
+    def send(self, to: Location, now_s: float) -> None:
+        """It is being ordered there."""
+        self.sent_to, self.sent_s = to, now_s
+        self.due_s = now_s + self.pause_s
+        self.pause_s = min(2.0 * self.pause_s, LONGEST_PAUSE_S)
+
+    def stay(self, state: PartState, reason: str = "") -> None:
+        """It will not follow its latest order."""
+        self.state, self.reason, self.sent_to = state, reason, None
 
 
 @dataclass(frozen=True)
@@ -72,7 +87,8 @@ class StandingProgress:
         flying = self.drones[PartState.FLYING]
         if flying:
             words.append(f"{len(flying)} flying")
-        for state in (PartState.WAITING, PartState.ABSENT, PartState.REPLACED):
+        others = (PartState.LATER, PartState.WAITING, PartState.ABSENT, PartState.REPLACED)
+        for state in others:
             if self.drones[state]:
                 ids = ids_in_words(self.drones[state])
                 words.append(f"{len(self.drones[state])} {state.value}: {ids}")
@@ -85,12 +101,18 @@ class _StandingOrder:
     """One layout that was ordered."""
 
     def __init__(
-        self, number: int, case: int, goals: Mapping[int, Location], given_s: float, due_s: float
+        self,
+        number: int,
+        case: int,
+        goals: Mapping[int, Location],
+        given_s: float,
+        at_once: bool,
     ) -> None:
         self.number = number
         self.case = case
         self.given_s = given_s
-        self.parts = {drone: _Part(goal, due_s=due_s) for drone, goal in goals.items()}
+        self.at_once = at_once
+        self.parts = {drone: _Part(goal) for drone, goal in goals.items()}
 
     def progress(self) -> StandingProgress:
         """A snapshot."""
@@ -112,15 +134,18 @@ class StandingOrders:
         self._orders: dict[int, _StandingOrder] = {}  # by number, oldest first
         self._last_number = 0
 
-    def give(self, case: int, goals: Mapping[int, Location], now_s: float) -> int:
+    def give(
+        self, case: int, goals: Mapping[int, Location], now_s: float, at_once: bool = False
+    ) -> int:
         """A layout is being ordered; returns its number. It replaces earlier goals of its drones.
 
-        `now_s`: simulated time; the caller gives the first orders at that moment.
+        `now_s`: simulated time. `at_once`: all drones set out together, whatever becomes of the
+        mesh and whomever they meet. The first orders are those of the next `update`.
         """
         self.replace(goals)
         self._last_number += 1
         self._orders[self._last_number] = _StandingOrder(
-            self._last_number, case, goals, now_s, now_s + FIRST_PAUSE_S
+            self._last_number, case, goals, now_s, at_once
         )
         return self._last_number
 
@@ -148,43 +173,85 @@ class StandingOrders:
             if part is None or not part.state.is_open or is_older:
                 continue
             if event.kind == MeshEventKind.ORDER_REFUSED.value:
-                part.state, part.reason = PartState.REFUSED, words
-            elif event.kind == MeshEventKind.ORDER_SENT.value and not what.endswith(_to(part.goal)):
+                part.stay(PartState.REFUSED, words)
+            elif event.kind == MeshEventKind.ORDER_SENT.value and not what.endswith(
+                (_to(part.goal), _to(part.sent_to or part.goal))
+            ):
                 part.state = PartState.REPLACED
 
-    def update(self, mesh: MeshStatus) -> list[tuple[int, Location]]:
+    def update(
+        self,
+        mesh: MeshStatus,
+        rules: FlightRules = FlightRules(),  # noqa: B008 (immutable)
+    ) -> list[tuple[int, Location]]:
         """Compare the goals with the state of the mesh; returns the orders to give now."""
         nodes = {node.id: node for node in mesh.nodes}
-        wanted: list[tuple[int, Location]] = []
+        wanted: dict[int, Location] = {}
+        together: dict[int, _Part] = {}
+        due: dict[int, _Part] = {}
+        for order in self._orders.values():
+            for drone, part in sorted(order.parts.items(), reverse=True):
+                if not part.state.is_open:
+                    continue
+                if self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
+                    if part.sent_to is not None:
+                        wanted[drone] = part.sent_to
+                        part.send(part.sent_to, mesh.stamp_s)
+                    else:
+                        (together if order.at_once else due)[drone] = part
+        if together or due:
+            departures = self._departures(mesh, rules)
+            taken = {drone: departures.taken_by(drone) for drone in together}
+            free = {drone: part.goal for drone, part in together.items() if not taken[drone]}
+            choice = departures.choose(due)
+            together.update(due)
+            for drone, reason in [*taken.items(), *choice.blocked.items()]:
+                if reason:
+                    together[drone].stay(PartState.REFUSED, reason)
+            for drone, to in [*free.items(), *choice.set_out.items()]:
+                if together[drone].state is PartState.REFUSED:
+                    together[drone].state = PartState.LATER
+                together[drone].send(to, mesh.stamp_s)
+                wanted[drone] = to
+        return list(wanted.items())
+
+    def _departures(self, mesh: MeshStatus, rules: FlightRules) -> Departures:
+        goals: dict[int, Location] = {}
+        sent: dict[int, Location] = {}
+        at = {n.id: Location.from_vector(n.position) for n in mesh.nodes if position_is_known(n)}
         for order in self._orders.values():
             for drone, part in order.parts.items():
-                if part.state.is_open and self._follow(part, nodes.get(drone), mesh.stamp_s):
-                    wanted.append((drone, part.goal))
-        return wanted
+                goal = _as_ordered(part.goal)
+                stands = drone in at and at[drone].distance_m(goal) <= AT_PLACE_M
+                if part.state.is_open or (part.state is PartState.ARRIVED and stands):
+                    goals[drone] = goal
+                    if part.state.is_open and part.sent_to is not None:
+                        sent[drone] = _as_ordered(part.sent_to)
+        return Departures(mesh, goals, sent, rules)
 
-    def _follow(self, part: _Part, node: NodeStatus | None, now_s: float) -> bool:
-        """Update one drone's state; returns whether to order it now."""
+    def _follow(self, part: _Part, node: NodeStatus | None, at_once: bool, now_s: float) -> bool:
+        """Update one drone's state; returns whether it may be ordered now."""
         if node is None:
             part.state = PartState.ABSENT
             return False
-        goal = _as_ordered(part.goal)
-        if len(node.path):
-            if Location.from_vector(node.path[-3:]).distance_m(goal) <= AT_PLACE_M:
-                part.state, part.pause_s = PartState.FLYING, FIRST_PAUSE_S
+        flies = bool(len(node.path))
+        if flies or position_is_known(node):
+            end = Location.from_vector(node.path[-3:] if flies else node.position)
+            if end.distance_m(_as_ordered(part.goal)) <= AT_PLACE_M:
+                part.stay(PartState.FLYING if flies else PartState.ARRIVED)
+                part.pause_s = FIRST_PAUSE_S
                 return False
-        elif (
-            position_is_known(node)
-            and Location.from_vector(node.position).distance_m(goal) <= AT_PLACE_M
-        ):
-            part.state = PartState.ARRIVED
-            return False
-        if part.state is PartState.FLYING:
-            part.state = PartState.WAITING
-        if now_s < part.due_s or not (node.connected or node.role == Role.GATEWAY):
-            return False
-        part.due_s = now_s + part.pause_s
-        part.pause_s = min(2.0 * part.pause_s, LONGEST_PAUSE_S)
-        return True
+            is_aside = part.sent_to is not None and end.distance_m(part.sent_to) <= AT_PLACE_M
+            if is_aside and not flies:
+                part.sent_to, part.due_s = None, now_s
+        if now_s - part.sent_s >= UNDER_WAY_S and not flies:
+            part.sent_to = None
+        has_route = node.connected or node.role == Role.GATEWAY
+        if part.state is not PartState.REFUSED:
+            part.state = PartState.LATER if has_route or flies else PartState.WAITING
+        if at_once and part.sent_s == -math.inf:
+            return True  # a gateway may find a drone that seems lost
+        return now_s >= part.due_s and has_route and (at_once or not flies)
 
     def all_progress(self) -> list[StandingProgress]:
         """How far each has come, oldest first."""
@@ -204,6 +271,7 @@ class StandingOrders:
             {
                 "number": order.number,
                 "case": order.case,
+                "at_once": order.at_once,
                 "goals": {
                     str(drone): list(part.goal)
                     for drone, part in order.parts.items()
@@ -219,7 +287,7 @@ class StandingOrders:
             goals = {int(drone): Location(*goal) for drone, goal in entry["goals"].items()}
             number = int(entry["number"])
             self._orders[number] = _StandingOrder(
-                number, int(entry["case"]), goals, -math.inf, -math.inf
+                number, int(entry["case"]), goals, -math.inf, bool(entry["at_once"])
             )
             self._last_number = max(self._last_number, number)
 

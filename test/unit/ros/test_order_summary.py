@@ -21,6 +21,10 @@ from drone_mesh.ros.services.order_summary import OrderSummary
             "ordered 2 of 89 drones; no route yet to drones 3..5, 9; "
             "drones 18..100 are not in this fleet",
         ),
+        (
+            OrderSummary([1], [], [], later=[2, 3]),
+            "ordered 1 of 3 drones; drones 2..3 will set out later",
+        ),
         (OrderSummary([], [7], []), "ordered 0 of 1 drone; no route yet to drone 7"),
     ],
 )

@@ -6,6 +6,7 @@ import pytest
 
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
 from drone_mesh.inprocess.network import Network
 from drone_mesh.layouts import Layouts
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
@@ -19,6 +20,10 @@ NORTH = Location(latitude=6.0, longitude=0.0, height=1.0)
 def drone(node_id, at=HOME, to=None, connected=True):
     path = () if to is None else (*at.to_vector(), *to.to_vector())
     return NodeStatus(node_id, connected=connected, position=at.to_vector(), path=path)
+
+
+def gateway():
+    return NodeStatus(0, role=Role.GATEWAY, connected=True, position=(-1.0, 0.0, 0.0))
 
 
 def state(now_s, *nodes):
@@ -41,7 +46,7 @@ def test_an_order_that_a_drone_does_not_carry_out_is_repeated_less_and_less_ofte
     orders = StandingOrders()
     orders.give(7, {4: EAST}, now_s=0.0)
     ordered = [s for s in range(100) if orders.update(state(float(s), drone(4)))]
-    assert ordered == [5, 10, 20, 40, 80]
+    assert ordered == [0, 5, 15, 35, 75]
 
 
 def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there():
@@ -55,10 +60,30 @@ def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there():
     assert orders.all_progress()[0].is_over
 
 
-def test_a_drone_that_flies_elsewhere_is_ordered_once_more():
+def test_a_drone_that_flies_elsewhere_is_ordered_when_it_has_landed():
     orders = StandingOrders()
     orders.give(7, {4: EAST}, now_s=0.0)
-    assert orders.update(state(6.0, drone(4, to=NORTH))) == [(4, EAST)]
+    assert orders.update(state(6.0, drone(4, to=NORTH))) == []
+    assert words(orders) == ["0 of 1 at their place, 1 waiting to set out: 4"]
+    assert orders.update(state(7.0, drone(4, at=NORTH))) == [(4, EAST)]
+
+
+def test_at_once_a_drone_is_ordered_on_the_way_elsewhere_and_without_a_route():
+    orders = StandingOrders()
+    orders.give(7, {3: EAST, 4: EAST, 5: NORTH}, now_s=0.0, at_once=True)
+    present = drone(3), drone(4, to=NORTH), drone(5, connected=False)
+    assert orders.update(state(6.0, *present)) == [(5, NORTH), (4, EAST), (3, EAST)]
+
+
+def test_a_drone_that_may_still_set_out_is_not_met_by_another_one():
+    orders = StandingOrders()
+    there, across = drone(4), drone(5, at=Location(3.0, 3.0, 0.0))
+    orders.give(7, {4: EAST}, now_s=0.0)
+    assert orders.update(state(1.0, gateway(), there, across)) == [(4, EAST)]
+    orders.give(8, {5: Location(-3.0, 3.0, 0.0)}, now_s=2.0)  # crosses the other path
+    assert orders.update(state(3.0, gateway(), there, across)) == []
+    arrived = drone(4, at=EAST)
+    assert orders.update(state(9.0, gateway(), arrived, across)) == [(5, Location(-3.0, 3.0, 0.0))]
 
 
 def test_a_drone_that_has_arrived_once_is_not_ordered_back_after_a_repair():
@@ -164,3 +189,13 @@ def test_the_last_layout_ordered_is_reached_whatever_was_ordered_before(seed, pa
     places = dict(LAYOUTS.orders(0))
     astray = [n for n in places if network.location(n).distance_m(places[n]) > 0.5]
     assert astray == [], f"{ids_in_words(astray)}: {last.in_words()}"
+
+
+def test_no_drone_is_sent_to_the_place_of_one_that_stays_there():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST}, now_s=0.0)
+    orders.give(8, {5: NORTH}, now_s=0.0, at_once=True)
+    there = drone(6, at=EAST), drone(7, at=NORTH)
+    assert orders.update(state(1.0, drone(4), drone(5), *there)) == []
+    refused = "0 of 1 at their place, {} refused: drone {} is in the way"
+    assert words(orders) == [refused.format(4, 6), refused.format(5, 7)]

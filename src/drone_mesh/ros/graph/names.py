@@ -22,6 +22,7 @@ REQUEST_MOVEMENT_SERVICE = "DroneManager/requestDroneMovement"
 SET_TO_CASUS_SERVICE = "DroneManager/SetToCasus"
 ORDER_FLIGHT_SERVICE = "DroneManager/orderFlight"  # OrderFlight
 ORDER_LAYOUT_SERVICE = "DroneManager/orderLayout"  # OrderLayout
+PREVIEW_LAYOUT_SERVICE = "DroneManager/previewLayout"  # PreviewLayout
 WITHDRAW_LAYOUT_SERVICE = "DroneManager/withdrawLayout"  # WithdrawLayout
 LAYOUT_ACTION = "DroneManager/layout"  # Layout
 LAYOUTS_TOPIC = "DroneManager/layouts"  # LayoutProgress, latched: DroneManager -> users

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import time
 from typing import Sequence
@@ -25,7 +26,7 @@ from drone_mesh.ros.graph.parameters import manager_layouts, or_exit
 from drone_mesh.ros.graph.present_drones import PresentDrones
 from drone_mesh.ros.services.order_answers import OrderAnswers, Outcomes
 from drone_mesh.ros.services.order_summary import OrderSummary
-from drone_mesh.ros.services.standing_layouts import StandingLayouts
+from drone_mesh.ros.services.standing_layouts import Given, StandingLayouts
 from drone_mesh.srv import (
     Casus,
     CasusRequest,
@@ -36,6 +37,9 @@ from drone_mesh.srv import (
     OrderLayout,
     OrderLayoutRequest,
     OrderLayoutResponse,
+    PreviewLayout,
+    PreviewLayoutRequest,
+    PreviewLayoutResponse,
     RequestDroneFlight,
     RequestDroneFlightRequest,
     RequestDroneFlightResponse,
@@ -43,6 +47,7 @@ from drone_mesh.srv import (
     WithdrawLayoutRequest,
     WithdrawLayoutResponse,
 )
+from drone_mesh.state.standing_orders import PartState
 
 WAIT_FOR_GATEWAY_S = 3.0  # of wall time (docs/ros.md, "Drone manager")
 ANSWERS_TIMEOUT_S = 1.0  # our choice, wall: a gateway answers in milliseconds, if it answers
@@ -62,7 +67,8 @@ class DroneManager:
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
                 (Casus), also as /requestDroneMovement and /SetToCasus;
                 /DroneManager/orderFlight (OrderFlight), /DroneManager/orderLayout (OrderLayout),
-                /DroneManager/withdrawLayout (WithdrawLayout)
+                /DroneManager/previewLayout (PreviewLayout), /DroneManager/withdrawLayout
+                (WithdrawLayout)
     Standing orders: see StandingLayouts
     """
 
@@ -77,13 +83,16 @@ class DroneManager:
             for topic in (names.GATEWAY_TOPIC, names.SHARED_PLACE_TOPIC)
         )
         self._answers = OrderAnswers()
-        self._standing = StandingLayouts(self._publish, self._carry_out)
+        self._standing = StandingLayouts(
+            functools.partial(self._publish, allow_shared_place=True), self._carry_out
+        )
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
             rospy.Service(name, RequestDroneFlight, self._request_movement)
         for name in (names.SET_TO_CASUS_SERVICE, names.SHORT_SET_TO_CASUS_SERVICE):
             rospy.Service(name, Casus, self._set_to_casus)
         rospy.Service(names.ORDER_FLIGHT_SERVICE, OrderFlight, self._order_flight)
         rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
+        rospy.Service(names.PREVIEW_LAYOUT_SERVICE, PreviewLayout, self._preview_layout)
         rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, self._withdraw_layout)
 
     def _request_movement(self, request: RequestDroneFlightRequest) -> RequestDroneFlightResponse:
@@ -128,13 +137,34 @@ class DroneManager:
         return f"no gateway has a route to drone {drone}"
 
     def _set_to_casus(self, request: CasusRequest) -> CasusResponse:
-        self._carry_out(request.caseID)
+        self._carry_out(request.caseID, at_once=True)
         return CasusResponse()
 
     def _order_layout(self, request: OrderLayoutRequest) -> OrderLayoutResponse:
-        number, summary = self._carry_out(request.caseID)
+        number, summary = self._carry_out(request.caseID, request.at_once)
         return OrderLayoutResponse(
-            number, summary.sent, summary.no_route, summary.not_in_fleet, summary.in_words()
+            number,
+            summary.sent,
+            summary.later,
+            summary.no_route,
+            summary.not_in_fleet,
+            summary.in_words(),
+        )
+
+    def _preview_layout(self, request: PreviewLayoutRequest) -> PreviewLayoutResponse:
+        known, missing = self._drones_of(request.caseID, drones_if_known())
+        found = self._standing.preview(known, request.at_once)
+        if found is None:
+            raise rospy.ServiceException("the state of the mesh is not known")
+        return PreviewLayoutResponse(
+            found.duration_s,
+            found.least_connected,
+            found.out_of_reach,
+            found.cut_off,
+            list(found.stays),
+            list(found.stays.values()),
+            missing,
+            found.in_words(),
         )
 
     def _withdraw_layout(self, request: WithdrawLayoutRequest) -> WithdrawLayoutResponse:
@@ -144,25 +174,45 @@ class DroneManager:
         return WithdrawLayoutResponse(True, words)
 
     def _carry_out(
-        self, case: int, handle: actionlib.ServerGoalHandle | None = None
+        self, case: int, at_once: bool, handle: actionlib.ServerGoalHandle | None = None
     ) -> tuple[int, OrderSummary]:
         """Order a layout; returns the number of its standing order, and its first outcome."""
+        fleet = drones_if_known()
+        known, missing = self._drones_of(case, fleet)
+        if not self._gateway_is_there():
+            raise rospy.ServiceException("no gateway is running")
+        given = self._standing.give(case, self._layouts.orders(case), at_once, handle)
+        if given.is_followed:
+            summary = self._order_first(given, fleet, missing)
+        else:
+            summary = self._order_all(known, fleet, missing)
+        complete = len(summary.sent) + len(summary.later) == len(known) + len(missing)
+        _log.log(
+            logging.INFO if complete else logging.WARNING, "case %d: %s", case, summary.in_words()
+        )
+        return given.progress.number, summary
+
+    def _order_first(
+        self, given: Given, fleet: PresentDrones | None, missing: Sequence[int]
+    ) -> OrderSummary:
+        """Give the first orders of a standing order; who they are for is free to fly."""
+        drones, reasons = given.progress.drones, dict(given.progress.reasons)
+        first = [order for order in given.orders if order.node_id not in missing]
+        ordered = {order.node_id for order in first}
+        outcomes = self._order(first, fleet, allow_shared_place=True)
+        reasons.update({drone: answer.reason for drone, answer in outcomes.refused.items()})
+        no_route = [drone for drone in drones[PartState.WAITING] if drone not in ordered]
+        later = [drone for drone in drones[PartState.LATER] if drone not in ordered]
+        return OrderSummary(outcomes.sent, outcomes.no_route + no_route, missing, reasons, later)
+
+    def _drones_of(self, case: int, fleet: PresentDrones | None) -> tuple[list[Order], list[int]]:
+        """The orders of a layout, and the ids in it that are not in the fleet."""
         try:
             orders = self._layouts.orders(case)
         except UnknownCase as error:
             raise rospy.ServiceException(str(error)) from None
-        if not self._gateway_is_there():
-            raise rospy.ServiceException("no gateway is running")
-        fleet = drones_if_known()
         known = [o for o in orders if fleet is None or o.node_id in fleet.roles]
-        missing = [order.node_id for order in orders if order not in known]
-        number = self._standing.give(case, orders, handle)
-        summary = self._order_all(known, fleet, missing)
-        complete = len(summary.sent) == len(orders)
-        _log.log(
-            logging.INFO if complete else logging.WARNING, "case %d: %s", case, summary.in_words()
-        )
-        return number, summary
+        return known, [order.node_id for order in orders if order not in known]
 
     def _publish(self, orders: Sequence[Order], allow_shared_place: bool = False) -> None:
         checked = not (allow_shared_place and self._sharing.get_num_connections())

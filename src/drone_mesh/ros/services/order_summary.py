@@ -16,12 +16,15 @@ class OrderSummary:
     no_route: Sequence[int]
     not_in_fleet: Sequence[int]
     refused: Mapping[int, str] = field(default_factory=dict)  # by drone: the reason
+    later: Sequence[int] = ()
 
     def in_words(self) -> str:
         """One line, for example: ordered 16 of 17 drones; drone 17 is not in this fleet."""
-        others = (self.no_route, self.not_in_fleet, self.refused)
+        others = (self.no_route, self.not_in_fleet, self.refused, self.later)
         total = len(self.sent) + sum(map(len, others))
         parts = [f"ordered {len(self.sent)} of {_counted(total, 'drone')}"]
+        if self.later:
+            parts.append(f"{_named(self.later)} will set out later")
         if self.no_route:
             parts.append(f"no route yet to {_named(self.no_route)}")
         parts += [f"drone {drone} stays: {reason}" for drone, reason in self.refused.items()]

@@ -6,7 +6,7 @@ import json
 import logging
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, Sequence
+from typing import Callable, NamedTuple, Sequence
 
 import actionlib
 import rospy
@@ -22,7 +22,11 @@ from drone_mesh.msg import (
 )
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
+from drone_mesh.ros.graph.flight_rules import flight_rules
 from drone_mesh.ros.graph.master_watch import NO_ANSWER
+from drone_mesh.state.departures import FlightRules
+from drone_mesh.state.formation_preview import FormationPreview, preview
+from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.standing_orders import PartState, StandingOrders, StandingProgress
 
 _QUEUE = 1000  # events that may wait
@@ -38,6 +42,7 @@ def progress_msg(progress: StandingProgress, over: bool) -> LayoutProgress:
         case_id=progress.case,
         arrived=ids[PartState.ARRIVED],
         flying=ids[PartState.FLYING],
+        later=ids[PartState.LATER],
         waiting=ids[PartState.WAITING],
         refused=ids[PartState.REFUSED],
         reasons=[progress.reasons[drone] for drone in progress.drones[PartState.REFUSED]],
@@ -46,6 +51,14 @@ def progress_msg(progress: StandingProgress, over: bool) -> LayoutProgress:
         over=over,
         message=progress.in_words(),
     )
+
+
+class Given(NamedTuple):
+    """A standing order at its start."""
+
+    progress: StandingProgress
+    orders: Sequence[Order]  # that must be given first
+    is_followed: bool  # whether others follow as the state of the mesh demands
 
 
 class StandingLayouts:
@@ -64,7 +77,7 @@ class StandingLayouts:
     def __init__(
         self,
         order: Callable[[Sequence[Order]], None],
-        begin: Callable[[int, actionlib.ServerGoalHandle], object],
+        begin: Callable[[int, bool, actionlib.ServerGoalHandle], object],
     ) -> None:
         """`order` publishes orders; `begin` orders a layout for the goal of an action.
 
@@ -76,6 +89,7 @@ class StandingLayouts:
         self._lock = threading.Lock()
         self._reporter = ThreadPoolExecutor(max_workers=1, thread_name_prefix="standing layouts")
         self._orders = StandingOrders()
+        self._mesh: MeshStatus | None = None  # the latest state
         self._shown: dict[int, StandingProgress] = {}
         self._saved = ""
         self._handles: dict[int, actionlib.ServerGoalHandle] = {}
@@ -91,18 +105,35 @@ class StandingLayouts:
         rospy.Subscriber(names.STATE_TOPIC, MeshState, self._state_came, queue_size=1)
 
     def give(
-        self, case: int, orders: Sequence[Order], handle: actionlib.ServerGoalHandle | None
-    ) -> int:
-        """Make a standing order of these, which the caller publishes next. Returns its number.
+        self,
+        case: int,
+        orders: Sequence[Order],
+        at_once: bool,
+        handle: actionlib.ServerGoalHandle | None,
+    ) -> Given:
+        """Make a standing order of these. The caller publishes the first ones next.
 
+        Without a state of the mesh, as beside the world of another program, that is all of them.
         `handle` is the accepted goal of the action, if it was ordered by one.
         """
+        rules = flight_rules()
         with self._lock:
-            number = self._orders.give(case, dict(orders), rospy.get_time())
+            number = self._orders.give(case, dict(orders), rospy.get_time(), at_once)
             if handle is not None:
                 self._handles[number] = handle
+            first = orders
+            if self._mesh is not None:
+                sent = self._orders.update(self._mesh, rules)
+                first = [Order(drone, goal) for drone, goal in sent]
+            (progress,) = [p for p in self._orders.all_progress() if p.number == number]
+            given = Given(progress, first, self._mesh is not None)
         self._show()
-        return number
+        return given
+
+    def preview(self, orders: Sequence[Order], at_once: bool) -> FormationPreview | None:
+        """What would happen if these were ordered now; None: the state of the mesh is unknown."""
+        mesh = self._mesh
+        return None if mesh is None else preview(mesh, dict(orders), flight_rules(), at_once)
 
     def replace(self, drone: int) -> None:
         """This drone is ordered elsewhere."""
@@ -129,8 +160,11 @@ class StandingLayouts:
             self._orders.take(event_record(event))
 
     def _state_came(self, state: MeshState) -> None:
+        mesh = mesh_status(state)
+        rules = flight_rules() if self._orders.all_progress() else FlightRules()
         with self._lock:
-            wanted = self._orders.update(mesh_status(state))
+            self._mesh = mesh
+            wanted = self._orders.update(mesh, rules)
         if wanted:
             self._order([Order(drone, goal) for drone, goal in wanted])
         self._show()
@@ -138,7 +172,8 @@ class StandingLayouts:
     def _goal_came(self, handle: actionlib.ServerGoalHandle) -> None:
         handle.set_accepted()  # first: it may be over before `begin` returns
         try:
-            self._begin(handle.get_goal().caseID, handle)
+            goal = handle.get_goal()
+            self._begin(goal.caseID, goal.at_once, handle)
         except rospy.ServiceException as error:
             handle.set_aborted(LayoutResult(0, False, str(error)), str(error))
 

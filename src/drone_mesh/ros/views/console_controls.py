@@ -60,7 +60,7 @@ class RosControls:
         """Order all drones of a layout to their positions."""
         request = OrderLayoutRequest(caseID=case)
         answer = _call(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
-        if not answer.sent:
+        if not (answer.sent or answer.later):
             raise OrderRefused(f"layout {case}: {answer.message}")
         return f"layout {case}: {answer.message}"
 

@@ -23,29 +23,32 @@ from drone_mesh.stopping import StopRequest
 def main() -> None:
     """Entry point of nodes/layout."""
     options = _parser().parse_args(rospy.myargv()[1:])
-    run_tool("layout", lambda: _run(options.case))
+    run_tool("layout", lambda: _run(options.case, options.at_once))
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosrun drone_mesh layout",
         description="Sends the drones of a layout to their places, and shows how far they are. "
+        "They set out one after the other, so that none meets another and the mesh holds. "
         "Drones without a route are ordered as soon as they have one. Ctrl-C withdraws the "
         "layout; drones in flight fly on.",
         epilog="Exit code: 0 all drones are at their places, 1 some are not, 2 not ordered.",
     )
     parser.add_argument("case", type=whole(0, MAX_CASE), help="its number, such as 0 or 202")
+    parser.add_argument("--at-once", action="store_true", help="all drones set out together")
     return parser
 
 
-def _run(case: int) -> int:
+def _run(case: int, at_once: bool) -> int:
     join_graph("order_layout")
     heard: queue.Queue[LayoutProgress] = queue.Queue()
     rospy.Subscriber(names.LAYOUTS_TOPIC, LayoutProgress, heard.put)
     with StopRequest() as stop:  # from here on Ctrl-C finds a layout that it can withdraw
         signal.signal(signal.SIGINT, lambda _number, _frame: stop.make())
         try:
-            answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, OrderLayoutRequest(case))
+            request = OrderLayoutRequest(case, at_once)
+            answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
         except ServiceGone as error:
             raise MeshError(f"{error}: is the simulation running?") from None
         except ServiceRefused as error:

@@ -1,0 +1,138 @@
+"""The drones of a formation set out so that none meets another, and the mesh holds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from drone_mesh.drone.fleet import plan_fleet
+from drone_mesh.drone.flight_path import FlightPath
+from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.layouts import Layouts
+from drone_mesh.state.departures import Departures, FlightRules
+from drone_mesh.state.formation_preview import preview
+from drone_mesh.state.model import MeshStatus, NodeStatus
+from drone_mesh.state.separation import nearest_m, segments, ways_of
+
+LAYOUTS = Layouts.shipped()
+
+
+def at(x, y, z=0.0):
+    return Location(latitude=y, longitude=x, height=z)
+
+
+def mesh(places, hops=None, routes=None, **more):
+    nodes = [NodeStatus(0, role=Role.GATEWAY, connected=True, position=(0.0, 0.0, 0.0))]
+    for drone, place in places.items():
+        node = NodeStatus(drone, connected=True, position=place.to_vector())
+        node.hops = (hops or {}).get(drone, 1)
+        node.route = bytes((routes or {}).get(drone, ()))
+        nodes.append(node)
+    return MeshStatus(0.0, nodes, **more)
+
+
+def choose(state, goals, sent=None, rules=FlightRules()):  # noqa: B008
+    return Departures(state, goals, sent or {}, rules).choose(goals)
+
+
+def fleet(routers, spacing=1.0):
+    places = plan_fleet(1, routers, 6, spacing)
+    return MeshStatus(
+        0.0,
+        [
+            NodeStatus(p.node_id, p.role, connected=True, position=(p.longitude, p.latitude, 0.0))
+            for p in places
+        ],
+    )
+
+
+def test_the_distance_of_segments_is_that_of_their_nearest_points():
+    level = segments([(0, 0, 1), (10, 0, 1)])
+    crossing, beside, point = [(5, -5, 3), (5, 5, 3)], [(2, 4, 1), (8, 4, 1)], [(20, 5, 1)]
+    others = np.concatenate([segments(corners) for corners in (crossing, beside, point)])
+    assert nearest_m(level, others) == pytest.approx([2.0, 4.0, math.hypot(10, 5)])
+
+
+def test_paths_that_cross_at_one_height_are_not_flown_together():
+    places = {1: at(3, 0), 2: at(0, 3)}
+    goals = {1: at(-3, 0), 2: at(0, -3)}
+    (first,) = choose(mesh(places, hops={1: 1, 2: 2}), goals).set_out
+    assert first == 2
+    assert choose(mesh(places), goals, sent={2: goals[2]}).set_out == {}
+
+
+def test_a_goal_is_free_only_when_the_drone_that_stands_there_has_left():
+    places = {1: at(3, 0), 2: at(6, 0), 3: at(6, 6)}
+    goals = {1: at(6, 0), 2: at(-6, 0)}
+    assert 1 not in choose(mesh(places), goals).set_out
+    choice = choose(mesh(places), {1: at(6, 6)})
+    assert choice.set_out == {}
+    assert choice.blocked == {1: "drone 3 is in the way"}
+
+
+def test_drones_that_change_places_let_each_other_pass():
+    places = {1: at(3, 0), 2: at(6, 0)}
+    found = preview(mesh(places), {1: places[2], 2: places[1]})
+    assert found.stays == {}
+    assert found.out_of_reach == []
+
+
+def test_far_drones_set_out_before_relays():
+    places = {n: at(6.0 * n, 0) for n in (1, 2, 3)}
+    routes = {1: (1, 0), 2: (2, 1, 0), 3: (3, 2, 1, 0)}
+    state = mesh(places, {1: 1, 2: 2, 3: 3}, routes)
+    goals = {n: at(0, 6.0 * n) for n in (1, 2, 3)}
+    assert list(choose(state, goals).set_out) == [3]
+
+
+def test_at_most_a_fifth_of_the_drones_is_away_at_once():
+    places = {n: at(1.5 * (n % 5) - 3, 1.5 * (n // 5) + 1.5) for n in range(1, 21)}
+    goals = {n: place._replace(longitude=place.longitude + 8) for n, place in places.items()}
+    assert len(choose(mesh(places), goals).set_out) == 4
+    assert len(choose(mesh(places, routing="beacon"), goals).set_out) > 4
+
+
+def test_a_preview_names_who_will_be_out_of_reach():
+    places = {1: at(1, 0), 2: at(2, 0), 3: at(3, 0)}
+    found = preview(mesh(places), {2: at(30, 0), 3: at(0, 30)})
+    assert found.out_of_reach == [2, 3]
+    assert found.in_words().startswith("2 drones would be out of reach: 2..3; ")
+
+
+def test_a_preview_names_the_drones_whose_places_are_taken():
+    places = {1: at(1, 0), 2: at(4, 0)}
+    assert preview(mesh(places), {1: at(4.5, 0)}).stays == {1: "drone 2 is in the way"}
+
+
+@pytest.mark.parametrize(("before", "case"), [*itertools.permutations((0, 100, 101, 202), 2)])
+def test_between_layouts_the_mesh_of_17_holds(before, case):
+    state = fleet(17)
+    for drone, goal in LAYOUTS.orders(before):
+        if drone <= 17:
+            state.nodes[drone].position = goal.to_vector()
+    found = preview(state, dict(LAYOUTS.orders(case)))
+    assert found.stays == {}
+    assert found.least_connected >= 0.75  # one cut on the way from 100 to 0
+
+
+@pytest.mark.slow
+def test_254_drones_keep_80_percent_of_the_mesh_on_their_way_to_the_grid():
+    state = fleet(253, spacing=1.1)  # so that nobody stands at a place of the grid
+    goals = dict(LAYOUTS.orders(100))
+    assert preview(state, goals, at_once=True).least_connected < 0.3
+    found = preview(state, goals)
+    assert found.least_connected >= 0.8
+
+
+def test_dynamic_drones_keep_the_room_that_they_sway():
+    paths = [FlightPath((0, y, 0), (10, y, 0), 0.0) for y in (0.0, 1.2)]
+    assert nearest_m(ways_of(paths[0]), ways_of(paths[1])).min() == pytest.approx(1.2)
+    places = {1: at(3, 3), 2: at(-3, 4.2)}
+    goals = {1: at(-3, 3), 2: at(3, 4.2)}
+    assert len(choose(mesh(places), goals).set_out) == 1  # 20 % of two: one at a time
+    wide = Departures(mesh(places), goals, {1: goals[1]}, FlightRules(sway_m=0.5))
+    assert wide.choose([2]).set_out == {}
