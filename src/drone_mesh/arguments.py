@@ -1,4 +1,7 @@
-"""Types for argparse: numbers within bounds, whose errors name the bounds."""
+"""Numbers that users write: on command lines, in parameters, in addresses.
+
+int() and float() also take `1_0`, digits of other scripts, white space and `nan`.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,27 @@ import argparse
 import re
 from typing import Callable
 
-_WHOLE = re.compile(r"-?[0-9]{1,18}", re.ASCII)  # not int(): that takes 1_0 as well
+MOST = 10**9  # our choice: for numbers without a bound of their own
+
+_WHOLE = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 _DECIMAL = re.compile(r"-?([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?", re.ASCII | re.IGNORECASE)
 
 
+def is_whole(text: str) -> bool:
+    """Whether the text is a whole number in decimal digits."""
+    return _WHOLE.fullmatch(text) is not None
+
+
+def is_decimal(text: str) -> bool:
+    """Whether the text is a number in decimal digits, also with an exponent."""
+    return _DECIMAL.fullmatch(text) is not None
+
+
 def whole(lowest: int, highest: int) -> Callable[[str], int]:
-    """A whole number within these bounds."""
+    """For argparse: a whole number within these bounds."""
 
     def number_of(text: str) -> int:
-        if not (_WHOLE.fullmatch(text) and lowest <= int(text) <= highest):
+        if not (is_whole(text) and lowest <= int(text) <= highest):
             raise argparse.ArgumentTypeError(
                 f"invalid value {text!r}: must be a whole number {lowest}..{highest}"
             )
@@ -24,10 +39,10 @@ def whole(lowest: int, highest: int) -> Callable[[str], int]:
 
 
 def decimal(lowest: float, highest: float) -> Callable[[str], float]:
-    """A finite number within these bounds."""
+    """For argparse: a finite number within these bounds."""
 
     def number_of(text: str) -> float:
-        if not (_DECIMAL.fullmatch(text) and lowest <= float(text) <= highest):
+        if not (is_decimal(text) and lowest <= float(text) <= highest):
             raise argparse.ArgumentTypeError(
                 f"invalid value {text!r}: must be a number {lowest:g}..{highest:g}"
             )

@@ -127,6 +127,7 @@ def test_typed_numbers_send_a_drone(page):
         ("x", "5001", "x must be a number from -5000 to 5000"),
         ("z", "-5", "z must be a whole number from 0 to 500"),
         ("z", "1.5", "z must be a whole number from 0 to 500"),
+        ("x", "0x10", "x must be a number from -5000 to 5000"),
     ],
 )
 def test_a_goal_that_cannot_be_flown_to_is_refused_beside_the_field(page, axis, typed, why):

@@ -47,6 +47,11 @@ class UsersDataTest(unittest.TestCase):
         refused = call("/Nodes/3/send", SendData, GATEWAY, 7, True, payload + b"!", 0.0)
         self.assertFalse(refused.success)
         self.assertIn("too large: 1025 bytes", refused.message)
+        for wait in (-1.0, float("nan"), float("inf"), 301.0):
+            refused = call("/Nodes/3/send", SendData, GATEWAY, 7, True, b"x", wait)
+            self.assertFalse(refused.success)
+            self.assertRegex(refused.message, r"invalid wait .*: must be 0\.\.300 seconds")
+            self.assertEqual(refused.ticket, 0)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Sequence
 
+from drone_mesh.arguments import MOST, whole
 from drone_mesh.bench import cases, inprocess, overload, report, soak
 from drone_mesh.bench.cases import Case
 from drone_mesh.bench.measurement import RosResult, measure
@@ -18,6 +19,7 @@ from drone_mesh.bench.progress import ProgressLine
 from drone_mesh.bench.system import BenchmarkError, check_environment, free_port
 from drone_mesh.communication.seals.key_file import read_key_file
 from drone_mesh.errors import ConfigurationError, naming_argument
+from drone_mesh.web.listening import MAX_PORT
 
 WINDOW_S = 20.0  # two rounds of the default timing
 QUICK_WINDOW_S = 10.0
@@ -46,12 +48,6 @@ def _positive(text: str) -> float:
         if 0 < value < float("inf"):
             return value
     raise argparse.ArgumentTypeError(f"invalid value {text!r}: must be a number above 0")
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"invalid number {text}: must be whole, 0 or more")
-    return int(text)
 
 
 def _size(text: str) -> Case:
@@ -103,7 +99,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--busy",
         nargs="+",
-        type=_count,
+        type=whole(0, MOST),
         metavar="LOOPS",
         help="instead of the tables: run one size (default: "
         f"{_in_short(cases.OVERLOAD)}) for {overload.SIMULATED_S:g} simulated seconds beside each "
@@ -127,7 +123,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="also write all figures to this file"
     )
-    parser.add_argument("--port", type=int, help="port of the ROS master; default: a free port")
+    parser.add_argument(
+        "--port", type=whole(1, MAX_PORT), help="port of the ROS master; default: a free port"
+    )
     return parser
 
 

@@ -11,6 +11,7 @@ import time
 from functools import partial
 from typing import Mapping, Sequence
 
+from drone_mesh.arguments import whole
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
@@ -22,6 +23,7 @@ from drone_mesh.console.server import ConsoleServer
 from drone_mesh.errors import MeshError
 from drone_mesh.stopping import StopRequest
 from drone_mesh.web import LOOPBACK
+from drone_mesh.web.listening import MAX_PORT
 
 ASK_PERIOD_S = 1.0  # our choice
 GATEWAY_TOKEN = "DRONE_MESH_TOKEN"  # as of the gateway
@@ -90,7 +92,7 @@ def main(
     )
     parser.add_argument(
         "--port",
-        type=int,
+        type=whole(0, MAX_PORT),
         default=DEFAULT_PORT,
         help="TCP port (default: %(default)s; 0: any free one)",
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
+from drone_mesh.arguments import MOST, whole
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.inprocess.chip_air import ChipAir
 from drone_mesh.inprocess.network import Network
@@ -33,7 +34,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--nodes",
-        type=int,
+        type=whole(0, MOST),
         default=17,
         help=f"number of nodes, 2..{MAX_DRONES} (default %(default)s)",
     )
@@ -53,7 +54,10 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         "--seconds", type=float, default=60.0, help="simulated seconds (default %(default)g)"
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="seed of all random choices (default %(default)s)"
+        "--seed",
+        type=whole(0, MOST),
+        default=1,
+        help="seed of all random choices (default %(default)s)",
     )
     parser.add_argument(
         "--links",

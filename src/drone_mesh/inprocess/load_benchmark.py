@@ -13,6 +13,7 @@ import sys
 from collections import Counter
 from typing import NamedTuple, Sequence
 
+from drone_mesh.arguments import MOST, whole
 from drone_mesh.errors import QueueFull
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.shared_air import SharedAir
@@ -122,10 +123,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="drone_mesh.inprocess.load_benchmark",
         description="Offers a rising load of users' messages to a mesh that loses a relay.",
     )
-    parser.add_argument("--nodes", type=int, nargs="+", default=[26, 50])
+    parser.add_argument("--nodes", type=whole(0, MOST), nargs="+", default=[26, 50])
     parser.add_argument("--offered", type=float, nargs="+", default=[0, 5, 10, 20, 40])
     parser.add_argument("--seconds", type=float, default=90.0, help="measured; %(default)s")
-    parser.add_argument("--seed", type=int, default=1, help="of all choices; %(default)s")
+    parser.add_argument(
+        "--seed", type=whole(0, MOST), default=1, help="of all choices; %(default)s"
+    )
     parser.add_argument("--rate", choices=DATA_RATES, default="250k")
     parsed = parser.parse_args(arguments)
     print("| nodes | offered/s | taken/s | delivered/s | connected | frames/s | fairness |")

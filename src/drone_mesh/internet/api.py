@@ -23,6 +23,7 @@ from drone_mesh.drone.location import Location
 from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.internet.data import add_data_requests
 from drone_mesh.internet.guarded_app import REFUSALS, Refusal, Responses, guarded_app
+from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
 from drone_mesh.internet.orders import add_order_requests
 from drone_mesh.internet.status import ReadStatus, add_status_request
 from drone_mesh.users.desk import UsersDesk
@@ -35,10 +36,13 @@ ORDER_LOG_PERIOD_S = 10.0  # our choice: between two lines about one drone
 
 _log = logging.getLogger(__name__)
 
-DroneId = Annotated[int, Path(ge=0, le=MAX_NODE_ID, description="Node id of the drone.")]
+DroneId = Annotated[
+    int, Path(ge=0, le=MAX_NODE_ID, description="Node id of the drone."), WholeDigits
+]
 Coordinate = Annotated[
     float,
     Path(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False, description="Metres."),
+    DecimalDigits,
 ]
 SharedPlace = Annotated[
     bool, Query(description="Also to a place where another drone is, flies to or was last heard.")
@@ -46,6 +50,7 @@ SharedPlace = Annotated[
 Height = Annotated[
     int,
     Path(ge=0, le=int(MAX_HEIGHT_M), description="Height of the drone's underside, whole metres."),
+    WholeDigits,
 ]
 
 
@@ -267,7 +272,9 @@ def make_api(
 
         @app.get("/mesh", dependencies=guards, responses=order_refusals)
         async def whole_mesh(
-            after: Annotated[int, Query(ge=0, description="Events with higher numbers.")] = 0,
+            after: Annotated[
+                int, Query(ge=0, description="Events with higher numbers."), WholeDigits
+            ] = 0,
         ) -> Dict[str, Any]:
             """All nodes as they reported themselves, and their events: for the web console."""
             return await desk.ask(lambda _gateway, _now_s: read_mesh(after))

@@ -22,6 +22,7 @@ from drone_mesh.communication.data.ticket import TO_ALL, TicketState
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.errors import MessageRefused, QueueFull
 from drone_mesh.internet.guarded_app import Responses
+from drone_mesh.internet.numbers import DecimalDigits, WholeDigits
 from drone_mesh.users.desk import HANDOVER_S, Sending, UsersDesk
 
 LONGEST_WAIT_S = 60.0  # our choice
@@ -30,9 +31,11 @@ MOST_UNREAD = 256  # messages waiting for a slow client; with more, its connecti
 _POLL_S = 0.02
 
 Destination = Annotated[
-    int, Path(ge=0, le=TO_ALL, description=f"Node id; {TO_ALL}: all nodes, best effort.")
+    int,
+    Path(ge=0, le=TO_ALL, description=f"Node id; {TO_ALL}: all nodes, best effort."),
+    WholeDigits,
 ]
-Port = Annotated[int, Query(ge=0, le=MAX_DATA_PORT)]
+Port = Annotated[int, Query(ge=0, le=MAX_DATA_PORT), WholeDigits]
 
 
 class DataSent(BaseModel):
@@ -65,7 +68,9 @@ def add_data_requests(
         port: Port = 0,
         reliable: bool = True,
         wait: Annotated[
-            float, Query(ge=0, le=LONGEST_WAIT_S, description="Seconds to wait for the delivery.")
+            float,
+            Query(ge=0, le=LONGEST_WAIT_S, description="Seconds to wait for the delivery."),
+            DecimalDigits,
         ] = 0.0,
     ) -> DataSent:
         """Send the body, up to 1024 bytes, to a node. 504: it did not arrive within `wait`."""
@@ -93,6 +98,7 @@ def add_data_requests(
         port: Annotated[
             Optional[int],
             Query(ge=0, le=MAX_DATA_PORT, description="Only messages for this port."),
+            WholeDigits,
         ] = None,
     ) -> Response:
         """The messages that the gateway receives from now on, as server-sent events.

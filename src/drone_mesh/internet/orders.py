@@ -17,9 +17,12 @@ from drone_mesh.communication.order_record import OrderRecord, OrderState
 from drone_mesh.communication.orders.book import HIGHEST_NUMBER
 from drone_mesh.internet.asking import GatewayDesk
 from drone_mesh.internet.guarded_app import Responses
+from drone_mesh.internet.numbers import WholeDigits
 
 OrderNumber = Annotated[
-    int, Path(ge=1, le=HIGHEST_NUMBER, description="As in the Location header of the order.")
+    int,
+    Path(ge=1, le=HIGHEST_NUMBER, description="As in the Location header of the order."),
+    WholeDigits,
 ]
 
 

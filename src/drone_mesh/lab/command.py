@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Callable, Sequence
 
+from drone_mesh.arguments import MOST, whole
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.campaign import Campaign
 from drone_mesh.lab.estimate import Estimate, estimate
@@ -23,6 +24,7 @@ from drone_mesh.lab.proofs.fuzz import NODES, crowd, fuzz
 from drone_mesh.lab.status import describe_folder
 from drone_mesh.lab.template import write_template
 from drone_mesh.stopping import quiet_on_closed_pipe
+from drone_mesh.web.listening import MAX_PORT
 
 PROGRAM = "lab"
 CELLS_SHOWN = 30  # by `lab plan`
@@ -129,7 +131,10 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     how.add_argument("--console", action="store_true", help="show it in the web console")
     how.add_argument("--rviz", action="store_true", help="play it in rviz (needs ROS, a screen)")
     show.add_argument(
-        "--port", type=int, default=9081, help="port for --console (default %(default)s)"
+        "--port",
+        type=whole(0, MAX_PORT),
+        default=9081,
+        help="port for --console (default %(default)s)",
     )
     show.set_defaults(run=_show)
 
@@ -152,7 +157,11 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         "attacks", nargs="*", metavar="ATTACK", help=f"any of: {', '.join(ATTACKS)} (default: all)"
     )
     attack.add_argument(
-        "--runs", type=_count, default=12, metavar="N", help="number of seeds (default %(default)s)"
+        "--runs",
+        type=whole(0, MOST),
+        default=12,
+        metavar="N",
+        help="number of seeds (default %(default)s)",
     )
     attack.set_defaults(run=_attack)
 
@@ -161,12 +170,14 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     )
     fuzzing.add_argument(
         "--packets",
-        type=_count,
+        type=whole(0, MOST),
         default=1_000_000,
         metavar="N",
         help="number of packets (default: %(default)s)",
     )
-    fuzzing.add_argument("--seed", type=int, default=1, help="random seed (default: %(default)s)")
+    fuzzing.add_argument(
+        "--seed", type=whole(0, MOST), default=1, help="random seed (default: %(default)s)"
+    )
     fuzzing.set_defaults(run=_fuzz)
 
     metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
@@ -182,16 +193,10 @@ def _add_experiment(parser: argparse.ArgumentParser) -> None:
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--workers", type=_count, default=len(os.sched_getaffinity(0)), metavar="N",
+        "--workers", type=whole(0, MOST), default=len(os.sched_getaffinity(0)), metavar="N",
         help="number of processes; 0: run in this process, for a debugger (default: one per core, "
         "%(default)s)",
     )  # fmt: skip
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"invalid number {text!r}: must be whole, 0 or more")
-    return int(text)
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import sys
 from pathlib import Path
 from typing import Callable
 
+from drone_mesh.arguments import MOST, decimal, whole
 from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYTES
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
@@ -18,6 +18,13 @@ from drone_mesh.users.socket_path import node_of, served_sockets, socket_folder,
 
 NODE_VARIABLE = "DRONE_MESH_NODE"
 MOST_SECONDS = 86400.0  # our choice: a day
+
+node_id = whole(0, MAX_NODE_ID)
+port = whole(0, MAX_DATA_PORT)
+count = whole(1, MOST)
+size = whole(1, MAX_MESSAGE_BYTES)
+seconds = decimal(0.0, MOST_SECONDS)
+
 _DESTINATIONS = {"all": TO_ALL, "gateway": TO_GATEWAY}
 
 
@@ -52,13 +59,6 @@ def add_echo_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def node_id(text: str) -> int:
-    """A node id, for argparse."""
-    if not text.isdigit() or int(text) > MAX_NODE_ID:
-        raise argparse.ArgumentTypeError(f"invalid node {text!r}: must be 0..{MAX_NODE_ID}")
-    return int(text)
-
-
 def destination(text: str) -> int:
     """A node id, "all" or "gateway", for argparse."""
     if text in _DESTINATIONS:
@@ -67,40 +67,6 @@ def destination(text: str) -> int:
         return node_id(text)
     except argparse.ArgumentTypeError as error:
         raise argparse.ArgumentTypeError(f"{error}, gateway or all") from None
-
-
-def port(text: str) -> int:
-    """A port, for argparse."""
-    if not text.isdigit() or int(text) > MAX_DATA_PORT:
-        raise argparse.ArgumentTypeError(f"invalid port {text!r}: must be 0..{MAX_DATA_PORT}")
-    return int(text)
-
-
-def count(text: str) -> int:
-    """A number of times, at least 1, for argparse."""
-    if not text.isdigit() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"invalid number {text!r}: must be 1 or more")
-    return int(text)
-
-
-def size(text: str) -> int:
-    """The size of a message in bytes, for argparse."""
-    if not text.isdigit() or not 1 <= int(text) <= MAX_MESSAGE_BYTES:
-        raise argparse.ArgumentTypeError(
-            f"invalid size {text!r}: must be 1..{MAX_MESSAGE_BYTES} bytes"
-        )
-    return int(text)
-
-
-def seconds(text: str) -> float:
-    """A time in seconds, for argparse."""
-    try:
-        time_s = float(text)
-    except ValueError:
-        time_s = math.nan
-    if not 0.0 <= time_s <= MOST_SECONDS:
-        raise argparse.ArgumentTypeError(f"invalid time {text!r}: must be 0..{MOST_SECONDS:g} s")
-    return time_s
 
 
 def client(parsed: argparse.Namespace) -> LocalClient:

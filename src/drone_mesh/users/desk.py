@@ -12,6 +12,7 @@ from drone_mesh.communication.data.transport import ReceivedMessage, Receiver, T
 from drone_mesh.errors import MessageRefused
 
 HANDOVER_S = 5.0  # our choice: a node accepts a message within this time
+LONGEST_WAIT_S = 300.0  # our choice: a reliable message is given up before
 MOST_UNREAD = 256  # messages that may wait for a slow listener; the oldest is dropped
 
 Submit = Callable[[Callable[[float], None]], None]
@@ -19,6 +20,12 @@ Submit = Callable[[Callable[[float], None]], None]
 
 
 WhenOver = Callable[[Optional[Ticket], Optional[MessageRefused]], None]
+
+
+def check_wait(seconds: float) -> None:
+    """Raise MessageRefused unless a caller may wait for so long."""
+    if not 0.0 <= seconds <= LONGEST_WAIT_S:  # NaN neither
+        raise MessageRefused(f"invalid wait {seconds:g}: must be 0..{LONGEST_WAIT_S:g} seconds")
 
 
 class Sending:

@@ -153,23 +153,28 @@ def test_a_message_far_too_large_is_named_as_that(rig, capsys):
 def test_an_invalid_receiver_is_named_with_all_valid_ones(capsys):
     with pytest.raises(SystemExit):
         send_command.main(["banana", "21.5"])
-    assert "invalid node 'banana': must be 0..253, gateway or all" in capsys.readouterr().err
+    assert (
+        "invalid value 'banana': must be a whole number 0..253, gateway or all"
+        in capsys.readouterr().err
+    )
 
 
 def test_an_invalid_node_in_the_environment_gives_one_line(monkeypatch, capsys):
     monkeypatch.setenv("DRONE_MESH_NODE", "five")
     assert trace_command.main(["3"]) == 1
     assert capsys.readouterr().err == (
-        "mesh_trace: DRONE_MESH_NODE: invalid node 'five': must be 0..253\n"
+        "mesh_trace: DRONE_MESH_NODE: invalid value 'five': must be a whole number 0..253\n"
     )
 
 
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["3", "-c", "-1"], "invalid number '-1': must be 1 or more"),
-        (["3", "-i", "-1"], "invalid time '-1': must be 0..86400 s"),
-        (["3", "-W", "nan"], "invalid time 'nan': must be 0..86400 s"),
+        (["1_0"], "invalid value '1_0': must be a whole number 0..253"),
+        (["٣"], "invalid value '٣': must be a whole number 0..253"),
+        (["3", "-c", "0"], "invalid value '0': must be a whole number 1..1000000000"),
+        (["3", "-i", "1_0"], "invalid value '1_0': must be a number 0..86400"),
+        (["3", "-W", "nan"], "invalid value 'nan': must be a number 0..86400"),
     ],
 )
 def test_invalid_numbers_are_refused(capsys, arguments, reason):

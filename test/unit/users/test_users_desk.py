@@ -1,8 +1,10 @@
+import math
+
 import pytest
 from users_rig import UsersRig
 
 from drone_mesh.errors import MessageRefused
-from drone_mesh.users.desk import MOST_UNREAD, UsersDesk
+from drone_mesh.users.desk import MOST_UNREAD, UsersDesk, check_wait
 
 
 @pytest.fixture
@@ -59,3 +61,14 @@ def test_an_echo_without_an_answer_names_the_neighbour_with_another_key(rig):
         rig.desks[0].echo(2, 0.01)
     with pytest.raises(MessageRefused, match=f"^no route to node 77; {reason}$"):
         rig.desks[0].echo(77, 0.01)
+
+
+@pytest.mark.parametrize("seconds", [-1.0, math.nan, math.inf, 301.0])
+def test_nobody_waits_for_a_time_that_is_none(seconds):
+    with pytest.raises(MessageRefused, match=r"invalid wait .*: must be 0\.\.300 seconds"):
+        check_wait(seconds)
+
+
+@pytest.mark.parametrize("seconds", [0.0, 20.0, 300.0])
+def test_any_other_wait_is_taken(seconds):
+    check_wait(seconds)

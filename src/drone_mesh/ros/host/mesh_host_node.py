@@ -10,6 +10,7 @@ from typing import Callable
 import rospy
 
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.arguments import is_whole
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.errors import ConfigurationError
@@ -45,11 +46,10 @@ def _wait_for(what: str, is_there: Callable[[], bool], give_up: Callable[[], boo
 
 
 def _whole_parameter(name: str) -> int:
-    value = rospy.get_param(f"~{name}", "")
-    try:
-        return int(value)
-    except ValueError:
-        raise ConfigurationError(f"invalid {name} {value!r}: must be a whole number") from None
+    value = str(rospy.get_param(f"~{name}", ""))
+    if not is_whole(value):
+        raise ConfigurationError(f"invalid {name} {value!r}: must be a whole number")
+    return int(value)
 
 
 def _obstacles_of(fleet: FactoryConfiguration) -> Obstacles | None:

@@ -10,7 +10,7 @@ from drone_mesh.msg import ReceivedData
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import ros_time
 from drone_mesh.srv import SendData, SendDataRequest, SendDataResponse
-from drone_mesh.users.desk import UsersDesk
+from drone_mesh.users.desk import UsersDesk, check_wait
 
 _QUEUE = 64  # messages that may wait for a slow subscriber
 
@@ -60,8 +60,9 @@ class UsersOfNode:
         self._publisher.publish(data)
 
     def _send(self, request: SendDataRequest) -> SendDataResponse:
-        sending = self._desk.send(request.to, request.payload, request.port, request.reliable)
         try:
+            check_wait(request.wait)
+            sending = self._desk.send(request.to, request.payload, request.port, request.reliable)
             ticket = sending.ticket()
         except MessageRefused as error:
             return SendDataResponse(success=False, message=str(error))

@@ -11,6 +11,7 @@ from pathlib import Path
 import rosgraph
 import rospy
 
+from drone_mesh.arguments import is_whole
 from drone_mesh.console import DEFAULT_PORT
 from drone_mesh.console.controls import MeshControls, RecordingControls
 from drone_mesh.console.dots import make_dots
@@ -34,6 +35,7 @@ from drone_mesh.ros.views.state_source import OLD_STATE_S
 from drone_mesh.secret_file import read_secret
 from drone_mesh.stopping import StopRequest
 from drone_mesh.web import LOOPBACK
+from drone_mesh.web.listening import MAX_PORT
 
 CHECK_PERIOD_S = 1.0  # wall time between two checks of the master
 REPAIR_DEMO = "repair"
@@ -204,10 +206,6 @@ def _token(address: str) -> PageToken:
 
 
 def _port(value: object) -> int:
-    try:
-        port = int(str(value))
-    except ValueError:
-        port = -1
-    if not 0 <= port <= 65535:
-        raise ConfigurationError(f"invalid port {value!r}: must be a whole number 0..65535")
-    return port
+    if not (is_whole(str(value)) and 0 <= int(str(value)) <= MAX_PORT):
+        raise ConfigurationError(f"invalid port {value!r}: must be a whole number 0..{MAX_PORT}")
+    return int(str(value))

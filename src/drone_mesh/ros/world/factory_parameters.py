@@ -8,6 +8,7 @@ from typing import Mapping
 import rospy
 
 from drone_mesh.air.obstacles import Obstacles
+from drone_mesh.arguments import is_whole
 from drone_mesh.configuration import FactoryConfiguration
 from drone_mesh.drone.fleet import plan_fleet
 from drone_mesh.drone.goal import MAX_HEIGHT_M
@@ -64,7 +65,7 @@ class FactoryParameters:
         # With a bad layout file the manager would be restarted for ever; this ends the launch.
         manager_layouts()
         hosts = str(rospy.get_param("~hosts", "") or 1)
-        if not hosts.isdigit():
+        if not (is_whole(hosts) and int(hosts) >= 0):
             raise ConfigurationError(
                 f"argument: invalid hosts {hosts!r}: expected a whole number, 0 or more"
             )
