@@ -16,6 +16,7 @@ from drone_mesh.channel.trains import place_in_train
 from drone_mesh.communication.interfaces import (
     BROADCAST,
     MAX_NODE_ID,
+    NO_ROUTE,
     PAYLOAD_BYTES,
     IMeshDebugInfo,
     IMeshNetwork,
@@ -58,8 +59,10 @@ class PacketAntenna(IWirelessCommunication):
         *,
         runtime: Runtime | None = None,
         on_payload: Callable[[bytes], None] | None = None,
+        debug_period_s: float = DEBUG_PERIOD_S,
     ) -> None:
         """`on_payload` is called with each payload as the mesh gets it, in the receiving thread."""
+        self._debug_period_s = debug_period_s
         self._radio = radio
         self._submit = submit
         self._inbox = PacketInbox(submit)
@@ -161,7 +164,7 @@ class PacketAntenna(IWirelessCommunication):
         return self._sender.data_room()
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
-        """Log one line about the node and the channel every DEBUG_PERIOD_S, or stop doing so."""
+        """Log one line about the node and the channel every `debug_period_s`, or stop."""
         self._info = info if on else None
 
     def on(self) -> bool:
@@ -190,14 +193,18 @@ class PacketAntenna(IWirelessCommunication):
 
     def _show(self, info: IMeshDebugInfo) -> None:
         use = self.channel_use()
+        place_of = info.get_last_good_known_location_id()
         logger.info(
-            "node %d: %s, gateway %d, %d hops, %d nodes known; airtime %.1f %%, %.2f tries per "
-            "packet, %d waiting, %d given up",
+            "node %d: %s, %s, gateway %d, %d hops, %d nodes known, %d messages sent, steps back to "
+            "%s; airtime %.1f %%, %.2f tries per packet, %d waiting, %d given up",
             info.get_node_id(),
+            "on" if self.powered else "off",
             "connected" if info.get_connected_to_gateway() else "not connected",
             info.get_preferred_gateway(),
             info.get_hops_from_gateway_away(),
             info.get_router_tech_table_size(),
+            info.get_total_message_sent(),
+            "none" if place_of == NO_ROUTE else f"node {place_of}",
             100 * use.airtime,
             use.tries,
             use.waiting,
@@ -205,11 +212,11 @@ class PacketAntenna(IWirelessCommunication):
         )
 
     def _receive(self) -> None:
-        show_s = self._runtime.now_s() + DEBUG_PERIOD_S
+        show_s = self._runtime.now_s() + self._debug_period_s
         while not self._ending:
             info = self._info
             if info is not None and self._runtime.now_s() >= show_s:
-                show_s += DEBUG_PERIOD_S
+                show_s += self._debug_period_s
                 self._show(info)
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):
                 self._hand_on(received)

@@ -57,7 +57,9 @@ class RadioNode:
         self.engine = engine
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
         self._slot = self._executor.slot()
-        self._antenna = NRF24HighLevelInterface(radio, self._slot.submit)
+        self._antenna = NRF24HighLevelInterface(
+            radio, self._slot.submit, debug_period_s=options.debug_period_s
+        )
         self._origin = options.flight.origin
         self.events = EventHistory() if events is None else events
         self._changes: NodeChanges | None = None
@@ -93,6 +95,7 @@ class RadioNode:
             repair_options=options.repair_options,
             timing=options.timing,
             observer=self.events.observe,
+            debug=options.debug_period_s > 0.0,
         )
         self.users.open(self.component.data)
         self._started = False

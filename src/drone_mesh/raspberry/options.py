@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Mapping, Sequence
 
-from drone_mesh.arguments import whole
+from drone_mesh.arguments import decimal, whole
+from drone_mesh.channel.antenna import DEBUG_PERIOD_S
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.communication.named_techniques import (
     ROUTING_TECHNIQUES,
@@ -84,6 +85,7 @@ class Options:
     http: HttpSettings | None  # None: a router without --http
     keys: MeshKey | NodeKeys | None = None  # None: packets are not sealed
     mqtt: MqttOptions | None = None
+    debug_period_s: float = DEBUG_PERIOD_S  # 0: no such lines
 
 
 def parse_router(
@@ -262,6 +264,14 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         "(pcapng, for Wireshark)",
     )
     parser.add_argument(
+        "--debug",
+        type=decimal(0.0, 3600.0),
+        default=DEBUG_PERIOD_S,
+        metavar="SECONDS",
+        help="period of the log line with what a simulated node publishes as NodeDebugInfo, and "
+        "the use of the channel; 0 for none (default: %(default)g)",
+    )
+    parser.add_argument(
         "--log-level",
         choices=LOG_LEVELS,
         default="info",
@@ -331,6 +341,7 @@ def _options(
             air=air_options(parsed),
             emulated=parsed.emulated,
             trace=parsed.trace,
+            debug_period_s=parsed.debug,
             log_level=parsed.log_level,
             gateway=parsed.gateway,
             http=http_options(parsed, environment) if parsed.http else None,

@@ -226,8 +226,8 @@ def test_debugging_mode_logs_a_line_per_period_until_it_is_switched_off(lab, nod
     assert (
         lines
         == [
-            "node 1: connected, gateway 0, 3 hops, 42 nodes known; airtime 0.0 %, 1.00 tries per "
-            "packet, 0 waiting, 0 given up"
+            "node 1: on, connected, gateway 0, 3 hops, 42 nodes known, 17 messages sent, steps "
+            "back to none; airtime 0.0 %, 1.00 tries per packet, 0 waiting, 0 given up"
         ]
         * 2
     )

@@ -114,7 +114,7 @@ def test_each_option_reaches_what_it_is_for():
         "--power -12 --broadcast shockburst "
         "--check-period 5 --connection-lost-after 60 --report-period 45 "
         "--latitude 10 --longitude -20.5 "
-        "--height 3 --log-level debug --repair home --clearance 3 --range 40 "
+        "--height 3 --debug 2.5 --log-level debug --repair home --clearance 3 --range 40 "
         "--routing drone_mesh.communication.routing.child_table_tree:"
         "ChildTableTree "
         "--drone mavlink:/dev/serial0,921600 --origin 52.0907,5.1214,3 --max-height 40 "
@@ -146,6 +146,7 @@ def test_each_option_reaches_what_it_is_for():
         air=AirOptions(),
         emulated=0,
         trace=None,
+        debug_period_s=2.5,
         log_level="debug",
         gateway=False,
         http=None,
@@ -208,6 +209,7 @@ def test_emulated_nodes_need_no_id():
         ("--emulated 3 --ground-station 127.0.0.1:14550", "needs --drones mavlink"),
         ("--id 3 --trace air.pcapng", "--trace needs --emulated"),
         ("--emulated 1", "invalid value '1': must be a whole number 2..17"),
+        ("--id 3 --debug -1", "must be a number 0..3600"),
         ("--id 3 --log-level loud", "invalid choice: 'loud'"),
         ("--id 3 --port 9081", "--port needs --http"),
     ],
