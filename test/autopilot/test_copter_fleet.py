@@ -11,14 +11,14 @@ import itertools
 import json
 import math
 import os
+import shutil
 import socket
 import subprocess
 import sys
-import threading
 import time
 import urllib.request
 from pathlib import Path
-from typing import Any, Callable, Iterator
+from typing import Any, Callable, Iterator, Mapping
 
 import pytest
 from copter_rig import ORIGIN
@@ -31,6 +31,7 @@ from drone_mesh.raspberry.pilot_side import PilotSide
 pytestmark = pytest.mark.timeout(1800)  # flights last
 
 RUNS = int(os.environ.get("AUTOPILOT_RUNS", "1"))
+PICTURE = os.environ.get("AUTOPILOT_PICTURE")  # file for one of the console
 NEAREST_M = 5.0
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 HEARD_S = 12.0  # two check periods
@@ -76,7 +77,6 @@ class Fleet:
         self.pilots: dict[int, PilotSide] = {}
         self.routers: dict[int, subprocess.Popen[bytes]] = {}
         self._log = (folder / "positions.csv").open("w")
-        self._lock = threading.Lock()
         for node, home in HOMES.items():
             own = folder / f"copter{node}"
             own.mkdir()
@@ -90,15 +90,15 @@ class Fleet:
             self.pilots[node] = PilotSide(copter.pilot_address, copter.system_id)
         for pilot in self.pilots.values():
             pilot.make_ready()
-        self._start("gateway", "raspberry_gateway", "--emulated-air-serve", str(self._air),
-                    "--port", str(self._http), *NODE_OPTIONS)  # fmt: skip
+        serving = ("--emulated-air-serve", str(self._air), "--port", str(self._http))
+        self._start("gateway", "raspberry.gateway", *serving, *NODE_OPTIONS)
         self.until("the gateway answers", lambda: bool(self.ask("ready")))
         for node in HOMES:
             self.start_router(node)
 
     def start_router(self, node: int) -> None:
         self.routers[node] = self._start(
-            *(f"router{node}", "raspberry_router", "--id", str(node)),
+            *(f"router{node}", "raspberry.router", "--id", str(node)),
             *("--emulated-air", str(self._air), "--drone", f"mavlink:{self.copters[node].address}"),
             *("--may-arm", "--may-take-off", "--may-change-mode", "--speed", "5"),
             *("--cruise-height", "12", "--layers", "6", *NODE_OPTIONS),
@@ -121,6 +121,21 @@ class Fleet:
     def order(self, node: int, goal: Location) -> None:
         path = f"DroneMovement/{node}/{goal.latitude:g}/{goal.longitude:g}/{goal.height:g}"
         self.until(f"order for {node} is sent", lambda: self.ask(path, b"") is not None)
+
+    def fly_layout(self, layout: Mapping[int, Location]) -> None:
+        """Order it, and again what was given up, as its operator would; each time is printed."""
+        for node, goal in layout.items():
+            self.order(node, goal)
+
+        def is_flown() -> bool:
+            latest = {o["drone"]: o for o in (self.ask("orders") or {"orders": []})["orders"]}
+            for node, order in latest.items():
+                if order["state"] in ("given up", "refused", "no route"):
+                    print(f"{node} again: {order['state']}, {order['reason']}", flush=True)
+                    self.order(node, layout[node])
+            return all(self.is_at(node, goal) for node, goal in layout.items())
+
+        self.until("the layout is flown", is_flown, 300.0)
 
     def reachable(self) -> set[int]:
         """The nodes that the gateway heard within two check periods."""
@@ -166,6 +181,12 @@ class Fleet:
         while time.monotonic() < end_s:
             self.watch()
 
+    def is_at_rest(self) -> bool:
+        """Whether nobody moves within ten seconds, but for the one on a mission."""
+        before = dict(self.places)
+        self.watch_for(10.0)
+        return all(self.is_at(node, before[node], 0.5) for node in HOMES if node != ON_MISSION)
+
     def is_at(self, node: int, goal: Location, within_m: float = 2.5) -> bool:
         return self.places[node].distance_m(goal) < within_m
 
@@ -177,9 +198,28 @@ class Fleet:
         self._stack.close()
         self._log.close()
 
-    def _start(self, name: str, program: str, *options: str) -> subprocess.Popen[bytes]:
-        module = program.replace("raspberry_", "drone_mesh.raspberry.")
-        code = f"import sys; from {module} import main; sys.exit(main())"
+    def photograph(self, path: Path) -> None:
+        """The console's page of this mesh, as PNG; needs chromium."""
+        from playwright.sync_api import sync_playwright
+
+        port = free_port()
+        gateway = f"http://127.0.0.1:{self._http}"
+        self._start(
+            *("console", "console.gateway_command", "--gateway", gateway, "--port", str(port))
+        )
+        self.watch_for(5.0)
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"), args=["--headless", "--no-sandbox"]
+            )
+            page = browser.new_page(viewport={"width": 1400, "height": 900})
+            page.goto(f"http://127.0.0.1:{port}/")
+            self.watch_for(8.0)
+            page.screenshot(path=path)
+            browser.close()
+
+    def _start(self, name: str, module: str, *options: str) -> subprocess.Popen[bytes]:
+        code = f"import sys; from drone_mesh.{module} import main; sys.exit(main())"
         with (self._folder / f"{name}.log").open("ab") as log:
             process = subprocess.Popen(
                 [sys.executable, "-c", code, *options],
@@ -212,18 +252,14 @@ def test_six_copters_keep_the_mesh_together_and_apart_from_each_other(
     fleet.until("all are connected", lambda: fleet.reachable() >= everybody)
     say("all six routers are connected")
 
-    for node, goal in LAYOUT.items():
-        fleet.order(node, goal)
-    fleet.until(
-        "the layout is flown",
-        lambda: all(fleet.is_at(node, goal) for node, goal in LAYOUT.items()),
-        300.0,
-    )
+    fleet.fly_layout(LAYOUT)
     fleet.until("all are connected", lambda: fleet.reachable() >= everybody)
     say("the layout is flown, everybody is connected")
     fleet.until("the gateway knows the places", lambda: fleet.gateway_error_m() < 3.0)
     say(f"gateway and ground stations agree on all places within {fleet.gateway_error_m():.1f} m")
 
+    if PICTURE:
+        fleet.photograph(Path(PICTURE))
     mission = [Location(-40.0, 60.0, 20.0), Location(-60.0, 30.0, 20.0), Location(-40.0, 5.0, 20.0)]
     pilot = fleet.pilots[ON_MISSION]
     pilot.upload([ORIGIN.to_earth(place) for place in mission])
@@ -240,7 +276,7 @@ def test_six_copters_keep_the_mesh_together_and_apart_from_each_other(
     say("the group has repaired the mesh")
     assert fleet.is_at(RELAY, LAYOUT[RELAY], 4.0)  # it hovers on
 
-    fleet.watch_for(20.0)
+    fleet.until("everybody has come to rest", fleet.is_at_rest)
     before = dict(fleet.places)
     fleet.start_router(RELAY)
     fleet.until("the relay is back", lambda: fleet.reachable() >= everybody)

@@ -1,4 +1,4 @@
-"""Recorded motion: the files of BonnMotion and of ns-2, and CSV."""
+"""Recorded motion: the files of BonnMotion and of ns-2, CSV, and the record of a gateway."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Dict, Iterable, Iterator, List, Tuple
 
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.mobility.gateway_record import FIRST_BYTE, answers, places
 from drone_mesh.mobility.settings import Knot
 
 Knots = Dict[int, List[Knot]]  # by drone, in order of time
@@ -28,7 +29,8 @@ def read_trace(path: Path) -> Knots:
 
     * CSV with the header t,id,x,y,z (seconds and metres);
     * ns-2 movement: `$node_(0) set X_ 1.0`, `$ns_ at 2.0 "$node_(0) setdest 3.0 4.0 1.5"`;
-    * BonnMotion: a line per drone, `t x y` again and again, or `t x y z`.
+    * BonnMotion: a line per drone, `t x y` again and again, or `t x y z`;
+    * the record of a gateway: straight lines between the places that its nodes reported.
 
     The k-th line of BonnMotion and node k of ns-2 are drone k. Raises ConfigurationError.
     """
@@ -45,6 +47,8 @@ def read_trace(path: Path) -> Knots:
             knots = _csv(lines)
         elif any(_START.match(line.strip()) for line in lines):
             knots = _ns2(lines)
+        elif lines and lines[0].startswith(FIRST_BYTE):
+            knots = _recorded(lines)
         else:
             knots = _bonnmotion(lines)
     except ValueError as error:
@@ -75,6 +79,16 @@ def _csv(lines: Iterable[str]) -> Knots:
         except ValueError as error:
             raise ValueError(f"line {number}: expected t,id,x,y,z as numbers") from error
     return {node: sorted(knots) for node, knots in sorted(found.items())}
+
+
+def _recorded(lines: Iterable[str]) -> Knots:
+    found: Knots = {}
+    for t, answer in answers(lines):
+        for node, place in places(answer):
+            knots = found.setdefault(node, [])
+            if not knots or knots[-1][1:] != place:
+                knots.append((t, *place))
+    return found
 
 
 def _bonnmotion(lines: Iterable[str]) -> Knots:

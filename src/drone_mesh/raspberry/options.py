@@ -86,6 +86,7 @@ class Options:
     keys: MeshKey | NodeKeys | None = None  # None: packets are not sealed
     mqtt: MqttOptions | None = None
     debug_period_s: float = DEBUG_PERIOD_S  # 0: no such lines
+    record: Path | None = None  # of a gateway
 
 
 def parse_router(
@@ -131,6 +132,13 @@ def parse_gateway(
     add_air_options(parser, gateway=True)
     add_http_options(parser.add_argument_group("HTTP"))
     add_mqtt_options(parser)
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="FILE",
+        help="append the state of all nodes and the events to this file once a second, for "
+        "'report', 'replay' and experiments",
+    )
     parser.set_defaults(gateway=True, http=True)
     return _options(parser, parser.parse_args(arguments), environment)
 
@@ -347,6 +355,7 @@ def _options(
             http=http_options(parsed, environment) if parsed.http else None,
             keys=_keys(parsed),
             mqtt=mqtt_options(parsed, environment) if parsed.gateway else None,
+            record=parsed.record if parsed.gateway else None,
         )
     except MeshError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")

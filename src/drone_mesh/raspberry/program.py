@@ -26,6 +26,7 @@ from drone_mesh.nrf24.spi import open_spi
 from drone_mesh.raspberry.emulated_air import EmulatedAir
 from drone_mesh.raspberry.emulated_fleet import EmulatedFleet
 from drone_mesh.raspberry.event_history import EventHistory
+from drone_mesh.raspberry.mesh_record import MeshRecord
 from drone_mesh.raspberry.node import MakeInternet, RadioNode
 from drone_mesh.raspberry.node_status import one_line
 from drone_mesh.raspberry.options import Hardware, Options
@@ -108,6 +109,10 @@ def _run(options: Options, request: StopRequest) -> None:
             server = _status_server(nodes[0], options.http)
             server.start()
             stack.callback(server.stop)
+        record: MeshRecord | None = None
+        if options.record is not None:
+            record = MeshRecord(options.record, nodes[0].submit, nodes[0].mesh)
+            stack.callback(record.close)
         for node in nodes:
             node.start()
         manager = ServiceManager()
@@ -115,6 +120,8 @@ def _run(options: Options, request: StopRequest) -> None:
         watch = _Watch(nodes, options, manager)
         while not request.wait(POLL_PERIOD_S):
             watch.check(time.monotonic())
+            if record is not None:
+                record.check(time.monotonic())
             for node in nodes:
                 node.check_others()
             move_radios()

@@ -1,15 +1,20 @@
-"""Reads states, events and packets of a mesh from a rosbag; writes states and events into one."""
+"""Reads states, events and packets of a mesh from a rosbag; writes states and events into one.
+
+The record of a gateway (`raspberry_gateway --record`) is read in the place of a bag.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Iterable, Iterator
+from typing import Any, Iterable, Iterator
 
 import rosbag
 import rospy
 
 from drone_mesh.console.dots import RecordedDots, make_dots
+from drone_mesh.console.real_mesh import events_of, real_mesh
 from drone_mesh.errors import MeshError
+from drone_mesh.mobility.gateway_record import FIRST_BYTE, answers
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import (
     event_msg,
@@ -30,6 +35,9 @@ class BagUnusable(MeshError):
 
 def read_states(path: Path) -> Iterator[MeshStatus]:
     """Every state in the bag, oldest first. Raises BagUnusable."""
+    if is_gateway_record(path):
+        yield from (real_mesh(answer)[0] for answer in _answers(path))
+        return
     with _open(path) as bag:
         for _topic, message, _time in bag.read_messages([_namespace(bag) + names.STATE_TOPIC]):
             yield mesh_status(message)
@@ -37,6 +45,10 @@ def read_states(path: Path) -> Iterator[MeshStatus]:
 
 def read_events(path: Path) -> Iterator[EventRecord]:
     """Every event in the bag, oldest first. Raises BagUnusable."""
+    if is_gateway_record(path):
+        for answer in _answers(path):
+            yield from events_of(answer)
+        return
     with _open(path) as bag:
         for _topic, message, _time in bag.read_messages([_namespace(bag) + names.EVENTS_TOPIC]):
             yield event_record(message)
@@ -44,10 +56,21 @@ def read_events(path: Path) -> Iterator[EventRecord]:
 
 def read_packets(path: Path) -> Iterator[RecordedDots]:
     """Every sample of packets in the bag, oldest first. Raises BagUnusable."""
+    if is_gateway_record(path):
+        return  # a gateway does not see the packets of others
     with _open(path) as bag:
         for _topic, message, time in bag.read_messages([_namespace(bag) + names.PACKETS_TOPIC]):
             dots = make_dots(message.senders, message.receivers, message.types, message.ages)
             yield RecordedDots.of(time.to_sec(), message.carried, dots)
+
+
+def is_gateway_record(path: Path) -> bool:
+    """Whether it is the record of a gateway; False for a file that cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(1) == FIRST_BYTE.encode()
+    except OSError:
+        return False
 
 
 def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRecord]) -> None:
@@ -62,6 +85,15 @@ def write_bag(path: Path, states: Iterable[MeshStatus], events: Iterable[EventRe
                 bag.write(f"/{names.EVENTS_TOPIC}", event_msg(event), ros_time(at_s))
     except OSError as error:
         raise BagUnusable(f"cannot write {path}: {error.strerror}") from error
+
+
+def playable(path: Path) -> Path:
+    """A bag that rosbag can play: itself, or one made of a gateway's record, beside it."""
+    if not is_gateway_record(path):
+        return path
+    bag = path.with_name(f"{path.name}.bag")
+    write_bag(bag, read_states(path), read_events(path))
+    return bag
 
 
 def topics_in_bag(path: Path) -> tuple[str, set[str]]:
@@ -85,6 +117,19 @@ def _namespace(bag: rosbag.Bag) -> str:
     topics = bag.get_type_and_topic_info().topics
     found = [topic[: -len(names.STATE_TOPIC)] for topic in topics if topic.endswith(end)]
     return found[0] if len(found) == 1 else rospy.get_namespace()
+
+
+def _answers(path: Path) -> Iterator[dict[str, Any]]:
+    """Each answer, its times from the begin of the record."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            for at_s, answer in answers(file):
+                later_s = at_s - answer["uptime_s"]
+                for event in answer["events"]:
+                    event["t"] += later_s
+                yield {**answer, "uptime_s": at_s}
+    except (KeyError, TypeError, ValueError) as error:
+        raise BagUnusable(f"{path}: {error}") from error
 
 
 def _open(path: Path) -> rosbag.Bag:

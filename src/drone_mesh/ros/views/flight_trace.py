@@ -23,7 +23,7 @@ def main() -> None:
         "start, metres), which mobility of kind trace replays.",
         epilog="Exit code: 0 written, 2 failed.",
     )
-    parser.add_argument("bag", type=Path, help="a recording of /mesh/state")
+    parser.add_argument("bag", type=Path, help="a recording of /mesh/state, or a gateway's record")
     parser.add_argument("trace", type=Path, help="the CSV file to write")
     options = parser.parse_args(rospy.myargv()[1:])
     run_tool("flight_trace", lambda: _run(options.bag, options.trace))

@@ -14,7 +14,7 @@ import rospy
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import require_master, run_tool
-from drone_mesh.ros.views.bag import topics_in_bag
+from drone_mesh.ros.views.bag import playable, topics_in_bag
 
 # Topics that rosbag must not publish, because running nodes do; --clock publishes the time.
 NOT_PLAYED = {"/rosout", "/rosout_agg"}
@@ -45,7 +45,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="The space bar pauses. Exit code: that of rosbag play; 2: unusable bag or no free "
         "master.",
     )
-    parser.add_argument("bag", type=Path, help="the bag of the recorded run")
+    parser.add_argument("bag", type=Path, help="the bag of the recorded run, or a gateway's record")
     parser.add_argument(
         "--rate", type=_rate, default=1.0, metavar="R", help="seconds of the bag per second (1)"
     )
@@ -72,7 +72,8 @@ def _number(text: str, lowest: float, highest: float, expected: str) -> float:
 
 
 def _run(options: argparse.Namespace) -> int:
-    recorded, topics = topics_in_bag(options.bag)
+    bag = playable(options.bag)
+    recorded, topics = topics_in_bag(bag)
     require_master()
     clock = rospy.resolve_name(names.CLOCK_TOPIC)
     publishers, _subscribers, _services = rosgraph.Master("/replay").getSystemState()
@@ -81,7 +82,7 @@ def _run(options: argparse.Namespace) -> int:
         raise AlreadyATime(others, clock)
     rospy.set_param(names.SIM_TIME_PARAM, True)
     command = ["rosrun", "rosbag", "play", "--clock", "--keep-alive"]
-    command += ["--rate", str(options.rate), "--start", str(options.start), str(options.bag)]
+    command += ["--rate", str(options.rate), "--start", str(options.start), str(bag)]
     command += ["--topics", *sorted(topics - NOT_PLAYED - {recorded + names.CLOCK_TOPIC})]
     # What was recorded in one namespace is played in that of this program.
     if recorded != rospy.get_namespace():

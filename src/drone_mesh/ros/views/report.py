@@ -34,7 +34,7 @@ def _parser() -> argparse.ArgumentParser:
         "per node, the map before and after. Needs no running simulation.",
         epilog="Exit code: 0 written, 2 failed.",
     )
-    parser.add_argument("bag", type=Path, help="the bag of the recorded run")
+    parser.add_argument("bag", type=Path, help="the bag of the recorded run, or a gateway's record")
     parser.add_argument(
         "-o",
         "--output",

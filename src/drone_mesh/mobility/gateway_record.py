@@ -1,0 +1,42 @@
+"""The record of a gateway (`raspberry_gateway --record`): its answers to GET /mesh, one a line."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Iterable, Iterator, Tuple
+
+Answer = Tuple[float, Any]
+"""Seconds since the record began, which rise on after a restart of the gateway; and the answer."""
+
+FIRST_BYTE = "{"  # of every line, and of no other file that is read in its place
+
+
+def answers(lines: Iterable[str]) -> Iterator[Answer]:
+    """Each answer, oldest first. Raises ValueError if there is none.
+
+    A line that was cut off, as by a power failure, is left out.
+    """
+    latest_s, start_s, found = 0.0, 0.0, False
+    for line in lines:
+        try:
+            answer = json.loads(line)
+            uptime_s = float(answer["uptime_s"])
+        except (ValueError, KeyError, TypeError):
+            continue
+        if start_s + uptime_s < latest_s:  # the gateway was started again
+            start_s = latest_s
+        latest_s, found = start_s + uptime_s, True
+        yield latest_s, answer
+    if not found:
+        raise ValueError("no line is an answer to GET /mesh")
+
+
+def places(answer: Any) -> Iterator[tuple[int, tuple[float, float, float]]]:
+    """Each node with a known place, as x, y, z in metres. Raises ValueError for other content."""
+    try:
+        for node in answer["nodes"]:
+            if node["place"] is not None:
+                latitude, longitude, height = (float(metres) for metres in node["place"])
+                yield int(node["id"]), (longitude, latitude, height)
+    except (KeyError, TypeError) as error:
+        raise ValueError("expected an answer to GET /mesh") from error
