@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
+from typing import Iterator
 
 import pytest
 
@@ -16,3 +19,16 @@ def program() -> tuple[Path, Path]:
     from drone_mesh.raspberry.arducopter import program_from_environment
 
     return program_from_environment()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def busy_loops() -> Iterator[None]:
+    """AUTOPILOT_BUSY_LOOPS programs beside the flights that take all the time they can get."""
+    loops = [
+        subprocess.Popen([sys.executable, "-c", "while True: pass"])
+        for _ in range(int(os.environ.get("AUTOPILOT_BUSY_LOOPS", "0")))
+    ]
+    yield
+    for loop in loops:
+        loop.kill()
+        loop.wait()

@@ -264,7 +264,7 @@ def test_six_copters_keep_the_mesh_together_and_apart_from_each_other(
     pilot = fleet.pilots[ON_MISSION]
     pilot.upload([ORIGIN.to_earth(place) for place in mission])
     pilot.choose("AUTO")
-    fleet.pilots[TAKEN].choose("LOITER")
+    fleet.pilots[TAKEN].choose("BRAKE")  # whose hovering needs no stick
     fleet.watch_for(5.0)
     where = fleet.places[TAKEN]
     fleet.kill_router(RELAY)
@@ -284,7 +284,7 @@ def test_six_copters_keep_the_mesh_together_and_apart_from_each_other(
     say("the relay's node is back")
     for node in everybody - {ON_MISSION}:
         assert fleet.is_at(node, before[node], 3.0), f"{node} moved: a duel for the place"
-    assert fleet.pilots[TAKEN].mode == "LOITER"
+    assert fleet.pilots[TAKEN].mode == "BRAKE"
     assert fleet.is_at(TAKEN, where, 5.0)
     assert fleet.pilots[ON_MISSION].mode in ("AUTO", "LOITER")
     assert fleet.nearest[0] >= NEAREST_M

@@ -72,6 +72,22 @@ def test_a_step_back_ends_in_hovering_even_at_a_place_on_the_ground(engine: Mavl
     assert engine.get_location().height == pytest.approx(15.0, abs=1.5)
 
 
+def test_a_step_back_to_where_it_hovers_moves_nothing(
+    engine: MavlinkEngine, server: VehicleServer
+) -> None:
+    engine.step_back_to(20.0, 0.0, 0.0)
+    wait_for("it hovers", lambda: not engine.is_flying())
+    goal = engine.status().goal
+    body = server.vehicles[0].body
+    body.speed_m_s = 0.0  # the wind lifts it, and it does not come back at once
+    body.place = body.place._replace(height=body.place.height + 0.6)
+    wait_for("it reports that", lambda: engine.get_location().height > goal.height + 0.5)
+    engine.step_back_to(20.0, 0.0, 0.0)
+    assert not engine.is_flying() or engine.status().goal == goal
+    wait_for("the engine has taken it", lambda: not engine.is_flying())
+    assert engine.status().goal == goal
+
+
 def test_a_goal_outside_the_limits_is_refused_at_once(engine: MavlinkEngine) -> None:
     with pytest.raises(GoalRefused, match="--max-distance"):
         engine.set_goal(600.0, 0.0, 5)

@@ -61,8 +61,10 @@ class MavlinkEngine(IDroneEngine):
     def step_back_to(self, latitude: float, longitude: float, height: float) -> None:
         """Fly there and hover: at --hover, or else at the drone's current height."""
         status = self.status()
-        hover_m = self._limits.hover_m
-        if hover_m is None:
+        hover_m, goal = self._limits.hover_m, status.goal
+        if goal is not None and goal[:2] == (latitude, longitude) and goal.height > 0.0:
+            hover_m = goal.height  # asked again: it is there, or on its way
+        elif hover_m is None:
             here = status.location
             in_air = here is not None and status.on_ground is False
             hover_m = (

@@ -51,6 +51,7 @@ class Inquiries:
         capabilities = (
             mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
             | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
             | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
         )
         self._send(
@@ -78,14 +79,6 @@ class Inquiries:
         if message.param_id in self._parameters and math.isfinite(message.param_value):
             self._parameters.take(message.param_id, message.param_value)
             self._send(self._parameters.message(message.param_id))
-
-    def take_mission_request(self, message: Message) -> None:
-        """Handle MISSION_REQUEST_LIST: it has no mission."""
-        self._send(
-            mavlink.MAVLink_mission_count_message(
-                message.get_srcSystem(), message.get_srcComponent(), 0
-            )
-        )
 
     def take_timesync(self, message: Message) -> None:
         """TIMESYNC."""

@@ -14,6 +14,7 @@ from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body
 from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
 from drone_mesh.drone.mavlink_vehicle.inquiries import Inquiries
+from drone_mesh.drone.mavlink_vehicle.mission import Mission
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
 from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
 from drone_mesh.drone.mavlink_vehicle.reports import Reports
@@ -65,6 +66,8 @@ class MavlinkVehicle:
         self._stands_since_s = math.inf
         self._lifts_s = -math.inf  # when the motors have spooled up
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
+        # ArduPilot keeps home in item 0.
+        self.mission = Mission(self._send, self._place, 0 if autopilot is PX4 else 1)
         self._reports = Reports(self)
         inquiries = Inquiries(self._reports, self.parameters, self._send, lambda: self.now_s)
         self._inquiries = inquiries
@@ -77,8 +80,17 @@ class MavlinkVehicle:
             "PARAM_REQUEST_READ": inquiries.take_parameter_request,
             "PARAM_REQUEST_LIST": inquiries.take_parameter_list_request,
             "PARAM_SET": inquiries.take_parameter,
-            "MISSION_REQUEST_LIST": inquiries.take_mission_request,
             "TIMESYNC": inquiries.take_timesync,
+        }
+        mission = self.mission
+        self._takes_of_mission: dict[str, Callable[[Message, float], None]] = {
+            "MISSION_REQUEST_LIST": mission.take_list_request,
+            "MISSION_REQUEST_INT": mission.take_request,
+            "MISSION_REQUEST": mission.take_request,
+            "MISSION_COUNT": mission.take_count,
+            "MISSION_ITEM_INT": mission.take_item,
+            "MISSION_CLEAR_ALL": mission.take_clear,
+            "MISSION_SET_CURRENT": mission.take_current,
         }
 
     # Actions of the human pilot --------------------------------------------------------------
@@ -110,12 +122,16 @@ class MavlinkVehicle:
         take = self._takes.get(message.get_type())
         if take is not None:
             take(message)
+        of_mission = self._takes_of_mission.get(message.get_type())
+        if of_mission is not None:
+            of_mission(message, now_s)
 
     def tick(self, now_s: float) -> None:
         """Fly on to this time and send what is due."""
         passed_s = min(1.0, max(0.0, now_s - self.now_s))
         self.now_s = now_s
         self._watch_for_failsafes()
+        self.mission.tick(now_s)
         self._fly(passed_s)
         for message in self._reports.due(now_s):
             self._send(message)
@@ -134,6 +150,8 @@ class MavlinkVehicle:
             target, speed_m_s = here._replace(height=0.0), LANDING_SPEED_M_S
         elif self.mode is Mode.RETURN:
             target, speed_m_s = self._way_home(here)
+        elif self.mode is Mode.MISSION:
+            target = self._next_way_point(here)
         elif self.mode in (Mode.PILOT, Mode.HOLD) and self._target is None:
             target = here
         if self.now_s < self._lifts_s:
@@ -141,7 +159,22 @@ class MavlinkVehicle:
         arrived = body.move(target, passed_s, speed_m_s)
         if self.mode is Mode.TAKE_OFF and arrived:
             self._enter(Mode.HOLD)
+        elif self.mode is Mode.MISSION and arrived and self.mission.item() is not None:
+            self.mission.arrived(self.now_s)
         self._disarm_on_ground()
+
+    def _next_way_point(self, here: Location) -> Location:
+        """Here, at the end of a mission: it hovers there. Enters the mode to land or to return."""
+        item = self.mission.item()
+        if item is None:
+            return here
+        if item.command == mavlink.MAV_CMD_NAV_LAND:
+            self._enter(Mode.LAND)
+        elif item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            self._enter(Mode.RETURN)
+        else:
+            return self.mission.target(item, here)
+        return here
 
     def _way_home(self, here: Location) -> tuple[Location, float]:
         above_home = Location(0.0, 0.0, max(RETURN_HEIGHT_M, here.height))
@@ -287,6 +320,10 @@ class MavlinkVehicle:
             return int(DENIED)
         if mode is Mode.FOLLOW and self.autopilot is PX4 and self.now_s - self._target_s > 1.0:
             return int(REJECTED)  # PX4 requires targets first
+        if mode is Mode.MISSION:
+            if self.mission.is_empty:
+                return int(DENIED)
+            self.mission.begin()
         self._enter(mode)
         return int(ACCEPTED)
 
