@@ -95,6 +95,53 @@ def test_mavsdk_arms_takes_off_goes_somewhere_and_lands(mavsdk_ground_station) -
         server.close()
 
 
+def test_mavsdk_uploads_a_mission_that_the_vehicle_flies(mavsdk_ground_station) -> None:
+    from mavsdk.plugins.action.action import Action
+    from mavsdk.plugins.mission.mission import Mission, MissionItem, MissionPlan
+    from mavsdk.plugins.telemetry.telemetry import FlightMode, Telemetry
+
+    server, vehicle, port = serve(PX4)
+    try:
+        mavsdk_ground_station.add_any_connection(f"udpout://127.0.0.1:{port}")
+        system = mavsdk_ground_station.first_autopilot(PATIENCE_S)
+        action, mission, telemetry = Action(system), Mission(system), Telemetry(system)
+        wait_for("all is healthy", telemetry.health_all_ok)
+        places = [
+            ORIGIN.to_earth(Location(20.0, 0.0, 10.0)),
+            ORIGIN.to_earth(Location(20.0, 30.0, 12.0)),
+        ]
+        items = [
+            MissionItem(
+                place.latitude_deg,
+                place.longitude_deg,
+                place.altitude_m - ORIGIN.altitude_m,
+                speed_m_s=5.0,
+                is_fly_through=True,
+            )
+            for place in places
+        ]
+        mission.upload_mission(MissionPlan(items))
+        again = mission.download_mission().mission_items
+        assert [item.latitude_deg for item in again] == pytest.approx(
+            [place.latitude_deg for place in places], abs=1e-6
+        )
+        action.arm()
+        wait_for("armed", telemetry.armed)
+        mission.start_mission()
+        wait_for("it flies it", lambda: telemetry.flight_mode() == FlightMode.MISSION)
+        wait_for("it is over", mission.is_mission_finished)
+        assert vehicle.body.place.distance_m(Location(20.0, 30.0, 12.0)) < 0.2
+        end = pytest.approx((20.0, 30.0, -12.0), abs=0.2)
+
+        def here() -> tuple[float, float, float]:
+            position = telemetry.position_velocity_ned().position
+            return position.north_m, position.east_m, position.down_m
+
+        wait_for("it reports where it is from home", lambda: here() == end)
+    finally:
+        server.close()
+
+
 # MAVProxy, the ground station ----------------------------------------------------------------
 
 
