@@ -18,8 +18,8 @@ from drone_mesh.drone.mavlink.telemetry import (
 )
 from drone_mesh.drone.mavlink_vehicle.body import Body
 from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
-from drone_mesh.drone.mavlink_vehicle.mission import Mission
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_number
+from drone_mesh.drone.mavlink_vehicle.uploaded_mission import UploadedMission
 
 SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -40,7 +40,7 @@ class Reported(Protocol):
     body: Body
     faults: VehicleFaults
     mode: Mode
-    mission: Mission
+    mission: UploadedMission
     in_failsafe: bool
     now_s: float
 

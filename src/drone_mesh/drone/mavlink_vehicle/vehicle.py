@@ -14,10 +14,10 @@ from drone_mesh.drone.mavlink.telemetry import Message
 from drone_mesh.drone.mavlink_vehicle.body import LANDING_SPEED_M_S, Body
 from drone_mesh.drone.mavlink_vehicle.faults import VehicleFaults
 from drone_mesh.drone.mavlink_vehicle.inquiries import Inquiries
-from drone_mesh.drone.mavlink_vehicle.mission import Mission
 from drone_mesh.drone.mavlink_vehicle.modes import Mode, mode_of
 from drone_mesh.drone.mavlink_vehicle.parameters import Parameters
 from drone_mesh.drone.mavlink_vehicle.reports import Reports
+from drone_mesh.drone.mavlink_vehicle.uploaded_mission import UploadedMission
 
 RETURN_HEIGHT_M = 15.0  # ArduPilot's RTL_ALT
 GROUND_STATION_LOST_S = 5.0  # ArduPilot's FS_GCS_TIMEOUT
@@ -67,7 +67,7 @@ class MavlinkVehicle:
         self._lifts_s = -math.inf  # when the motors have spooled up
         self._ground_station_s = math.nan  # when its heartbeat was heard; NaN: never
         # ArduPilot keeps home in item 0.
-        self.mission = Mission(self._send, self._place, 0 if autopilot is PX4 else 1)
+        self.mission = UploadedMission(self._send, self._place, 0 if autopilot is PX4 else 1)
         self._reports = Reports(self)
         inquiries = Inquiries(self._reports, self.parameters, self._send, lambda: self.now_s)
         self._inquiries = inquiries

@@ -1,4 +1,4 @@
-"""Mission: the way points that a ground station uploads, and how far the vehicle has come."""
+"""UploadedMission: way points from a ground station, and how far the vehicle has come."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WAY_POINTS = frozenset(
 )
 
 
-class Mission:
+class UploadedMission:
     """MAVLink's mission protocol, from the vehicle's side. Kinds other than flights are refused."""
 
     def __init__(
