@@ -20,6 +20,7 @@ class Complaints:
         self._node_id = node_id
         self._throttle = Throttle(COMPLAINT_PERIOD_S)
         self._foreign = ("", -math.inf)
+        self._foreign_s: dict[int, float] = {}  # by neighbour: when
         self.counts = self._throttle.counts
 
     def add(self, reason: str, detail: str, now_s: float) -> None:
@@ -28,10 +29,15 @@ class Complaints:
             count = self.counts[reason]
             _log.warning("node %d: %s: %s (%d so far)", self._node_id, reason, detail, count)
 
-    def foreign(self, reason: str, payload: bytes, now_s: float) -> None:
+    def foreign(self, neighbour: int, reason: str, payload: bytes, now_s: float) -> None:
         """A neighbour has another key than this node, or only one of the two has a key."""
         self._foreign = (reason, now_s)
+        self._foreign_s[neighbour] = now_s
         self.add(reason, payload.hex(), now_s)
+
+    def is_foreign(self, neighbour: int, now_s: float) -> bool:
+        """Whether this neighbour takes no packets of this node, or this node none of its."""
+        return now_s - self._foreign_s.get(neighbour, -math.inf) <= FOREIGN_FOR_S
 
     def foreign_neighbour(self, now_s: float) -> str:
         """The latest such reason; empty if it is older than FOREIGN_FOR_S."""

@@ -252,7 +252,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
     def receive_seal_challenge(self, payload: bytes, creator: int, _from: int) -> None:
         """A neighbour has a key; with one, the antenna would have answered."""
         reason = f"a neighbour, node {creator}, has a mesh key and this node has none"
-        self.complaints.foreign(reason, payload, self._deadlines.now_s)
+        self.complaints.foreign(creator, reason, payload, self._deadlines.now_s)
 
     def _drop_unknown(self, payload: bytes, _creator: int, _from: int) -> None:
         self._drop("a packet of a type that this node does not process", payload)

@@ -56,7 +56,7 @@ def test_an_echo_without_an_answer_names_the_neighbour_with_another_key(rig):
     network.nodes[2].component.data.on_packet = lambda _payload: None
     assert rig.desks[0].echo(2, 0.01) is None
     reason = "a neighbour, node 9, sends packets without a seal: it has no key"
-    network.nodes[0].component.complaints.foreign(reason, b"", network.now_s())
+    network.nodes[0].component.complaints.foreign(1, reason, b"", network.now_s())
     with pytest.raises(MessageRefused, match=f"^no answer within 0.01 s; {reason}$"):
         rig.desks[0].echo(2, 0.01)
     with pytest.raises(MessageRefused, match=f"^no route to node 77; {reason}$"):

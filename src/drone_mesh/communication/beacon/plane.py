@@ -272,6 +272,9 @@ class BeaconPlane(IControlPlane):
             return
         self._set_time()
         routes, now_s = self._routes, self._routes.now_s
+        if self._basics.complaints.is_foreign(creator, now_s):  # readable, but it takes no packets
+            self._basics.complaints.dropped("a beacon of another mesh", payload, now_s)
+            return
         here = None if routes.motion is None else routes.motion.place
         beacon = Beacon.from_body(messages.body(payload)[: self._room], here)
         if beacon is None:

@@ -267,10 +267,10 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
             self.complaints.add(reason, payload.hex(), now_s)
         elif payload[SEAL_AT:] == _NO_SEAL:
             reason = f"a neighbour, node {from_}, sends packets without a seal: it has no key"
-            self.complaints.foreign(reason, payload, now_s)
+            self.complaints.foreign(from_, reason, payload, now_s)
         else:
             reason = (
                 f"a neighbour, node {from_}, sends packets that this node's key does not open: "
                 "another mesh or another key?"
             )
-            self.complaints.foreign(reason, payload, now_s)
+            self.complaints.foreign(from_, reason, payload, now_s)

@@ -75,3 +75,22 @@ def test_after_the_key_was_corrected_it_is_not_mentioned():
     network.run_for(61.0)
     ticket = network.send(0, 9, b"x")
     assert ticket.reason == "no route to node 9"
+
+
+@pytest.mark.parametrize("routing", ["beacon", "child_table_tree"])
+def test_a_router_without_the_key_does_not_believe_that_it_is_connected(routing):
+    """It can read beacons, but nobody takes its packets."""
+    network = Network(
+        1,
+        key=lambda node: None if node == 3 else KEY if node == 0 else KEY.for_node(node),
+        routing=routing,
+    )
+    network.add_gateway(0, 0.0, 0.0)
+    for node in (1, 2, 3):
+        network.add_router(node, 6.0 * node, 0.0)
+    believed = 0
+    for _ in range(60):
+        network.run_for(1.0)
+        believed += network.nodes[3].component.get_connected_to_gateway()
+    assert network.connected(2)
+    assert believed <= 5  # until a neighbour has challenged it
