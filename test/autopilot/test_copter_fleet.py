@@ -137,6 +137,18 @@ class Fleet:
 
         self.until("the layout is flown", is_flown, 300.0)
 
+    def outcome(self, node: int) -> str:
+        """What the gateway says in the end about the latest order of this drone."""
+        latest: dict[str, Any] = {}
+
+        def is_over() -> bool:
+            orders = (self.ask("orders") or {"orders": []})["orders"]
+            latest.update([o for o in orders if o["drone"] == node][-1:][0])
+            return latest["state"] not in ("asked", "under way")
+
+        self.until(f"the order for {node} is over", is_over)
+        return f"{latest['state']}: {latest['reason']}"
+
     def reachable(self) -> set[int]:
         """The nodes that the gateway heard within two check periods."""
         nodes = (self.ask("nodes") or {"nodes": []})["nodes"]
@@ -265,8 +277,13 @@ def test_six_copters_keep_the_mesh_together_and_apart_from_each_other(
     pilot.upload([ORIGIN.to_earth(place) for place in mission])
     pilot.choose("AUTO")
     fleet.pilots[TAKEN].choose("BRAKE")  # whose hovering needs no stick
-    fleet.watch_for(5.0)
+    fleet.until("it stands", fleet.is_at_rest)
     where = fleet.places[TAKEN]
+    fleet.order(TAKEN, Location(60.0, 30.0, 20.0))
+    words = fleet.outcome(TAKEN)
+    say(f"an order for {TAKEN}: {words}")
+    assert words.startswith("refused: ")
+    assert "in BRAKE, flown by its pilot" in words
     fleet.kill_router(RELAY)
     say(f"copter {ON_MISSION} flies its mission, {TAKEN} is its pilot's, node {RELAY} is killed")
 

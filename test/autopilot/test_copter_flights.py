@@ -69,6 +69,23 @@ def test_the_speed_of_the_engine_is_kept(program: tuple[Path, Path], tmp_path: P
         assert speed_m_s == pytest.approx(4.0, rel=0.1)
 
 
+@pytest.mark.parametrize(("behaviour", "turns"), [(0.0, False), (2.0, True)])
+def test_the_autopilot_decides_where_the_nose_points(
+    program: tuple[Path, Path], tmp_path: Path, behaviour: float, turns: bool
+) -> None:
+    with CopterRig(program, tmp_path, parameters={"WP_YAW_BEHAVIOR": behaviour}) as rig:
+        rig.fly(0.0, 0.0, 7.0)
+        before = rig.pilot.heading_deg
+        rig.engine.set_goal(0.0, 100.0, 7.0)  # east, 90 degrees
+        where = rig.engine.get_location
+        rig.pilot.until("on its way", lambda: where().longitude > 70.0, FLIGHT_S)
+        print(
+            f"WP_YAW_BEHAVIOR {behaviour:g}: from {before:.0f} to {rig.pilot.heading_deg:.0f} deg"
+        )
+        wanted = 90.0 if turns else before
+        assert abs((rig.pilot.heading_deg - wanted + 180.0) % 360.0 - 180.0) < 15.0
+
+
 @pytest.mark.parametrize("mode", ["LOITER", "RTL", "STABILIZE", "LAND", "BRAKE", "POSHOLD"])
 def test_the_pilot_ends_a_flight_and_keeps_the_drone(
     program: tuple[Path, Path], tmp_path: Path, mode: str

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import subprocess
 from pathlib import Path
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Mapping
 
 from drone_mesh.drone.geodesy import Origin
@@ -111,17 +111,6 @@ class ArduCopter:
         """End the process."""
         self._process.kill()
         self._process.wait()
-
-    def __enter__(self) -> ArduCopter:
-        return self
-
-    def __exit__(
-        self,
-        _type: type[BaseException] | None,
-        _error: BaseException | None,
-        _traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _address(self, port: int) -> str:
         return f"tcp:{LOOPBACK}:{BASE_PORT + 10 * self.instance + port}"

@@ -72,6 +72,12 @@ class PilotSide:
         return 0.0 if position is None else float(position.relative_alt) / 1e3
 
     @property
+    def heading_deg(self) -> float:
+        """Where its nose points, from north over east; 0 if not reported yet."""
+        position = self._latest.get("GLOBAL_POSITION_INT")
+        return 0.0 if position is None else float(position.hdg) / 100.0
+
+    @property
     def uptime_s(self) -> float:
         """The copter's clock at its latest position, which may run faster than the wall's."""
         position = self._latest.get("GLOBAL_POSITION_INT")
