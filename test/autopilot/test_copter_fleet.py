@@ -31,10 +31,12 @@ from drone_mesh.raspberry.pilot_side import PilotSide
 pytestmark = pytest.mark.timeout(1800)  # flights last
 
 RUNS = int(os.environ.get("AUTOPILOT_RUNS", "1"))
+PACE = float(os.environ.get("AUTOPILOT_PACE", "1"))  # below 1: slow motion, on a busy machine
 PICTURE = os.environ.get("AUTOPILOT_PICTURE")  # file for one of the console
 NEAREST_M = 5.0
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 HEARD_S = 12.0  # two check periods
+READY_S = 120.0
 FIRST_INSTANCE = 10  # apart from those of other tests
 HOMES = {  # on the ground
     1: Location(0.0, 40.0, 0.0),
@@ -56,6 +58,11 @@ RELAY, TAKEN, ON_MISSION = 3, 2, 4
 NODE_OPTIONS = (
     *("--origin", "52.0907,5.1214,3", "--check-period", "5", "--connection-lost-after", "15"),
 )
+
+
+def now_s() -> float:
+    """The clock of the copters and of the nodes' programs."""
+    return time.monotonic() * PACE
 
 
 def free_port() -> int:
@@ -83,13 +90,13 @@ class Fleet:
             # Of the relay no failsafe shall act: its copter has to hover where it is.
             parameters = {**SAFE, "FS_GCS_ENABLE": 0.0 if node == RELAY else 1.0}
             earth = Origin(*ORIGIN.to_earth(home))
-            copter = ArduCopter(program, own, FIRST_INSTANCE + node, earth, 1.0, parameters)
+            copter = ArduCopter(program, own, FIRST_INSTANCE + node, earth, PACE, parameters)
             self._stack.callback(copter.close)
             self.copters[node] = copter
         for node, copter in self.copters.items():
             self.pilots[node] = PilotSide(copter.pilot_address, copter.system_id)
         for pilot in self.pilots.values():
-            pilot.make_ready()
+            pilot.make_ready(READY_S / PACE)
         serving = ("--emulated-air-serve", str(self._air), "--port", str(self._http))
         self._start("gateway", "raspberry.gateway", *serving, *NODE_OPTIONS)
         self.until("the gateway answers", lambda: bool(self.ask("ready")))
@@ -173,24 +180,24 @@ class Fleet:
             if distance_m < self.nearest[0]:
                 where = f"{self.places[one].in_words()} and {self.places[other].in_words()}"
                 self.nearest = (distance_m, f"{one} and {other}, {where}")
-        row = [f"{time.monotonic():.1f}"]
+        row = [f"{now_s():.1f}"]
         for node in sorted(self.places):
             row += [f"{value:.2f}" for value in self.places[node]]
         self._log.write(",".join(row) + "\n")
 
     def until(self, what: str, holds: Callable[[], bool], within_s: float = 180.0) -> None:
-        end_s, due_s = time.monotonic() + within_s, 0.0
+        end_s, due_s = now_s() + within_s, 0.0
         while True:
-            if time.monotonic() >= due_s:
+            if now_s() >= due_s:
                 if holds():
                     return
-                due_s = time.monotonic() + 1.0
-            assert time.monotonic() < end_s, f"{what}; at {self.places}; {self.ask('nodes')}"
+                due_s = now_s() + 1.0
+            assert now_s() < end_s, f"{what}; at {self.places}; {self.ask('nodes')}"
             self.watch()
 
     def watch_for(self, seconds: float) -> None:
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
+        end_s = now_s() + seconds
+        while now_s() < end_s:
             self.watch()
 
     def is_at_rest(self) -> bool:
@@ -231,7 +238,8 @@ class Fleet:
             browser.close()
 
     def _start(self, name: str, module: str, *options: str) -> subprocess.Popen[bytes]:
-        code = f"import sys; from drone_mesh.{module} import main; sys.exit(main())"
+        slow = f"import time; real = time.monotonic; time.monotonic = lambda: {PACE} * real()"
+        code = f"import sys; {slow}; from drone_mesh.{module} import main; sys.exit(main())"
         with (self._folder / f"{name}.log").open("ab") as log:
             process = subprocess.Popen(
                 [sys.executable, "-c", code, *options],
@@ -255,10 +263,10 @@ def fleet(program: tuple[Path, Path], tmp_path: Path) -> Iterator[Fleet]:
 def test_six_copters_keep_the_mesh_together_and_apart_from_each_other(
     fleet: Fleet, run: int
 ) -> None:
-    started_s = time.monotonic()
+    started_s = now_s()
 
     def say(what: str) -> None:
-        print(f"{time.monotonic() - started_s:6.1f} s  {what}; nearest {fleet.nearest}", flush=True)
+        print(f"{now_s() - started_s:6.1f} s  {what}; nearest {fleet.nearest}", flush=True)
 
     everybody = set(HOMES)
     fleet.until("all are connected", lambda: fleet.reachable() >= everybody)
