@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Callable
+import random
+from typing import Callable, Protocol, cast
 
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.drone.flight_path import FlightPath, Vector
@@ -12,6 +13,10 @@ from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.lab import scenario as given
 from drone_mesh.lab.impairments import Impairments
+from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.nrf24.emulator.noise import Noise
+from drone_mesh.nrf24.emulator.space import Space
+from drone_mesh.nrf24.settings import RadioSettings
 
 MARGIN_STEP_DB = 0.1  # of the fading table
 
@@ -58,11 +63,14 @@ def put_obstacles(
         return None
     obstacles = obstacles_of(part)
     range_m = scenario.range_m
-    if part.boxes:
+    if scenario.radio.kind != "disc":
+        if part.boxes:  # its fading is the network's
+            cast(_Air, network.air).space.obstacles = obstacles.loss_db
+    elif part.boxes:
         impairments.disc.sees = lambda a, b: (
             obstacles.margin_db(a.to_vector(), b.to_vector(), range_m) > 0
         )
-    if part.fading != "none":
+    if part.fading != "none" and scenario.radio.kind == "disc":
 
         def arrives(a: Location, b: Location) -> float:
             margin_db = obstacles.margin_db(a.to_vector(), b.to_vector(), range_m)
@@ -73,6 +81,27 @@ def put_obstacles(
     for node_id, node in network.nodes.items():
         node.drone.plan_flight = functools.partial(planner.plan, node_id)
     return planner
+
+
+def put_noise(
+    network: Network, jam: given.Jam, range_m: float, rng: random.Random
+) -> Callable[[], None]:
+    """Start a transmitter of noise on a shared channel; returns what stops it."""
+    air = cast(_Air, network.air)
+    mhz = 2400 + air.settings.channel
+    links, (x, y) = air.space.links, jam.center
+    at_edge_dbm = links.received_dbm(range_m, float(air.settings.power.value), mhz)
+    power_dbm = at_edge_dbm - links.received_dbm(jam.radius_m, 0.0, mhz)
+    noise = Noise((x, y, 0.0), power_dbm, rng, centre_mhz=mhz, duty=jam.loss)
+    air.space.noises.append(noise)
+    return lambda: noise.stop(round(network.now_s() * NS_PER_S))
+
+
+class _Air(Protocol):
+    """The air of radios that share a channel."""
+
+    space: Space
+    settings: RadioSettings
 
 
 class Planner:

@@ -242,7 +242,11 @@ class Link(Part):
 
 
 class Jam(Part):
-    """Noise in a circle: packets from or to a drone within it are lost."""
+    """Noise in a circle: packets from or to a drone within it are lost.
+
+    On a shared channel: a transmitter at its centre, at its edge as strong as a link at the edge of
+    the range; `loss` is then the share of the time that it sends.
+    """
 
     center: Point
     radius_m: Above0
@@ -435,8 +439,6 @@ class Scenario(Part):
     def _suits_its_radio(self) -> "Scenario":
         if self.radio.kind != "disc":
             for fault in self.faults:
-                if fault.action in ("cut_link", "jam", "loss"):
+                if fault.action in ("cut_link", "loss"):
                     raise ValueError(f"fault {fault.action} is for the disc radio")
-            if self.obstacles.boxes or self.obstacles.fading != "none":
-                raise ValueError("obstacles are for the disc radio")
         return self

@@ -328,13 +328,15 @@ def _options(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> 
     else:
         rate = scenario.radio.rate or DEFAULT_RATE
         options.update(radio=scenario.radio.kind, rate=rate, links=_links(scenario, rate, streams))
+        part = scenario.obstacles
+        options.update(fading=part.fading, rician_k_db=part.rician_k_db)
     return options
 
 
 def _links(scenario: Scenario, rate: str, streams: Streams) -> LinkModel:
     """Which frames arrive undamaged if no other frame is on the air."""
     links: LinkModel = IdealDisc(scenario.range_m)
-    if scenario.radio.links == "distance":
+    if scenario.radio.links == "distance" or scenario.obstacles.fading != "none":
         links = LogDistance.with_edge_at(
             scenario.range_m, streams.of("links"), bits_per_s=data_rate(rate).value
         )

@@ -16,6 +16,7 @@ from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.impairments import Impairments, Jamming
 from drone_mesh.lab.network_sample import NetworkSample, gateways_of
 from drone_mesh.lab.picking import pick_drones
+from drone_mesh.lab.propagation import put_noise
 from drone_mesh.lab.scenario import Fault, Scenario
 from drone_mesh.lab.streams import Streams
 
@@ -171,8 +172,12 @@ class Timeline:
         self._after(what.for_s, restore)
         return sorted({node for link in links for node in link})
 
-    def _jam(self, fault: Fault, _rng: random.Random) -> list[int]:
+    def _jam(self, fault: Fault, rng: random.Random) -> list[int]:
         what, jams = fault.what, self._impairments.jams
+        if self._scenario.radio.kind != "disc":
+            stop = put_noise(self._network, what, self._scenario.range_m, rng)
+            self._after(what.for_s, lambda _: stop())
+            return []
         jamming = Jamming((what.center[0], what.center[1]), what.radius_m, what.loss)
         jams.append(jamming)
         self._after(what.for_s, lambda _: jams.remove(jamming))

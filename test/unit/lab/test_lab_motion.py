@@ -203,3 +203,39 @@ def test_lapses_are_the_times_in_which_a_router_has_a_path_and_is_not_served() -
         watch.look(NetworkSample(float(now_s), frozenset({1, 2}), frozenset(served)), line, [0])
     assert sorted(watch.lapses_s) == [1.0, 1.0, 2.0]
     assert watch.shares == [0.5, 0.5, 1.0, 0.0, 1.0]
+
+
+CHANNEL = {"kind": "shared", "rate": "1M"}
+AT_REST: dict[str, Any] = {"kind": "none"}
+
+
+def tries_per_packet(**scenario: Any) -> float:
+    line = {"kind": "line", "drones": 3}
+    record = run(
+        layout=line, radio=CHANNEL, mobility=AT_REST, routing="beacon", duration_s=20, **scenario
+    )
+    assert record.air is not None
+    return record.air.tries / record.air.sent
+
+
+def test_links_of_the_shared_channel_fade() -> None:
+    assert tries_per_packet(obstacles={"fading": "rayleigh"}) > 1.2 * tries_per_packet()
+
+
+def test_boxes_stand_between_radios_of_the_shared_channel() -> None:
+    wall = {"boxes": [{"center": [3, 0, 50], "size": [1, 200, 100]}]}
+    line = {"kind": "line", "drones": 2}
+    record = run(layout=line, radio=CHANNEL, mobility=AT_REST, duration_s=10, obstacles=wall)
+    assert record.samples[-1].served == set()
+
+
+def test_a_jammer_of_the_shared_channel_cuts_its_surroundings_for_its_time() -> None:
+    line = {"kind": "line", "drones": 4}
+    jam = {"at_s": 10, "jam": {"center": [18, 0], "radius_m": 4, "for_s": 15}}
+    record = run(
+        layout=line, radio=CHANNEL, mobility=AT_REST, routing="beacon", faults=[jam], duration_s=35
+    )
+    served = {round(sample.now_s): sample.served for sample in record.samples}
+    assert served[9] == served[34] == {1, 2, 3}
+    assert 3 not in served[24]
+    assert 1 in served[24]
