@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 from typing import Callable, Mapping
 
@@ -38,6 +39,7 @@ logger = logging.getLogger(__name__)
 
 RECEIVE_TIMEOUT_S = 0.1  # our choice: how soon the receiving thread notices its end
 DEBUG_PERIOD_S = 10.0  # our choice: one line per check period
+POWER_WANTED_S = 1.0  # our choice: longer than the pause between two questions of a repair
 DUPLICATE_S = 0.5  # our choice: the same bytes again within this time are a duplicate
 
 Submit = Callable[[Callable[[float], None]], None]
@@ -80,6 +82,8 @@ class PacketAntenna(IWirelessCommunication):
         self._silent = False  # set by any thread
         self._seen: dict[int, tuple[bytes, float]] = {}  # node -> its last payload, and when
         self._duplicates = 0
+        self._power: bool | None = False  # in the channel; the receiving thread samples it
+        self._power_until_s = -math.inf  # as long as it is wanted
 
     @property
     def medium(self) -> Medium:
@@ -87,6 +91,11 @@ class PacketAntenna(IWirelessCommunication):
 
     def channel_use(self) -> ChannelUse:
         return self._meter.read(self.statistics(), self._runtime.now_s())
+
+    def hears_power(self) -> bool | None:
+        """The latest sample; the first call of several makes the receiving thread take some."""
+        self._power_until_s = self._runtime.now_s() + POWER_WANTED_S
+        return self._power
 
     def patience(self) -> float:
         return self._sender.patience
@@ -220,6 +229,8 @@ class PacketAntenna(IWirelessCommunication):
                 self._show(info)
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):
                 self._hand_on(received)
+            wanted = self._runtime.now_s() < self._power_until_s
+            self._power = self._radio.hears_power() if wanted else False
 
     def _hand_on(self, received: Received) -> None:
         mesh, payload = self._mesh, received.payload

@@ -77,5 +77,8 @@ class PacketRadio(Protocol):
     def receive(self, timeout_s: float) -> Sequence[Received]:
         """What has arrived, oldest first; waits up to `timeout_s` for something."""
 
+    def hears_power(self) -> bool | None:
+        """Whether there is power in its channel now, of whatever sender; None: it cannot tell."""
+
     def statistics(self) -> RadioStatistics:
         """The current counters."""

@@ -137,6 +137,10 @@ class IWirelessCommunication(abc.ABC):
         """This node's use of a shared channel. Any thread."""
         return ChannelUse()
 
+    def hears_power(self) -> bool | None:
+        """Whether there is power in its channel now, of whatever sender; None: it cannot tell."""
+        return None
+
     def patience(self) -> float:
         """The number of check periods for which the mesh should not probe what is known to work.
 

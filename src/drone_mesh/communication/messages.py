@@ -190,6 +190,7 @@ _ORDER_NUMBER_AT = HEADER_BYTES + GoToLocationMessage.BODY.size
 _FRAME_DIGEST = struct.Struct("<H")
 _FRAME_DIGEST_AT = PAYLOAD_BYTES - _FRAME_DIGEST.size  # the last bytes of a PRESENT
 _LOCATION = int(MessageType.LOCATION)
+_REQUESTLOCATION = int(MessageType.REQUESTLOCATION)
 _NEW_LOCATION = struct.Struct(
     f"<{HEADER_BYTES}B{LocationMessage.BODY.format[1:]}{BODY_BYTES - LocationMessage.BODY.size}x"
 )
@@ -305,6 +306,11 @@ def is_data(payload: bytes) -> bool:
 def priority(payload: bytes) -> Priority:
     """Whether it goes before or after other packets."""
     return ABOUT[payload[TYPE_AT]].priority
+
+
+def asks_for_place(payload: bytes) -> bool:
+    """Whether it is a REQUESTLOCATION: a node is connected without an answer to that."""
+    return payload[TYPE_AT] == _REQUESTLOCATION
 
 
 def readdressed(payload: bytes, to: int) -> bytes:

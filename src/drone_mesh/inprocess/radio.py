@@ -52,6 +52,7 @@ class InProcessAir(IInProcessAir):
         self._antennas: dict[int, InProcessAntenna] = {}
         self._ids: set[int] = set()  # of all antennas, also before they start and after they stop
         self._cut: set[frozenset[int]] = set()
+        self.jammed = False  # a jammer, heard everywhere: no packet arrives; set by experiments
         # Whether two places within range hear each other; set if there are obstacles.
         self.sees: Callable[[Location, Location], bool] | None = None
         # Whether a packet may arrive at all; set by experiments that count packets or lose some.
@@ -210,7 +211,7 @@ class InProcessAir(IInProcessAir):
                 self._hand_over(copy, other)
 
     def _hand_over(self, payload: bytes, other: InProcessAntenna) -> bool:
-        if not other.powered:
+        if not other.powered or self.jammed:
             return False
         if self.loss and self._rng.random() < self.loss:
             return False
@@ -275,6 +276,10 @@ class InProcessAntenna(IInProcessAntenna):
 
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Does nothing: the owner of the network can read its nodes."""
+
+    def hears_power(self) -> bool | None:
+        """Whether a jammer is on; a real chip is tuned to its channel and measures it (RPD)."""
+        return self._air.jammed
 
     def switch_power(self, on: bool) -> None:
         """Power on or off."""

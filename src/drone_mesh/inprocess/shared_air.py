@@ -19,7 +19,7 @@ from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.inprocess.clock import VirtualClock
 from drone_mesh.inprocess.interfaces import IInProcessAir
 from drone_mesh.nrf24.airtime import NS_PER_S
-from drone_mesh.nrf24.emulator.air import CAPTURE_DB
+from drone_mesh.nrf24.emulator.air import CAPTURE_DB, RPD_DBM, RPD_NS
 from drone_mesh.nrf24.emulator.links import Hop, LinkModel
 from drone_mesh.nrf24.emulator.space import Space
 from drone_mesh.nrf24.settings import RadioSettings
@@ -254,6 +254,20 @@ class SharedAir(IInProcessAir):
         place = receiver.drone.get_location().to_vector()
         noise_dbm = self.space.noise_dbm(place, self._carrier_mhz, self._bits_per_s, span_ns)
         return noise_dbm > dbm
+
+    def hears_power(self, radio: SharedRadio) -> bool:
+        """Whether noise or a frame of another radio is strong enough for RPD now."""
+        now_ns = round(self.clock.now_s * NS_PER_S)
+        strongest_dbm = self.space.noise_dbm(
+            radio.drone.get_location().to_vector(),
+            self._carrier_mhz,
+            self._bits_per_s,
+            (now_ns - RPD_NS, now_ns),
+            throughout=True,
+        )
+        for frame in self._active:
+            strongest_dbm = max(strongest_dbm, self._power(frame.sender.node_id, radio.node_id))
+        return strongest_dbm > RPD_DBM
 
     def _in_reach(self, node: int, faded: bool) -> list[SharedRadio]:
         """Who may hear a node: on the mean, or at a moment when fading adds to the power."""

@@ -71,6 +71,9 @@ class SharedAntenna(IInProcessAntenna, SharedRadio):
     def channel_use(self) -> ChannelUse:
         return self._meter.read(self.statistics(), self._clock.now_s)
 
+    def hears_power(self) -> bool | None:
+        return self._air.hears_power(self)
+
     def patience(self) -> float:
         return self.access.patience
 

@@ -211,6 +211,17 @@ class NRF24LowLevelInterface:
             else:
                 self._irq_watch.woken(self._irq.wait_low(left_s))
 
+    def hears_power(self) -> bool | None:
+        """Whether more than -64 dBm were in the channel for 40 us (RPD); None: it fails now."""
+        with self._lock:
+            if not self._ready():
+                return None
+            try:
+                return self._chip.received_power()
+            except RadioError as error:
+                self._failed(error)
+                return None
+
     def _pause(self, duration_s: float) -> None:
         """Wait, and keep receiving."""
         until_s = self._runtime.now_s() + duration_s

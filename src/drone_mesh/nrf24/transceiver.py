@@ -118,6 +118,10 @@ class Transceiver:
         if config != self._settings.config_listening:
             raise RadioError(f"CONFIG reads 0x{config:02X}: was the supply interrupted?")
 
+    def received_power(self) -> bool:
+        """Whether it receives more than -64 dBm in its channel, from whatever sender (RPD)."""
+        return bool(self._link.read_byte(Register.RPD) & 1)
+
     def check_registers(self) -> None:
         """Raise RadioError unless all registers hold their settings."""
         self.check_config()

@@ -43,6 +43,7 @@ class RecordingAntenna(IWirelessCommunication):
         self.losing = 0
         self.gets_lost = lambda payload: False
         self.powered = True
+        self.power = lambda: None  # whether it hears power; None: it cannot tell
 
     def start_antenna(self, mesh):
         self.calls.append(("start_antenna", mesh))
@@ -71,6 +72,9 @@ class RecordingAntenna(IWirelessCommunication):
 
     def on(self):
         return self.powered
+
+    def hears_power(self):
+        return self.power()
 
 
 class RigEngine(IDroneEngine):

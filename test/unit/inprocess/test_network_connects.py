@@ -19,6 +19,7 @@ from scenarios import (
 )
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.routing.child_table_tree import ChildTableTree
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError
@@ -171,6 +172,18 @@ def test_a_stranger_is_answered_on_the_first_try():
     assert [heard[:8] for heard in stranger.heard] == [bytes.fromhex("00 02 04 63 63 01 00 02")]
 
 
+def test_a_mesh_in_which_all_requests_for_places_are_lost_stays_connected():
+    network = fleet(24, 5)
+    network.run_for(30.0)
+    assert network.all_connected()
+    network.air.carries = lambda payload: payload[2] != MessageType.REQUESTLOCATION
+    connected = True
+    for _ in range(60):
+        network.run_for(1.0)
+        connected = connected and network.all_connected()
+    assert connected
+
+
 def test_a_drone_that_cannot_be_reached_does_not_move():
     network = line(2, spacing=8.0)
     network.add_router(9, 100.0, 0.0)
@@ -261,9 +274,9 @@ RECORDED = [
     "20.000 2 DISCONNECTED 0",
     "21.640 3 DISCONNECTED 0",
     "61.640 3 EMERGENCY 255",
-    "61.640 3 FLIGHT_DECIDED 2",
-    "66.240 3 LANDED 255",
-    "66.252 3 CONNECTED 0 2 hops",
+    "62.840 3 FLIGHT_DECIDED 2",
+    "67.440 3 LANDED 255",
+    "67.452 3 CONNECTED 0 2 hops",
 ]
 RECORDED_PACKETS = 175
 

@@ -183,7 +183,10 @@ def test_layout_202_without_node_1_is_whole_again_within_two_minutes(seed):
 
 
 def test_a_drone_that_is_alone_flies_back_step_by_step_until_it_is_connected():
-    """Both relays die: its first step leads to the place of the first, where no node is left."""
+    """Both relays die: its first step leads to the place of the first, where no node is left.
+
+    So it returns, and then flies to the gateway.
+    """
     network = line(3, spacing=8.0)
     network.run_for(20.0)
     network.power(1, False)
@@ -191,7 +194,7 @@ def test_a_drone_that_is_alone_flies_back_step_by_step_until_it_is_connected():
     network.run_for(15.0)
     assert not network.connected(3)
     assert run_until(network, network.all_connected, within_s=225.0)
-    assert [to for _at_s, _node, to in events(network, "FLIGHT_DECIDED")] == [2, 0]
+    assert [to for _at_s, _node, to in events(network, "FLIGHT_DECIDED")] == [2, 3, 0]
 
 
 def test_a_drone_that_never_knew_a_gateway_stays():

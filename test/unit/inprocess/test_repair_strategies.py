@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 from scenarios import LAYOUTS, events, fleet, flown, layout, line, outage, run_until
 
@@ -16,6 +18,9 @@ from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.network import ORACLE
 from drone_mesh.lab.metrics.harm import harm
 from drone_mesh.lab.sequence import run_sequence
+from drone_mesh.nrf24.airtime import NS_PER_S
+from drone_mesh.nrf24.emulator.noise import Noise
+from drone_mesh.nrf24.settings import RadioSettings
 
 FLYING = sorted(set(REPAIR_STRATEGIES) - {"stay"}) + [ORACLE]
 RANGE_M = 9.0
@@ -115,31 +120,57 @@ def alone_among_the_dead(repair):
     return network
 
 
-def test_with_scout_a_drone_whose_neighbours_all_died_looks_around_early_and_stays_connected():
-    network = alone_among_the_dead("scout")
+@pytest.mark.parametrize("repair", ["thesis", "scout", "nearest", "follow"])
+def test_a_drone_whose_neighbours_all_died_looks_around_early_and_stays_connected(repair):
+    network = alone_among_the_dead(repair)
     assert run_until(network, network.all_connected, within_s=70.0, step_s=1.0)
     network.run_for(60.0)
     assert network.all_connected()
     assert len(events(network, "FLIGHT_DECIDED")) == 1
 
 
-def test_with_thesis_that_drone_waits_five_times_as_long():
-    network = alone_among_the_dead("thesis")
-    network.run_for(150.0)
-    assert flown(network) == set()
-
-
+@pytest.mark.parametrize("repair", ["thesis", "scout"])
 @pytest.mark.parametrize("silence_s", [45.0, 52.0, 120.0, 600.0])
-def test_with_scout_all_drones_are_back_at_their_places_after_a_silence(silence_s):
+def test_all_drones_are_back_at_their_places_after_a_silence(repair, silence_s):
     """At 45 and 52 s some are on their way, and some listen."""
-    network = fleet(8, 3, repair="scout")
+    network = fleet(8, 3, repair=repair)
     network.run_for(30.0)
     before = {node: network.location(node) for node in network.nodes}
     outage(network, silence_s)
     assert flown(network) != set()
-    assert network.run_until(network.all_connected, within_s=15.0)
+    assert network.run_until(network.all_connected, within_s=20.0)
     network.run_for(20.0)
     assert {n for n, at in before.items() if network.location(n).distance_m(at) > 0.1} == set()
+
+
+def test_while_their_channel_is_jammed_no_drone_moves():
+    network = fleet(8, 3)
+    network.run_for(30.0)
+    network.air.jammed = True
+    network.run_for(600.0)
+    assert not network.connected(8)
+    assert "its channel is jammed" in network.status().nodes[8].repair
+    network.air.jammed = False
+    assert network.run_until(network.all_connected, within_s=20.0)
+    assert flown(network) == set()
+
+
+@pytest.mark.parametrize("radio", ["shared", "chips"])
+def test_a_carrier_is_measured_as_power_and_no_drone_moves(radio):
+    network = Network(radio=radio, rate="1M")
+    network.add_fleet(1, 4, 2, 6.0)
+    assert network.run_until(network.all_connected, within_s=60.0)
+    mhz = 2400 + RadioSettings().channel
+    jammer = Noise((3.0, 3.0, 0.0), 20.0, random.Random(1), centre_mhz=mhz)
+    network.air.space.noises.append(jammer)
+    network.run_for(200.0)
+    assert not network.connected(4)
+    assert flown(network) == set()
+    assert "its channel is jammed" in network.status().nodes[4].repair
+    jammer.stop(round(network.now_s() * NS_PER_S))
+    assert network.run_until(network.all_connected, within_s=60.0)
+    assert flown(network) == set()
+    network.stop()
 
 
 def test_with_scout_an_order_during_a_look_around_is_flown():
@@ -149,8 +180,8 @@ def test_with_scout_an_order_during_a_look_around_is_flown():
     network.nodes[4].plan()
     for node in (2, 3):
         network.power(node, True)
-    network.run_for(60.0)
-    assert network.location(4).latitude == pytest.approx(40.0)
+    ordered = pytest.approx(40.0)
+    assert run_until(network, lambda: network.location(4).latitude == ordered, within_s=60.0)
 
 
 def test_with_field_the_drones_move_towards_the_gateway_leg_by_leg():

@@ -90,7 +90,8 @@ class Delivery(IDelivery):
                 return True
             failures += 1
         self._routing.sent(to, False, failures)
-        self._neighbour_lost(to, came_from)
+        if not messages.asks_for_place(payload):
+            self._neighbour_lost(to, came_from)
         return False
 
     def went_to(self, payload: bytes) -> int | None:
@@ -123,7 +124,9 @@ class Delivery(IDelivery):
         self._routing.sent(to, False, tries)
         silent_since_s = self._deadlines.now_s - self._antenna.medium.silence_s
         heard = self._neighbours.last_heard_s(to, otherwise=silent_since_s) > silent_since_s
-        if heard and messages.is_data(payload):
+        if messages.asks_for_place(payload):
+            pass  # others decide: who keeps only these from arriving must not cut a mesh
+        elif heard and messages.is_data(payload):
             pass  # users' packets crowd the channel; their loss says little about a heard neighbour
         elif heard and to not in self._gave_up:
             self._gave_up.add(to)

@@ -179,6 +179,8 @@ class ConnectionRepair(RepairViews):
         self._flies_to_place_of = step.owner if step in self.steps else NO_ROUTE
         if step.owner != self.node_id:
             self._tried_goals.append(step.place)
+        elif self._flight is not None and self._tried_goals:
+            self._tried_goals.pop()  # it turns back before it has been there
         self._parts.neighbours.forget_all()
         self._parts.neighbours.takes_off(by_order=False)
         self._parts.routing.node_moved_location()
@@ -245,7 +247,7 @@ class ConnectionRepair(RepairViews):
         """
         flight = self._flight
         if flight is None:
-            return True
+            return not self._strategy.listens
         if know_gateway and node in flight.group:
             flight.stop_when_connected()
         return flight.stops_when_connected

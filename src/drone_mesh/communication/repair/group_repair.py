@@ -20,7 +20,8 @@ from drone_mesh.communication.repair.election import (
     as_on_the_air,
 )
 from drone_mesh.communication.repair.flight_news import FlightNews
-from drone_mesh.communication.repair.interfaces import IRepairActions, IRepairStrategy, Step
+from drone_mesh.communication.repair.interfaces import IRepairActions, Step
+from drone_mesh.communication.repair.lone_repair import LoneRepair
 from drone_mesh.communication.repair.spots import NEAR, PITCH
 from drone_mesh.communication.router_states import RepairState, RouterEvent
 from drone_mesh.drone.location import Location
@@ -34,7 +35,7 @@ HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a gro
 IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 
 
-class GroupRepair(IRepairStrategy):
+class GroupRepair(LoneRepair):
     """Asks for places, elects, flies one step back; the gateway's place is the second choice."""
 
     def start(self, mesh: IRepairActions) -> None:
@@ -54,14 +55,27 @@ class GroupRepair(IRepairStrategy):
         """With neighbours: start an election. Alone: fly."""
         if self.mesh.neighbours():
             self._ask_for_places()
-            return
-        self.mesh.happened(RouterEvent.NO_NEIGHBOURS)
+        else:
+            self.on_emergency_alone()
+
+    def fly_alone(self) -> None:
+        """One step; it comes back if it hears no node there.
+
+        A drone that flies to the gateway, as after an order, looks for it on the way: it need not.
+        """
+        mesh, here = self.mesh, self.mesh.own_place()
+        mesh.happened(RouterEvent.NO_NEIGHBOURS)
         step, self.reason = self._next_step(alone=True)
-        if step is not None:
+        if step is None:
+            return
+        if here is not None and (mesh.silent or not step.home):
+            self._look(step, here)
+        else:
             self._fly(step)
 
     def on_gateway_found(self) -> None:
         """The election is over; places tried without success may be tried again."""
+        super().on_gateway_found()
         self._election.clear()
         self._rounds_without_flier = 0
         self._news.clear()
@@ -69,10 +83,12 @@ class GroupRepair(IRepairStrategy):
 
     def on_stopped(self) -> None:
         """The election continues without this node."""
+        super().on_stopped()
         self._election.clear()
 
     def on_neighbour_lost(self, node: int) -> None:
         """Do not wait for its place or bid."""
+        super().on_neighbour_lost(node)
         if self.mesh.state in (RepairState.ASKING, RepairState.NEGOTIATING):
             self.mesh.wait_until(self.mesh.now_s)
 
@@ -83,6 +99,8 @@ class GroupRepair(IRepairStrategy):
 
     def on_time(self) -> None:
         """The time for places, bids or the winner's take-off is over."""
+        if self.on_time_alone():
+            return
         state = self.mesh.state
         if state is RepairState.ASKING:
             until_s = self._asked_s + self._places_within_s()

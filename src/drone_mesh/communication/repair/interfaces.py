@@ -93,6 +93,10 @@ class IRepairActions(abc.ABC):
         """Whether all neighbours (2 or more) fell silent together, so the medium may be down."""
 
     @abc.abstractmethod
+    def hears_power(self) -> bool | None:
+        """Whether there is power in the channel of its radio now; None: it cannot measure it."""
+
+    @abc.abstractmethod
     def neighbours(self) -> Mapping[int, NeighbourView]:
         """The nodes in direct reach."""
 
@@ -197,8 +201,9 @@ class IRepairStrategy(abc.ABC):
     or flies for a repair.
     """
 
-    # Shown to users, as RepairStatus:
+    # Read by the router, most of them shown to users as RepairStatus:
     reason = ""  # why the drone does not fly, as short text
+    listens = False  # it must not connect yet
     own_bid = NO_BID  # in an election
     bid_unit = ""  # of bids above 1
     bids_for = NO_ROUTE  # the node whose place it would take

@@ -75,6 +75,9 @@ class RepairViews(IRepairActions):
     def silent(self) -> bool:  # noqa: D102
         return self._parts.neighbours.silent
 
+    def hears_power(self) -> bool | None:  # noqa: D102
+        return self._parts.antenna.hears_power()
+
     def neighbours(self) -> Mapping[int, NeighbourView]:  # noqa: D102
         return {node: self._view(node) for node in self._parts.routing.get_set_of_children()}
 

@@ -107,6 +107,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def channel_use(self) -> ChannelUse:
         return self._antenna.channel_use()
 
+    def hears_power(self) -> bool | None:
+        return self._antenna.hears_power()
+
     def patience(self) -> float:
         return self._antenna.patience()
 

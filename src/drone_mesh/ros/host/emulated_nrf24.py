@@ -62,6 +62,9 @@ class EmulatedNRF24(IWirelessCommunication):
     def medium(self) -> Medium:
         return self._antenna.medium
 
+    def hears_power(self) -> bool | None:
+        return self._antenna.hears_power()
+
     def patience(self) -> float:
         return self._antenna.patience()
 

@@ -447,10 +447,13 @@ def test_after_one_step_back_the_next_one_is_to_the_gateway():
     rig = lone_rig()
     rig.wait_until(46.0)
     fly(rig, rig.engine.goals[-1])
-    rig.wait_until(120.0)
-    step_back, home = rig.engine.goals[:2]
+    rig.wait(3.0)
+    fly(rig, rig.engine.goals[-1])
+    rig.wait_until(130.0)
+    step_back, start, home = rig.engine.goals[:3]
     assert step_back == BESIDE_NEIGHBOUR
-    assert home.distance_m(Location(4.0, 0.0, 0.0)) == pytest.approx(1.1)
+    assert start == Location(12.0, 0.0, 0.0)  # it hears no node where it is now
+    assert home == A_LEG_FROM_12
 
 
 def test_a_drone_that_its_pilot_keeps_from_repairs_stays_and_says_why():
@@ -940,17 +943,51 @@ def silent_rig():
     return rig
 
 
-def test_a_drone_whose_neighbours_fell_silent_together_waits_five_times_as_long():
+HOME = Location(12.0, 0.0, 0.0)
+
+
+def test_a_drone_whose_neighbours_fell_silent_together_looks_around_once_and_comes_back():
+    """It flies after the usual time, and then waits five times as long."""
     rig = silent_rig()
-    rig.wait_until(155.0)
-    assert rig.engine.goals == []
-    rig.wait_until(176.0)
+    rig.wait_until(EMERGENCY_S + 0.1)
+    (there,) = rig.engine.goals
+    fly(rig, there)
+    rig.wait(3.0)
+    assert rig.engine.goals == [there, HOME]
+    fly(rig, HOME)
+    rig.wait_until(EMERGENCY_S + 150.0)
+    assert rig.engine.goals == [there, HOME]
+    rig.wait(30.0)
+    assert len(rig.engine.goals) > 2
+
+
+def test_it_stays_where_it_hears_a_node_that_it_did_not_know():
+    rig = silent_rig()
+    rig.wait_until(EMERGENCY_S + 0.1)
+    fly(rig, rig.engine.goals[0])
+    rig.wait(0.9)  # it asks whether another drone is there
+    rig.hear("09 09 03 01 fe 01 01")
+    rig.wait(7.0)
     assert len(rig.engine.goals) == 1
+    rig.hear("00 09 04 01 01 01 00 01")
+    assert rig.mesh.get_connected_to_gateway()
+
+
+def test_it_comes_back_if_a_lost_neighbour_turns_out_to_live():
+    """So the medium was down. A gateway's answer that comes before does not keep it there."""
+    rig = silent_rig()
+    rig.wait_until(EMERGENCY_S + 0.1)
+    fly(rig, rig.engine.goals[0])
+    rig.wait(0.9)
+    rig.hear("00 09 04 01 01 01 00 01")
+    assert not rig.mesh.get_connected_to_gateway()
+    rig.hear("03 03 03 01 fe 01 01")
+    assert rig.engine.goals[1:] == [HOME]
 
 
 def test_it_flies_to_a_spot_near_the_place_that_belongs_to_it_alone():
     rig = silent_rig()
-    rig.wait_until(176.0)
+    rig.wait_until(EMERGENCY_S + 0.1)
     (goal,) = rig.engine.goals
     assert 1.0 <= goal.distance_m(NEIGHBOUR_PLACE) < 7.0
     assert goal == own_spot(NEIGHBOUR_PLACE, 1, 1.0, [NEIGHBOUR_PLACE, Location(4.0, 0.0, 0.0)])
@@ -958,12 +995,45 @@ def test_it_flies_to_a_spot_near_the_place_that_belongs_to_it_alone():
 
 def test_a_node_that_is_heard_again_gives_the_mesh_time_to_recover():
     rig = silent_rig()
-    rig.wait_until(150.0)
+    rig.wait_until(EMERGENCY_S - 1.0)
     rig.antenna.dead = {2, 4}
     rig.know_neighbour(3)
-    rig.wait_until(174.0)
+    rig.wait(20.0)
     assert rig.engine.goals == []
     assert rig.sent(BID) == []
+
+
+# A jammer --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make_rig", [lone_rig, silent_rig])
+def test_a_drone_whose_channel_is_jammed_stays_says_so_and_tries_again(make_rig):
+    rig = make_rig()
+    rig.antenna.power = lambda: True
+    rig.wait_until(600.0)
+    assert rig.engine.goals == []
+    assert rig.repair_in_words().endswith("does not fly: its channel is jammed")
+    said = [event.detail for event in rig.events if event.kind.name == "EMERGENCY"]
+    assert said.count("its channel is jammed: it stays") == 1
+    rig.antenna.power = lambda: False
+    rig.wait(25.0)
+    assert rig.engine.goals == []  # the others need time to be heard again
+    rig.wait(20.0)
+    assert rig.engine.goals != []
+
+
+def test_power_in_a_few_samples_is_a_frame_of_strangers_and_no_jammer():
+    rig = lone_rig()
+    samples = iter([True, False, False, True, False, False, True, False])
+    rig.antenna.power = lambda: next(samples)
+    rig.wait_until(EMERGENCY_S + 2.0)
+    assert len(rig.engine.goals) == 1
+
+
+def test_a_drone_that_hears_nodes_does_not_ask_about_power():
+    rig = group_rig(3)
+    rig.antenna.power = None  # an error if it is called
+    rig.wait_until(EMERGENCY_S + 5.0)
 
 
 def test_neighbours_that_fall_silent_at_different_checks_did_not_do_so_together():

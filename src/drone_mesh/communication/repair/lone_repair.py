@@ -1,0 +1,140 @@
+"""LoneRepair: a drone that hears no node flies one step, and back if it hears none there either.
+
+docs/protocol.md, "Lost connection". A drone whose neighbours all fell silent together cannot know
+whether they died or its medium is down. A radio that measures power in its channel knows more: it
+is being jammed, and a flight would not help.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.repair.interfaces import (
+    SILENCE_PATIENCE,
+    IRepairActions,
+    IRepairStrategy,
+    Step,
+)
+from drone_mesh.drone.location import Location
+
+LISTENS_S = 1.0  # our choice: an answer takes some milliseconds
+SETTLES_S = 5.0  # our choice: by then the others are back, too, if the medium was down
+SAMPLES = 8  # our choice: of the power in the channel, before each decision to fly
+SAMPLE_S = 0.15  # our choice: longer than an antenna needs for a new sample, 0.1 s
+JAMMED_SHARE = 0.5  # our choice: a jammer may pulse; frames of strangers take less of the time
+
+
+class LoneRepair(IRepairStrategy):
+    """What the strategies do that elect a drone, if there is no other node to elect."""
+
+    _stood_at: Location | None = None  # during a look around: its start
+    _looked = False  # since the connection was lost
+    _in_silence = False  # several neighbours fell silent together before it
+    _landed_s = -math.inf  # from its latest look around
+    _jammed_s = -math.inf  # when its channel was last found to be jammed
+
+    def start(self, mesh: IRepairActions) -> None:
+        """Called once, before any other call."""
+        super().start(mesh)
+        self._lost: set[int] = set()  # neighbours that were not heard again
+        self._samples: list[bool] | None = None  # of the power in the channel, while it measures
+
+    def patience(self, silent: bool) -> float:
+        """In silence, look around after the usual time, and then rarely."""
+        return SILENCE_PATIENCE if silent and self._looked else 1.0
+
+    def on_gateway_found(self) -> None:
+        """Start over: the next loss is a new one."""
+        self._stood_at, self._looked, self._samples = None, False, None
+        self._jammed_s = -math.inf
+        self.listens = False
+
+    def on_stopped(self) -> None:
+        """The drone flies, perhaps by an order, or its antenna is off: forget the look around."""
+        self._stood_at, self._samples = None, None
+        self.listens = False
+
+    def on_neighbour_lost(self, node: int) -> None:
+        """Remember it: it may have died, or the medium is down."""
+        self._lost.add(node)
+
+    def on_neighbour_found(self, node: int) -> None:
+        """A lost neighbour is alive, so the medium was down: fly back to the start."""
+        if node in self._lost:
+            self._lost.discard(node)
+            if self._in_silence:
+                self._back()
+
+    def on_landed(self) -> None:
+        """If this is where it looks around, listen; if its medium may be down, do not connect yet.
+
+        A drone that lost a single neighbour may connect at once: that one has probably died.
+        """
+        if self._stood_at is not None:
+            self.listens, self._landed_s = self._in_silence, self.mesh.now_s
+            self.mesh.wait_until(self.mesh.now_s + LISTENS_S)
+
+    def on_emergency_alone(self) -> None:
+        """Measure the power in the channel; then fly, unless it is being jammed."""
+        if self._samples is None:
+            self._samples = []
+            self._measure()
+
+    def on_time_alone(self) -> bool:
+        """The timer has expired. Returns whether it was that of a drone alone."""
+        if self.mesh.neighbours() and self._stood_at is None:
+            self._samples = None
+            return False
+        if self._samples is not None:
+            self._measure()
+        elif self._stood_at is not None:
+            mesh = self.mesh
+            if not mesh.neighbours():
+                self._back()
+            elif self.listens and mesh.now_s < self._landed_s + LISTENS_S + SETTLES_S:
+                mesh.wait_until(self._landed_s + LISTENS_S + SETTLES_S)
+            elif self.listens:
+                self.listens = False
+                mesh.present()
+        else:
+            return False
+        return True
+
+    @abc.abstractmethod
+    def fly_alone(self) -> None:
+        """Its channel is not jammed: take the next step."""
+
+    def _measure(self) -> None:
+        mesh, samples = self.mesh, self._samples
+        assert samples is not None
+        power = mesh.hears_power() if len(samples) < SAMPLES else None
+        if power is not None:
+            samples.append(power)
+            mesh.wait_until(mesh.now_s + SAMPLE_S)
+            return
+        self._samples = None
+        if mesh.neighbours():
+            return
+        if samples and sum(samples) >= JAMMED_SHARE * len(samples):
+            if self._jammed_s == -math.inf:
+                mesh.report(MeshEventKind.EMERGENCY, detail="its channel is jammed: it stays")
+            self._jammed_s = mesh.now_s
+            self.reason = "its channel is jammed"
+        elif mesh.now_s - self._jammed_s < mesh.connection_lost_after_s:
+            self.reason = "its channel was jammed a moment ago"  # the others need time, too
+        else:
+            self.fly_alone()
+
+    def _look(self, step: Step, here: Location) -> None:
+        """Fly a step, and remember the way back."""
+        self._in_silence = self.mesh.silent
+        self.mesh.fly(step)
+        self._stood_at, self._looked = here, True
+
+    def _back(self) -> None:
+        stood_at, self._stood_at = self._stood_at, None
+        self.listens = False
+        if stood_at is not None and not self.mesh.connected:
+            self.mesh.fly(Step(stood_at, self.mesh.node_id))
