@@ -74,6 +74,9 @@ class SlowRadio:
             other.take(self.node_id, payload, to_all=True)
         return self.listening
 
+    def hears_power(self):
+        return None  # it cannot measure
+
     def receive(self, timeout_s):
         self._news.wait_for(lambda: bool(self._inbox), timeout_s)
         arrived, self._inbox = self._inbox, []

@@ -74,7 +74,7 @@ class LoneRepair(IRepairStrategy):
         """
         if self._stood_at is not None:
             self.listens, self._landed_s = self._in_silence, self.mesh.now_s
-            self.mesh.wait_until(self.mesh.now_s + LISTENS_S)
+            self.mesh.wait_until(self.mesh.now_s + self.mesh.medium.stretched(LISTENS_S))
 
     def on_emergency_alone(self) -> None:
         """Measure the power in the channel; then fly, unless it is being jammed."""
@@ -93,11 +93,13 @@ class LoneRepair(IRepairStrategy):
             mesh = self.mesh
             if not mesh.neighbours():
                 self._back()
-            elif self.listens and mesh.now_s < self._landed_s + LISTENS_S + SETTLES_S:
-                mesh.wait_until(self._landed_s + LISTENS_S + SETTLES_S)
             elif self.listens:
-                self.listens = False
-                mesh.present()
+                settled_s = self._landed_s + mesh.medium.stretched(LISTENS_S + SETTLES_S)
+                self.listens = mesh.now_s < settled_s
+                if self.listens:
+                    mesh.wait_until(settled_s)
+                else:
+                    mesh.present()
         else:
             return False
         return True
