@@ -77,7 +77,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
+        is_check = now_s >= self._deadlines.get(Due.CHECK)
         super().tick(now_s)
+        if is_check and self._states.connected:
+            self.places.connected_here(self._pilot.place(), self.control.hops)
         if now_s >= self._deadlines.get(Due.GOAL):
             self._deadlines.set(Due.GOAL, math.inf)
             goal = self._pilot.goal
@@ -120,6 +123,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         return self._repair.may_connect(node, know_gateway)
 
     def on_connected(self) -> None:  # noqa: D102
+        self.places.connected_here(self._pilot.place(), self.control.hops)
         self._repair.on_connected()
 
     def on_unconnected_check(self, due_s: float) -> None:  # noqa: D102
@@ -137,8 +141,9 @@ class MeshnetworkRouter(MeshnetworkComponent):
         """Relays use the gateway's place as well, unless only the addressee can check it."""
         if self._parts.seals.reserved_bytes(MessageType.LOCATION):
             return
-        if creator == self.control.gateway:
-            self.places.update_gateway(place_in(payload), self._deadlines.now_s)
+        place = place_in(payload)
+        if creator == self.control.gateway and self._is_possible(place, gateway=True):
+            self.places.update_gateway(place, self._deadlines.now_s)
 
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
@@ -148,15 +153,18 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._repair.on_bid(bid.creator, bid.cost, bid.from_, about)
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
-        now_s = self._deadlines.now_s
-        self._neighbours.set_place(node, location, now_s)
-        control = self.control
-        if node == control.gateway:
-            self.places.update_gateway(location, now_s)
+        now_s, control = self._deadlines.now_s, self.control
+        is_gateway, is_next_hop = node == control.gateway, node == control.next_hop()
+        if is_gateway:
             control.gateway_sent_place()
         elif gateway is not None:
             self._on_gateway_place(gateway)
-        if node == control.next_hop():
+        if (is_gateway or is_next_hop) and not self._is_possible(location, is_gateway):
+            return
+        self._neighbours.set_place(node, location, now_s)
+        if is_gateway:
+            self.places.update_gateway(location, now_s)
+        if is_next_hop:
             self.places.update_next_hop(node, location, now_s)
         self._repair.on_place(node, location)
 
@@ -170,9 +178,18 @@ class MeshnetworkRouter(MeshnetworkComponent):
             self._repair.on_taken(heard.place)
 
     def _on_gateway_place(self, gateway: GatewayPlace) -> None:
-        if self.control.may_use(gateway.gateway):
+        if self._is_possible(gateway.place, gateway=True) and self.control.may_use(gateway.gateway):
             seen_s = self._deadlines.now_s - gateway.age_s
-            self.places.update_gateway(gateway.place, seen_s)
+            self.places.hear_of_gateway(gateway.place, seen_s, self._states.connected)
+
+    def _is_possible(self, place: Location, gateway: bool) -> bool:
+        """Whether the gateway, or else the next hop, can be at `place`."""
+        possible = self.places.is_possible(place, self._repair.range_m, gateway)
+        if not possible:
+            who = "gateway" if gateway else "next hop"
+            reason = f"a place where the {who} cannot be"
+            self.complaints.add(reason, place.in_words(), self._deadlines.now_s)
+        return possible
 
     def _on_neighbour_found(self, node: int) -> None:
         self._repair.on_neighbour_found(node)

@@ -233,6 +233,7 @@ class GatewayConnection:
             period_s = self._parts.timing.check_period_s
             enough_s = max((MAX_AGE_PERIODS - 1) * period_s, 2.0 * fresh_s)
         unsure = places.gateway is None or now_s - places.gateway_seen_s >= enough_s
+        unsure = unsure or places.gateway_disputed
         if (unsure and not gateway_asked) or self._moved:  # the request tells where this node is
             self._moved = False
             ask_for_place(self._parts, self.gateway)

@@ -268,6 +268,8 @@ class ConnectionRepair(RepairViews):
     def on_landed(self) -> None:
         """The flight is over."""
         was_repair, self._flight = self._flight is not None, None
+        if was_repair and self._flies_to_place_of == self._control.gateway and not self.connected:
+            self._parts.places.gateway_not_found()
         self._control.end(RouterEvent.LANDED)
         if was_repair:
             self._strategy.on_landed()

@@ -95,12 +95,18 @@ class RepairViews(IRepairActions):
     @property
     def steps(self) -> list[Step]:  # noqa: D102
         places, gateway = self._parts.places, self._control.gateway
-        candidates = ((places.good, places.good_id), (places.gateway, gateway))
+        candidates = [(places.good, places.good_id), (places.gateway, gateway)]
+        if places.good is None and places.gateway is None and not self._is_where_it_was_connected():
+            candidates = [(places.connected_at, NO_ROUTE)]
         return [
-            Step(place, owner, home=owner == gateway)
+            Step(place, owner, home=owner == gateway != NO_ROUTE)
             for place, owner in candidates
             if place is not None and _may_be_flown_to(place)
         ]
+
+    def _is_where_it_was_connected(self) -> bool:
+        here, there = self._parts.pilot.place(), self._parts.places.connected_at
+        return here is not None and there is not None and here.distance_m(there) < self.clearance_m
 
     @property
     def gateway_place(self) -> Location | None:  # noqa: D102

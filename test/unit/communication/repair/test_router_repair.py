@@ -44,6 +44,9 @@ def own_bid(to: int, score: float) -> bytes:
     return (bytes((1, 1, BID, to, to)) + struct.pack("<f", score)).ljust(32, b"\0")
 
 
+UNDERGROUND = "02 02 01 01 01 00 00 00 41 00 00 00 00 ff ff"  # node 2: height -1 m
+
+
 def lone_rig(options=None, timing=None):
     """Connected through 2 to gateway 0, whose place is (0, 4); 2 stands at (0, 8). Then 2 dies.
 
@@ -484,9 +487,63 @@ def test_a_place_where_no_drone_may_go_is_nowhere_to_fly(place):
     assert rig.engine.goals == []
 
 
+FAR_NEXT_HOP = "02 02 01 01 01 00 00 f8 41"  # 2 is at latitude 31, two ranges and 1 m away
+FAR_GATEWAY = "00 02 01 01 01 00 00 20 42"  # 0 is at latitude 40, three ranges and 1 m away
+
+
+def hearsay(latitude: str) -> str:
+    """GATEWAY_PLACE of 7, through 2: the gateway is there now, at longitude 4."""
+    return f"07 02 7d 01 01 01 00 00 {latitude} 00 00 80 40"
+
+
+def test_a_place_where_the_next_hop_or_the_gateway_cannot_be_is_dropped():
+    """The next hop is within two ranges of this node, a gateway two hops away within three."""
+    rig = lone_rig()
+    rig.hear(FAR_NEXT_HOP, FAR_GATEWAY, hearsay("00 00 20 42"))
+    rig.wait_until(EMERGENCY_S + 0.1)
+    assert rig.engine.goals[:1] == [BESIDE_NEIGHBOUR]
+    assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
+    assert rig.mesh.complaints.counts["a place where the gateway cannot be"] == 2
+
+
+def test_what_others_say_of_the_gateway_does_not_replace_its_own_word_but_makes_the_node_ask_it():
+    rig = lone_rig()
+    rig.antenna.dead = set()
+    rig.forget()
+    rig.hear(hearsay("00 00 00 41"))
+    assert rig.mesh.places.gateway == Location(4.0, 0.0, 0.0)
+    rig.wait_until(5.5)
+    assert [p for p in rig.sent(2) if p[4] == 0] != []
+    rig.hear("00 02 01 01 01 00 00 00 41 00 00 80 40")
+    assert rig.mesh.places.gateway == Location(8.0, 4.0, 0.0)
+
+
+def test_a_cut_off_node_without_the_gateways_own_word_believes_the_newest_possible_news():
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.mesh.places.forget_gateway()
+    rig.antenna.dead = {2}
+    rig.wait_until(12.0)
+    assert not rig.mesh.get_connected_to_gateway()
+    for latitude, place in (("00 00 00 41", 8.0), ("00 00 40 41", 12.0)):
+        rig.hear(hearsay(latitude))
+        assert rig.mesh.places.gateway == Location(place, 4.0, 0.0)
+
+
+def test_a_drone_that_knows_no_place_flies_to_where_it_was_connected_last():
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.antenna.dead = {2}
+    rig.engine.place = Location(30.0, 0.0, 0.0)
+    rig.wait_until(60.0)
+    assert rig.engine.goals[:1] == [Location(12.0, 0.0, 0.0)]
+
+
 def test_a_next_hop_with_an_impossible_place_does_not_hide_that_of_the_gateway():
     rig = lone_rig()
-    rig.hear("02 02 01 01 01 00 60 9c 45")
+    rig.hear(UNDERGROUND)
     rig.antenna.dead = {2}
     rig.wait_until(60.0)
     assert rig.engine.goals[:1] == [A_LEG_FROM_12]
@@ -922,7 +979,7 @@ def test_an_announcement_is_passed_on_with_the_place_that_it_is_about():
 def test_after_a_flight_of_another_drone_to_the_gateway_there_is_none_for_a_minute():
     """With rounds so short that the first one after that minute comes within 10 s."""
     rig = group_rig(3, timing=MeshTiming(check_period_s=1.0, connection_lost_after_s=3.0))
-    rig.hear("02 02 01 01 01 00 60 9c 45")  # the place of 2 is nowhere to fly
+    rig.hear(UNDERGROUND)  # the place of 2 is nowhere to fly
     rig.antenna.dead = {2}
     rig.wait_until(4.0)
     rig.hear(bid(3, TOOK_OFF_HOME))
