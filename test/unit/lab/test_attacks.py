@@ -51,6 +51,7 @@ def test_without_a_key_a_stranger_sends_drones_kilometres_away(name):
         "false gateway",
         "MISSING storm",
         "far place and an outage",
+        "requests for places jammed",
         "black hole",
     ],
 )

@@ -11,19 +11,23 @@ from typing import Callable, Dict, Mapping
 
 from drone_mesh.communication.interfaces import BROADCAST
 from drone_mesh.communication.messages import (
+    TYPE_AT,
+    GatewayPlace,
     GoToLocationMessage,
     LocationMessage,
     MovementNegotiationMessage,
+    body,
     header,
     packet,
     readdressed,
 )
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.location import Location
+from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.proofs.stranger import Stranger
 
 ATTACK_S = 60.0
-OUTAGE_S = 90.0
+OUTAGE_S = 300.0
 BIDDING_S = 300.0
 SWALLOWING_S = 180.0
 FAR = Location(4900.0, 4900.0, 0.0)  # 6.9 km away, within the bounds for goals
@@ -118,15 +122,30 @@ def borrowed_names(stranger: Stranger) -> dict[int, Location]:
 
 
 def far_place(stranger: Stranger) -> dict[int, Location]:
-    """Claim once that the gateway is far away; then the gateway is off for a while."""
-    body = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
-    for node in stranger.in_range():
-        if node != 0:
-            stranger.say(MessageType.LOCATION, 0, node, node, body)
+    """Claim that the gateway is far away, in its name and as hearsay; then it is off for a while."""
+    own_word = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
+    hearsay = body(GatewayPlace(0, FAR, 0.0).to_payload(0, 0, 0, 0))
+    me = stranger.node_id
+    for node in stranger.network.nodes:
+        for to in [node] if node in stranger.in_range() else stranger.in_range():
+            if node != 0:
+                stranger.say(MessageType.LOCATION, 0, to, node, own_word)
+                stranger.say(MessageType.GATEWAY_PLACE, me, to, node, hearsay)
     stranger.network.power(0, False)
     stranger.network.run_for(OUTAGE_S)
     stranger.network.power(0, True)
     stranger.network.run_for(ATTACK_S)
+    return {}
+
+
+def jammed_requests(stranger: Stranger) -> dict[int, Location]:
+    """Destroy all requests for places, and nothing else."""
+    air = stranger.network.air
+    assert isinstance(air, InProcessAir)
+    if not stranger.mute:
+        air.carries = lambda payload: payload[TYPE_AT] != MessageType.REQUESTLOCATION
+    stranger.network.run_for(SWALLOWING_S)
+    air.carries = None
     return {}
 
 
@@ -180,6 +199,7 @@ ATTACKS: Mapping[str, Attack] = {
     "false gateway": false_gateway,
     "MISSING storm": missing_storm,
     "far place and an outage": far_place,
+    "requests for places jammed": jammed_requests,
     "bids of 1e9": highest_bid,
     "bids of 100 m": plausible_bid,
     "black hole": black_hole,
