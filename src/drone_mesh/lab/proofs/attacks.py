@@ -122,7 +122,7 @@ def borrowed_names(stranger: Stranger) -> dict[int, Location]:
 
 
 def far_place(stranger: Stranger) -> dict[int, Location]:
-    """Claim that the gateway is far away, in its name and as hearsay; then it is off for a while."""
+    """Claim that the gateway is far away, in its name and as hearsay; then it is off."""
     own_word = LocationMessage.BODY.pack(FAR.latitude, FAR.longitude, 0, 0)
     hearsay = body(GatewayPlace(0, FAR, 0.0).to_payload(0, 0, 0, 0))
     me = stranger.node_id
