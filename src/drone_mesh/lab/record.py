@@ -9,6 +9,7 @@ from drone_mesh.air.graph import Graph
 from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.data.transport import ReceivedMessage
 from drone_mesh.lab.flights import Leg
+from drone_mesh.lab.formations import Formations
 from drone_mesh.lab.impairments import Traffic
 from drone_mesh.lab.link_watch import LinkWatch
 from drone_mesh.lab.network_sample import NetworkSample
@@ -86,6 +87,7 @@ class RunRecord:
     links: LinkWatch | None  # of a run with motion, churn or probes
     probes: Sequence[ProbeFate]
     frames: Mapping[str, int] | None  # shared channel: "control" and "data"
+    formations: Formations  # what became of layouts
 
     @property
     def healed_at_s(self) -> float | None:

@@ -308,6 +308,15 @@ class FlightOrders(Part):
         return self
 
 
+class FlownLayouts(Part):
+    """Layouts of the drone manager, ordered one after the other and kept until they are reached."""
+
+    cases: Annotated[List[Annotated[int, Field(ge=0)]], Field(min_length=1)]
+    apart_s: AtLeast0 = 10.0  # between two orders
+    shuffled: bool = False  # in another order in each run
+    at_once: bool = False  # all drones set out together
+
+
 class Messages(Part):
     """Users' messages to the first gateway, handed in at once, by these drones in turn."""
 
@@ -329,7 +338,7 @@ class Fault(Part):
 
     ACTIONS: ClassVar[Tuple[str, ...]] = (
         "kill", "revive", "cut_link", "jam", "gateway_off", "loss", "battery", "churn", "order",
-        "send", "wind",
+        "layouts", "send", "wind",
     )  # fmt: skip
 
     at_s: Optional[AtLeast0] = None
@@ -343,6 +352,7 @@ class Fault(Part):
     battery: Optional[Battery] = None
     churn: Optional[Churn] = None
     order: Optional[FlightOrders] = None
+    layouts: Optional[FlownLayouts] = None
     send: Optional[Messages] = None
     wind: Optional[Wind] = None
 

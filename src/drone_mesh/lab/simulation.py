@@ -142,6 +142,7 @@ class Simulation:
             links=self._links,
             probes=self._probes.results(),
             frames=self.impairments.frames,
+            formations=self.timeline.formations,
             refused_flights=0 if self._planner is None else len(self._planner.refused),
             cut_offs=[*self._cut_offs, *(ServiceGap(*gap, None) for gap in self._cut_off.items())],
             in_the_air=frozenset(self.flights.in_the_air),

@@ -13,6 +13,7 @@ from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.conditions import StartCondition, parse_condition
 from drone_mesh.lab.flights import Flights
+from drone_mesh.lab.formations import Formations
 from drone_mesh.lab.impairments import Impairments, Jamming
 from drone_mesh.lab.network_sample import NetworkSample, gateways_of
 from drone_mesh.lab.picking import pick_drones
@@ -72,6 +73,7 @@ class Timeline:
         self._network, self._impairments, self._flights = network, impairments, flights
         self._scenario, self._streams = scenario, streams
         self._witness = witness
+        self.formations = Formations(network, self.send_order)
         self._waiting: list[tuple[StartCondition, int]] = []
         self._seen: dict[str, float] = {}  # when a condition's event was first true
         self._events_read = 0
@@ -283,6 +285,13 @@ class Timeline:
             x = here.longitude + within_m * math.cos(angle)
             y = here.latitude + within_m * math.sin(angle)
             self.send_order(node, x, y, 0)
+
+    def _layouts(self, fault: Fault, rng: random.Random) -> list[int]:
+        what, cases = fault.what, list(fault.what.cases)
+        if what.shuffled:
+            rng.shuffle(cases)
+        self.formations.fly(cases, what.apart_s, what.at_once)
+        return []
 
     def send_order(self, node: int, x: float, y: float, height: int) -> None:
         """Order a drone to x, y (m) through the first gateway that is on."""

@@ -65,6 +65,7 @@ class _Rehearsal:
         self._nodes = {n.id: replace(n) for n in mesh.nodes if position_is_known(n)}
         self._goals = {n: goal for n, goal in goals.items() if n in self._nodes}
         self._flights: dict[int, FlightPath] = {}
+        self._ordered: set[int] = set()  # of those that set out together
         self._now_s = 0.0
         self._found = FormationPreview()
         for node in self._nodes.values():
@@ -72,14 +73,14 @@ class _Rehearsal:
                 self._fly(node, Location.from_vector(node.path[-3:]))
 
     def run(self, at_once: bool) -> FormationPreview:
-        sent = self._goals if at_once else self._choose()
+        sent = self._due() if at_once else self._choose()
         while sent or self._flights:
             for drone, goal in sent.items():
                 self._fly(self._nodes[drone], goal)
             self._note_who_is_cut_off()
             self._now_s += STEP_S
             self._move()
-            sent = self._choose()
+            sent = self._due() if at_once else self._choose()
         self._found.out_of_reach = sorted(self._routers() - self._connected().keys())
         self._found.cut_off = sorted(set(self._found.cut_off) - set(self._found.out_of_reach))
         for drone, goal in self._goals.items():
@@ -87,6 +88,17 @@ class _Rehearsal:
             if Location.from_vector(node.position).distance_m(goal) > AT_PLACE_M:
                 self._found.stays.setdefault(drone, "it has no route")
         return self._found
+
+    def _due(self) -> Mapping[int, Location]:
+        """All that rest elsewhere and can be ordered, each once."""
+        connected = self._connected()
+        due = {
+            drone: goal
+            for drone, goal in self._goals.items()
+            if drone in connected and drone not in self._flights and drone not in self._ordered
+        }
+        self._ordered.update(due)
+        return due
 
     def _choose(self) -> Mapping[int, Location]:
         hops = self._connected()

@@ -103,6 +103,25 @@ def _stacked(scene: Topology, alive: Graph) -> set[int]:
     return {nodes[index] for index in np.flatnonzero(near.any(axis=1))}
 
 
+@metric(
+    "s", "from the last layout ordered until all that can be reached are at their places",
+    better="less", censored=True,
+)  # fmt: skip
+def formation_s(run: RunRecord) -> float:
+    given_s, reached_s = run.formations.given_s, run.formations.reached_s
+    return NAN if given_s is None or reached_s is None else reached_s - given_s
+
+
+@metric("s", "by which this is longer than the plan", better="less", censored=True)
+def formation_late_s(run: RunRecord) -> float:
+    return formation_s(run) - run.formations.planned_s
+
+
+@metric("drones", "drones of the last layout that can be reached and are elsewhere at the end")
+def astray(run: RunRecord) -> float:
+    return NAN if run.formations.given_s is None else float(len(run.formations.missing))
+
+
 @metric("", "flights that an obstacle did not allow", better="less")
 def flights_blocked(run: RunRecord) -> float:
     return float(run.refused_flights)

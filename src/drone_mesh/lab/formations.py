@@ -1,0 +1,80 @@
+"""Flies layouts in a run, as the drone manager does, and observes how the last one ends."""
+
+from __future__ import annotations
+
+from typing import Callable, Sequence
+
+from drone_mesh.drone.location import Location
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.status import event_records
+from drone_mesh.lab.network_sample import gateways_of, physical_graph
+from drone_mesh.layouts import Layouts
+from drone_mesh.state.departures import AT_PLACE_M
+from drone_mesh.state.formation_preview import preview
+from drone_mesh.state.standing_orders import PartState, StandingOrders
+
+LOOK_S = 1.0  # our choice: /mesh/state comes at least as often at real time
+
+Order = Callable[[int, float, float, int], None]
+"""Orders a drone to x, y and a height, in metres."""
+
+
+class Formations:
+    """The drone manager of a run, and the progress of the last layout."""
+
+    def __init__(self, network: Network, order: Order) -> None:
+        self.given_s: float | None = None  # when the last layout was ordered; None: none was
+        self.planned_s = 0.0  # that it takes, by its preview
+        self.reached_s: float | None = (
+            None  # since when all that can be reached are at their places
+        )
+        self.missing: list[int] = []  # those that are not, and can be reached
+        self._network, self._order = network, order
+        self._layouts = Layouts.shipped()
+        self._orders = StandingOrders()
+        self._goals: dict[int, Location] = {}
+        self._number = 0
+        self._events_read = 0
+
+    def fly(self, cases: Sequence[int], apart_s: float, at_once: bool) -> None:
+        """Order these layouts one after the other, from now on."""
+        clock = self._network.clock
+        for count, case in enumerate(cases):
+            clock.call_at(clock.now_s + count * apart_s, self._give, (case, at_once))
+        clock.call_at(clock.now_s, self._look, None)
+
+    def _give(self, what: tuple[int, bool]) -> None:
+        case, at_once = what
+        status = self._network.status()
+        orders = self._layouts.orders(case)
+        self._goals = {drone: goal for drone, goal in orders if drone in self._network.nodes}
+        self.given_s, self.reached_s = status.stamp_s, None
+        self.planned_s = preview(status, self._goals, at_once=at_once).duration_s
+        self._number = self._orders.give(case, self._goals, status.stamp_s, at_once)
+
+    def _look(self, _: object) -> None:
+        network = self._network
+        for event in event_records(network.events[self._events_read :]):
+            self._orders.take(event)
+        self._events_read = len(network.events)
+        for drone, to in self._orders.update(network.status()):
+            self._order(drone, to.longitude, to.latitude, round(to.height))
+        self._observe()
+        network.clock.call_at(network.clock.now_s + LOOK_S, self._look, None)
+
+    def _observe(self) -> None:
+        """A drone can be reached while it flies, or has power and a path to a gateway."""
+        network = self._network
+        reach = physical_graph(network).hops_from(gateways_of(network))
+        (progress,) = [p for p in self._orders.all_progress() if p.number == self._number]
+        self.missing = [
+            drone
+            for drone, goal in self._goals.items()
+            if network.location(drone).distance_m(goal) > AT_PLACE_M
+            and drone not in progress.drones[PartState.REFUSED]
+            and (drone in reach or network.nodes[drone].drone.path is not None)
+        ]
+        if self.missing:
+            self.reached_s = None
+        elif self.reached_s is None:
+            self.reached_s = network.clock.now_s
