@@ -17,6 +17,7 @@ from drone_mesh.layouts import Layouts, UnknownCase
 from drone_mesh.missions import Mission
 from drone_mesh.mobility.pilot import along
 from drone_mesh.state.events import EventBatcher
+from drone_mesh.state.formation_preview import FormationPreview, preview
 from drone_mesh.state.model import EventRecord, MeshStatus
 from drone_mesh.state.packets import PacketSampler
 
@@ -123,6 +124,11 @@ class InProcessMesh:
                     place = (goal.longitude, goal.latitude, int(goal.height))
                     self._network.order(node, *place, allow_shared_place=True)
         return f"ordered layout {case}"
+
+    def preview(self, case: int) -> FormationPreview:
+        with self._lock:
+            status = self._network.status()
+        return preview(status, dict(self._layouts.orders(case)))
 
     def speed(self, paused: bool, factor: float) -> str:
         self.paused, self.factor = paused, factor or self.factor

@@ -6,6 +6,7 @@ from typing import Protocol, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.missions import Mission
+from drone_mesh.state.formation_preview import FormationPreview
 
 RECORDED = "this is a recording: it cannot be changed"
 
@@ -24,6 +25,8 @@ class MeshControls(Protocol):
     ) -> str: ...
 
     def layout(self, case: int) -> str: ...
+
+    def preview(self, case: int) -> FormationPreview: ...
 
     def speed(self, paused: bool, factor: float) -> str: ...
 
@@ -49,6 +52,9 @@ class RecordingControls:
         raise OrderRefused(RECORDED)
 
     def layout(self, case: int) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def preview(self, case: int) -> FormationPreview:  # noqa: D102
         raise OrderRefused(RECORDED)
 
     def speed(self, paused: bool, factor: float) -> str:  # noqa: D102

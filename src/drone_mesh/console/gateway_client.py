@@ -8,6 +8,7 @@ from typing import Any, Sequence
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.errors import MeshError
 from drone_mesh.missions import Mission
+from drone_mesh.state.formation_preview import FormationPreview
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two seconds
@@ -47,6 +48,7 @@ class GatewayClient:
             raise GatewayGone(str(error)) from error
 
 
+ONLY_SIMULATED = "layouts exist only in the simulation"
 OWN_AUTOPILOT = "the missions of real drones belong to their autopilots"
 
 
@@ -72,7 +74,11 @@ class GatewayControls:
 
     def layout(self, case: int) -> str:
         """Refused."""
-        raise OrderRefused("layouts exist only in the simulation")
+        raise OrderRefused(ONLY_SIMULATED)
+
+    def preview(self, case: int) -> FormationPreview:
+        """Refused."""
+        raise OrderRefused(ONLY_SIMULATED)
 
     def speed(self, paused: bool, factor: float) -> str:
         """Refused."""

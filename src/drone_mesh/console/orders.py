@@ -179,6 +179,14 @@ class ReadPlaces(_Request):
             raise OrderRefused(str(error)) from error
 
 
+class PreviewLayout(_Request):
+    """The page asks what would happen if it ordered a layout now."""
+
+    do: Literal["preview"]
+    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
+    case: int = Field(ge=0, le=MAX_CASE)
+
+
 class NeighbourWatch(_Request):
     """The page requests details of one node's neighbours; None: stop."""
 
@@ -217,7 +225,9 @@ class _Numbered(_Request):
     number: int
 
 
-Request = Union[PageOrder, NeighbourWatch, PacketWatch, Demonstrate, ReadPlaces, TimeLine]
+Request = Union[
+    PageOrder, NeighbourWatch, PacketWatch, Demonstrate, ReadPlaces, PreviewLayout, TimeLine
+]
 
 _REQUESTS: TypeAdapter[Request] = TypeAdapter(
     Annotated[
@@ -230,6 +240,7 @@ _REQUESTS: TypeAdapter[Request] = TypeAdapter(
             PacketWatch,
             Demonstrate,
             ReadPlaces,
+            PreviewLayout,
             TimeLine,
             _Add,
             _Remove,

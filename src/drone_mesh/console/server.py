@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import json
 import logging
 import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Sequence
+from types import MappingProxyType
+from typing import Mapping, Sequence
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -40,7 +42,7 @@ from drone_mesh.console.orders import (
     NeighbourWatch,
     PacketWatch,
     PageOrder,
-    Place,
+    PreviewLayout,
     ReadPlaces,
     TimeLine,
     number_of,
@@ -286,6 +288,8 @@ class ConsoleServer:
             page.packets.wanted = request.on
         elif isinstance(request, ReadPlaces):
             await self._read_places(page, request)
+        elif isinstance(request, PreviewLayout):
+            await self._preview(page, request)
         elif isinstance(request, Demonstrate):
             try:
                 text = self._stage.begin() if request.on else self._stage.end()
@@ -320,7 +324,17 @@ class ConsoleServer:
         except OrderRefused as error:
             await self._answer(page, request.number, False, str(error))
         else:
-            await self._answer(page, request.number, True, "a layout", places)
+            await self._answer(page, request.number, True, "a layout", {"places": places})
+
+    async def _preview(self, page: Page, request: PreviewLayout) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            found = await loop.run_in_executor(self._workers, self._controls.preview, request.case)
+        except OrderRefused as error:
+            await self._answer(page, request.number, False, str(error))
+        else:
+            about = {"preview": dataclasses.asdict(found)}
+            await self._answer(page, request.number, True, found.in_words(), about)
 
     async def _answer(
         self,
@@ -328,11 +342,9 @@ class ConsoleServer:
         number: int | None,
         done: bool,
         text: str,
-        places: Sequence[Place] = (),
+        about: Mapping[str, object] = MappingProxyType({}),
     ) -> None:
-        answer: dict[str, object] = {"type": "answer", "number": number, "done": done, "text": text}
-        if places:
-            answer["places"] = places
+        answer = {"type": "answer", "number": number, "done": done, "text": text, **about}
         # The page may have closed meanwhile.
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
             await self._send(page, json.dumps(answer))

@@ -51,8 +51,21 @@ class _Part:
     reason: str = ""  # of a refusal
     pause_s: float = FIRST_PAUSE_S
     due_s: float = -math.inf  # when to order it next
+    settled: bool = False  # it was connected at its place: a repair may take it elsewhere
     sent_to: Location | None = None  # by an order that it may still follow
     sent_s: float = -math.inf
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether it may still have to be ordered."""
+        return not self.settled if self.state is PartState.ARRIVED else self.state.is_open
+
+    def replace(self) -> None:
+        """The drone has been ordered elsewhere."""
+        if self.state is PartState.ARRIVED:
+            self.settled = True
+        else:
+            self.state = PartState.REPLACED
 
     def send(self, to: Location, now_s: float) -> None:
         """It is being ordered there."""
@@ -153,8 +166,8 @@ class StandingOrders:
         """Another order for these drones followed."""
         for order in self._orders.values():
             for drone in drones:
-                if drone in order.parts and order.parts[drone].state.is_open:
-                    order.parts[drone].state = PartState.REPLACED
+                if drone in order.parts and order.parts[drone].is_followed:
+                    order.parts[drone].replace()
 
     def withdraw(self, number: int) -> StandingProgress | None:
         """Order no drone of this layout any more; returns how far it came. None: unknown."""
@@ -170,14 +183,14 @@ class StandingOrders:
         for order in self._orders.values():
             part = order.parts.get(drone)
             is_older = event.stamp_s < order.given_s - CLOCKS_DIFFER_S
-            if part is None or not part.state.is_open or is_older:
+            if part is None or not part.is_followed or is_older:
                 continue
             if event.kind == MeshEventKind.ORDER_REFUSED.value:
                 part.stay(PartState.REFUSED, words)
             elif event.kind == MeshEventKind.ORDER_SENT.value and not what.endswith(
                 (_to(part.goal), _to(part.sent_to or part.goal))
             ):
-                part.state = PartState.REPLACED
+                part.replace()
 
     def update(
         self,
@@ -191,7 +204,7 @@ class StandingOrders:
         due: dict[int, _Part] = {}
         for order in self._orders.values():
             for drone, part in sorted(order.parts.items(), reverse=True):
-                if not part.state.is_open:
+                if not part.is_followed:
                     continue
                 if self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
                     if part.sent_to is not None:
@@ -240,6 +253,7 @@ class StandingOrders:
             if end.distance_m(_as_ordered(part.goal)) <= AT_PLACE_M:
                 part.stay(PartState.FLYING if flies else PartState.ARRIVED)
                 part.pause_s = FIRST_PAUSE_S
+                part.settled = not flies and (node.connected or node.role == Role.GATEWAY)
                 return False
             is_aside = part.sent_to is not None and end.distance_m(part.sent_to) <= AT_PLACE_M
             if is_aside and not flies:

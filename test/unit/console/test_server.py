@@ -14,6 +14,7 @@ from drone_mesh.console.dots import Dot
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.orders import LayoutOffer
 from drone_mesh.console.server import MOST_PAGES, ConsoleServer
+from drone_mesh.state.formation_preview import FormationPreview
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 from drone_mesh.web import access
 from drone_mesh.web.access import Access
@@ -59,6 +60,9 @@ class PromptControls:
         if case == 9:
             raise OrderRefused("no case 9")
         return "ordered"
+
+    def preview(self, case: int) -> FormationPreview:
+        return FormationPreview(9.0, [14], [], {3: "drone 5 is in the way"}, 0.82)
 
     def speed(self, paused: bool, factor: float) -> str:
         return "done"
@@ -360,6 +364,19 @@ def test_packets_are_shown_only_to_pages_that_want_them_and_look_at_the_present(
         await until("the wish", lambda: server.packets_wanted)
         page.vanish()
         await until("no page wants any", lambda: not server.packets_wanted)
+
+    run(scenario)
+
+
+def test_a_preview_of_a_layout_names_who_would_be_out_of_reach_and_who_would_stay():
+    async def scenario(server: ConsoleServer, _store: FrameStore) -> None:
+        page = FakePage(server).open()
+        page.say(do="preview", number=1, case=0)
+        await until("the answer", lambda: page.of_type("answer"))
+        (answer,) = page.of_type("answer")
+        assert answer["text"].startswith("1 drone would be out of reach: 14; drone 3 would stay: ")
+        assert answer["preview"]["out_of_reach"] == [14]
+        assert answer["preview"]["stays"] == {"3": "drone 5 is in the way"}
 
     run(scenario)
 

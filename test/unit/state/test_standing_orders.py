@@ -93,6 +93,15 @@ def test_a_drone_that_has_arrived_once_is_not_ordered_back_after_a_repair():
     assert orders.update(state(60.0, drone(4, at=HOME), drone(5))) == [(5, NORTH)]
 
 
+def test_a_drone_that_found_no_mesh_at_its_place_is_ordered_back_once_it_is_connected():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    orders.update(state(0.0, drone(4), drone(5)))
+    orders.update(state(9.0, drone(4, at=EAST, connected=False), drone(5, connected=False)))
+    repaired = drone(4, at=Location(latitude=-6.0, longitude=0.0, height=0.0))
+    assert orders.update(state(60.0, repaired, drone(5, connected=False))) == [(4, EAST)]
+
+
 def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
     orders = StandingOrders()
     orders.give(7, {4: EAST, 5: EAST}, now_s=0.0)

@@ -31,11 +31,14 @@ from drone_mesh.srv import (
     OrderLayoutRequest,
     PowerSwitch,
     PowerSwitchRequest,
+    PreviewLayout,
+    PreviewLayoutRequest,
     RemoveDrone,
     RemoveDroneRequest,
     SetSpeed,
     SetSpeedRequest,
 )
+from drone_mesh.state.formation_preview import FormationPreview
 
 log = logging.getLogger(__name__)
 
@@ -63,6 +66,18 @@ class RosControls:
         if not (answer.sent or answer.later):
             raise OrderRefused(f"layout {case}: {answer.message}")
         return f"layout {case}: {answer.message}"
+
+    def preview(self, case: int) -> FormationPreview:
+        """What would happen if this layout were ordered now."""
+        request = PreviewLayoutRequest(caseID=case)
+        answer = _call(names.PREVIEW_LAYOUT_SERVICE, PreviewLayout, request)
+        return FormationPreview(
+            answer.duration,
+            list(answer.out_of_reach),
+            list(answer.cut_off),
+            dict(zip(answer.stay, answer.reasons)),
+            answer.least_connected,
+        )
 
     def speed(self, paused: bool, factor: float) -> str:
         """Pause or resume simulated time, or change its speed."""
