@@ -403,15 +403,16 @@ class Sequence(Part):
     It replaces layout, loss, faults and duration_s.
     """
 
-    INCIDENTS: ClassVar[Tuple[str, ...]] = (
+    DEATHS: ClassVar[Tuple[str, ...]] = (
         "cut_vertex_killed", "many_killed", "gateway_off", "gateway_moved",
         "killed_in_negotiation", "killed_in_flight",
     )  # fmt: skip
+    INCIDENTS: ClassVar[Tuple[str, ...]] = (*DEATHS, "silent_for_a_while", "links_cut")
 
     drones: Annotated[List[NodeId], Field(min_length=2, max_length=2)] = [8, 60]  # least, most
     density: Annotated[List[Above0], Field(min_length=2, max_length=2)] = [7.0, 9.0]
     """Least and most neighbours of a drone far from the edge."""
-    incidents: List[str] = list(INCIDENTS)
+    incidents: List[str] = list(DEATHS)
 
     @field_validator("incidents")
     @classmethod

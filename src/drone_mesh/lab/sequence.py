@@ -10,6 +10,7 @@ from typing import Callable, Iterator, Mapping
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.repair.options import DEFAULT_REPAIR
 from drone_mesh.errors import ConfigurationError
+from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.network_sample import physical_graph
 from drone_mesh.lab.record import RunRecord
 from drone_mesh.lab.scenario import Layout, Radio, Scenario, Sequence
@@ -126,6 +127,32 @@ class SequenceRun(Simulation):
     def _killed_in_flight(self) -> Times:
         yield from self._cut_vertex_killed()
         yield from self._killed_at(MeshEventKind.FLIGHT_DECIDED, self._rng.uniform(0.0, 4.0))
+
+    def _silent_for_a_while(self) -> Times:
+        """One to three antennas are off for a while; their drones still hang there."""
+        rng, alive = self._rng, self._alive()
+        vertices = physical_graph(self.network).cut_vertices([GATEWAY])
+        silent = rng.sample(alive, min(rng.randint(1, 3), len(alive) - 1))
+        if vertices and rng.random() < 0.7:
+            silent = sorted({rng.choice(vertices), *silent[:1]})
+        with self.timeline.disruption("silent", silent):
+            for node in silent:
+                self.network.power(node, False)
+        yield from self._passing(rng.uniform(20.0, 200.0))
+        for node in silent:
+            self.network.power(node, True)
+
+    def _links_cut(self) -> Times:
+        """One to three links to next hops fail for good; the drones are as near as before."""
+        network, air = self.network, self.network.air
+        assert isinstance(air, InProcessAir)
+        paths = [network.path_to_gateway(node) or [] for node in self._alive()]
+        links = [path[:2] for path in paths if len(path) > 1]
+        chosen = self._rng.sample(links, min(len(links), self._rng.randint(1, 3)))
+        with self.timeline.disruption("cut", sorted({node for link in chosen for node in link})):
+            for one, other in chosen:
+                air.cut(one, other)
+        return iter(())
 
     def _killed_at(self, kind: MeshEventKind, after_s: float) -> Times:
         """Kill the first router with an event of this kind, shortly after it."""

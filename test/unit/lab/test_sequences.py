@@ -8,7 +8,7 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.metrics.harm import harm, left_able
+from drone_mesh.lab.metrics.harm import harm, left_able, resting_close
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.sequence import SequenceRun, run_sequence
@@ -27,6 +27,15 @@ def test_no_sequence_ends_with_stacked_drones_or_a_needless_flight_or_a_node_giv
     assert harmed == []
 
 
+@pytest.mark.parametrize("number", range(10))
+def test_no_drone_rests_at_the_place_of_one_that_was_silent_or_lost_a_link(number):
+    incidents = ["silent_for_a_while", "links_cut"]
+    content = {"sequence": {"incidents": incidents, "drones": [8, 14]}, "sample_s": 2}
+    record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
+    assert {item.action for item in record.happened} & {"silent", "cut"}
+    assert resting_close(record) == 0
+
+
 @pytest.mark.parametrize("number", range(8))
 def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
     content = {"sequence": {"incidents": ["gateway_moved"], "drones": [8, 30]}, "sample_s": 2}
@@ -37,7 +46,7 @@ def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
 
 def test_the_same_seed_gives_the_same_run_in_an_experiment():
     loaded = load_experiment(SUITE, ["seeds=1", "base.sequence.drones=[8, 12]"])
-    dense, sparse = Plan(loaded)
+    dense, _, sparse, _ = Plan(loaded)
     outcome = execute(dense.spec)
     assert (outcome.failure, outcome.values["harm"]) == ("", 0.0)
     assert execute(dense.spec).event_hash == outcome.event_hash

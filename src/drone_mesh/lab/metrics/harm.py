@@ -24,7 +24,9 @@ def harm(run: RunRecord) -> float:
     return float(any(count(run) for count in kinds))
 
 
-@metric("", "pairs of live drones at rest nearer than 0.5 m at the end", better="less")
+@metric(
+    "", "pairs of live drones at rest nearer than 1 m (the clearance) at the end", better="less"
+)
 def resting_close(run: RunRecord) -> float:
     at_rest = sorted(run.end.graph.near.keys() - run.in_the_air)
     return float(
