@@ -25,7 +25,7 @@ def harm(run: RunRecord) -> float:
 
 
 @metric(
-    "", "pairs of live drones at rest nearer than 1 m (the clearance) at the end", better="less"
+    "", "pairs of live drones at rest nearer than the clearance, 1 m, at the end", better="less"
 )
 def resting_close(run: RunRecord) -> float:
     at_rest = sorted(run.end.graph.near.keys() - run.in_the_air)
