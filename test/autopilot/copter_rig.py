@@ -20,6 +20,7 @@ ORIGIN = Origin(52.0907, 5.1214, 3.0)
 ALL = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)
 LIMITS = FlightLimits(speed_m_s=5.0, cruise_height_m=6.0, layer_m=1.0)
 FLIGHT_S = 150.0
+REPORTED_WITHIN_S = 5.0
 
 
 class LossyLine:
@@ -145,9 +146,12 @@ class CopterRig:
         away_m = self.engine.get_location().distance_m(goal)
         if away_m > 1.6:
             return f"{away_m:.1f} m from its goal"
-        if goal.height == 0.0 and (self.pilot.armed or not self.engine.status().on_ground):
-            return "not on the ground and disarmed"
+        if goal.height == 0.0:  # its pilot may hear of that later
+            self.pilot.until("on the ground and disarmed", self._is_down, REPORTED_WITHIN_S)
         return ""
+
+    def _is_down(self) -> bool:
+        return bool(self.engine.status().on_ground) and not self.pilot.armed
 
     def bring_down(self) -> None:
         """The pilot lands it and gives it back."""

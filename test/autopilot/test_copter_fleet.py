@@ -151,7 +151,7 @@ class Fleet:
         def is_over() -> bool:
             orders = (self.ask("orders") or {"orders": []})["orders"]
             latest.update([o for o in orders if o["drone"] == node][-1:][0])
-            return latest["state"] not in ("asked", "under way")
+            return latest["state"] in ("refused", "given up", "arrived", "no route")
 
         self.until(f"the order for {node} is over", is_over)
         return f"{latest['state']}: {latest['reason']}"

@@ -128,7 +128,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self.complaints.add("a neighbour has another origin", f"node {creator}", now_s)
         if kind in TYPES_WITH_PLACES and self._frame.refuses(from_):
             self._drop("a place from a node with another or an unknown origin", payload)
-            if kind == _MOVE_TO_LOCATION and forward == me:
+            # From a neighbour that has not introduced itself yet, the order is only dropped: its
+            # gateway repeats it.
+            if kind == _MOVE_TO_LOCATION and forward == me and self._frame.is_foreign(from_):
                 order = messages.GoToLocationMessage.from_payload(payload)
                 self._orders.on_foreign_order(order, messages.order_number(payload), from_)
             return

@@ -31,3 +31,7 @@ class CommonFrame:
         neighbour that has not introduced itself has no origin either.
         """
         return self._of.get(from_, NO_FRAME) != self.digest
+
+    def is_foreign(self, from_: int) -> bool:
+        """Whether this neighbour has introduced itself with another frame."""
+        return from_ in self._of and self.refuses(from_)

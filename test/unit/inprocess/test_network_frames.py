@@ -60,8 +60,23 @@ def test_an_order_across_the_border_is_refused_and_the_gateway_is_told_why(two_f
     network.run_for(5.0)
     (order,) = network.nodes[0].component.get_orders()
     assert order.state is OrderState.REFUSED
-    assert order.reason == "node 1, which passed the order on, has another or an unknown --origin"
+    assert order.reason == "node 1, which passed the order on, has another --origin"
     assert network.nodes[2].drone.path is None
+
+
+def test_an_order_that_comes_before_the_introduction_is_repeated_and_flown(monkeypatch):
+    monkeypatch.setattr(InProcessDrone, "frame_digest", lambda self: ONE)
+    network = line(1, spacing=6.0)
+    network.run_for(60.0)
+    frame = network.nodes[1].component._frame
+    frame._of.clear()  # the PRESENT of the gateway was lost
+    assert network.order(1, 1.0, 1.0)
+    network.run_for(1.0)
+    assert network.nodes[1].drone.path is None
+    frame.heard(0, ONE)
+    network.run_for(30.0)
+    (order,) = network.nodes[0].component.get_orders()
+    assert order.state is OrderState.ARRIVED
 
 
 def test_a_mesh_with_one_origin_is_repaired_as_usual(monkeypatch):

@@ -88,7 +88,7 @@ class OrderIntake:
     def on_foreign_order(self, order: GoToLocationMessage, number: int, passed_by: int) -> None:
         """An order from a neighbour whose places may refer to another frame: not flown."""
         foreign = _KnownOrder(order.creator, number, order.location, OrderOutcome.REFUSED)
-        reason = f"node {passed_by}, which passed the order on, has another or an unknown --origin"
+        reason = f"node {passed_by}, which passed the order on, has another --origin"
         if number and self._find(order.creator, number) is None:
             self._remember(foreign)
         self._reply(foreign, OrderOutcome.REFUSED, reason)
