@@ -69,7 +69,11 @@ class Departures:
             if len(node.path):
                 path = list(node.path)
                 ahead = [path[corner : corner + 3] for corner in range(0, len(path), 3)]
-                self._airspace.add_flying([node.position, *ahead])
+                way = [list(node.position), *ahead]
+                if rules.sway_m:  # it may be behind its path, and climbs before it goes across
+                    high_m = max(corner[2] for corner in way)
+                    way = [way[0], *([*corner[:2], high_m] for corner in way), way[-1]]
+                self._airspace.add_flying(way)
                 self._ends[node.id] = Location.from_vector(ahead[-1])
             else:
                 self._airspace.add_resting(node.id, node.position)
