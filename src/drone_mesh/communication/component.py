@@ -130,9 +130,11 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._drop("a place from a node with another or an unknown origin", payload)
             # From a neighbour that has not introduced itself yet, the order is only dropped: its
             # gateway repeats it.
-            if kind == _MOVE_TO_LOCATION and forward == me and self._frame.is_foreign(from_):
+            if kind == _MOVE_TO_LOCATION and self._frame.is_foreign(from_):
                 order = messages.GoToLocationMessage.from_payload(payload)
-                self._orders.on_foreign_order(order, messages.order_number(payload), from_)
+                orders = self._orders
+                tell = orders.on_foreign_order if forward == me else orders.on_foreign_passage
+                tell(order, messages.order_number(payload), from_)
             return
         if forward != me and forward != BROADCAST:
             if kind == _LOCATION:

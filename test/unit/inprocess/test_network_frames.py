@@ -79,6 +79,16 @@ def test_an_order_that_comes_before_the_introduction_is_repeated_and_flown(monke
     assert order.state is OrderState.ARRIVED
 
 
+def test_the_gateway_learns_which_relay_dropped_an_order_because_of_another_origin(two_frames):
+    network = line(3, spacing=6.0)
+    network.run_for(60.0)
+    assert network.order(3, 1.0, 1.0)  # node 2 takes no places from node 1
+    network.run_for(40.0)
+    (order,) = network.nodes[0].component.get_orders()
+    assert order.state is OrderState.LOST_CONTACT
+    assert order.reason.endswith("node 2 dropped the order: node 1 has another --origin")
+
+
 def test_a_mesh_with_one_origin_is_repaired_as_usual(monkeypatch):
     monkeypatch.setattr(InProcessDrone, "frame_digest", lambda self: ONE)
     network = line(2, spacing=8.0)

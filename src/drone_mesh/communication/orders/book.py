@@ -67,6 +67,8 @@ class _Order:
     heard_s: float = 0.0  # when the drone last reported about it, or when it was ordered
     settled: bool = False  # the drone itself has reported the outcome
     reason_parts: TextAssembly = field(default_factory=TextAssembly)
+    dropped: str = ""  # why a relay says that it has dropped the order
+    dropped_parts: TextAssembly = field(default_factory=TextAssembly)
 
 
 class OrderBook:
@@ -154,7 +156,12 @@ class OrderBook:
     def on_reply(self, drone: int, reply: OrderReply) -> None:
         """A part of a drone's reply; acts when the last missing part has arrived."""
         order = self._orders.get(reply.number)
-        if order is None or order.drone != drone:
+        if order is None:
+            return
+        if order.drone != drone:  # a relay; its word alone decides nothing
+            why = order.dropped_parts.add(reply.part, reply.text)
+            if why is not None and reply.outcome is OrderOutcome.REFUSED:
+                order.dropped = f"node {drone} dropped the order: {why}"
             return
         reason = order.reason_parts.add(reply.part, reply.text)
         if reason is not None:
@@ -192,7 +199,7 @@ class OrderBook:
         order.unanswered += 1
         if order.state is OrderState.SENT:
             if order.unanswered >= len(REPEAT_AFTER_S):
-                self._lost(order, "it did not reply")
+                self._lost(order, order.dropped or "it did not reply")
                 return
             self._send_if_routed(order, self._packet(order))
             again_s = self._stretched(REPEAT_AFTER_S[order.unanswered])

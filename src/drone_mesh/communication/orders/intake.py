@@ -93,6 +93,14 @@ class OrderIntake:
             self._remember(foreign)
         self._reply(foreign, OrderOutcome.REFUSED, reason)
 
+    def on_foreign_passage(self, order: GoToLocationMessage, number: int, passed_by: int) -> None:
+        """An order for another drone, dropped here for the same reason: tell its gateway."""
+        if number:
+            reason = f"node {passed_by} has another --origin"
+            me, gateway = self._parts.node_id, order.creator
+            for packet in reply_packets(number, OrderOutcome.REFUSED, reason, me, gateway):
+                self._parts.delivery.send_own(packet)
+
     def on_query(self, gateway: int, number: int) -> None:
         """A gateway queries the state of an order."""
         known = self._find(gateway, number)
