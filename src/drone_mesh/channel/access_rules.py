@@ -14,7 +14,7 @@ class AccessRules:
     tries: int  # of one packet
     retransmits: int  # by the chip itself, in each try
     retransmit_delays: tuple[int, int]  # settings of ARD, from..to; a random one for each try
-    tries_when_silent: int  # of one packet for a receiver that let the last one fail
+    tries_when_silent: int  # of one packet for a receiver that let the last one fail or is silent
     first_pause_s: float  # mean pause after the first try; doubles with each further one
     longest_pause_s: float  # mean pause, at most
     gap_s: float  # mean distance between two packets of one node
@@ -29,6 +29,7 @@ class AccessRules:
     answer_jitter_s: float  # so does any packet within this time after a broadcast was heard
     lifetime_s: float  # a packet that waited for this time is no longer useful
     still_there_s: float  # a node that was heard within this time counts as present
+    perhaps_gone_s: float  # a node that was not heard within this time may be gone
     queue_length: int  # packets that may wait, in total
     data_queue_length: int  # of these: users' packets
     most_patience: float  # check periods without probes on a busy channel, at most
@@ -56,6 +57,7 @@ class AccessRules:
             answer_jitter_s=60 * cycle_s,
             lifetime_s=max(10.0, 3800 * cycle_s),
             still_there_s=max(5.0, 1900 * cycle_s),
+            perhaps_gone_s=max(10.5, 4000 * cycle_s),
             queue_length=300,
             data_queue_length=120,
             most_patience=2.5,

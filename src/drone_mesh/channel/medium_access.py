@@ -23,7 +23,8 @@ module has those rules, without chips, threads and clocks. The driver and the fa
    relay that forwarded its packets now would not hear the rest of the train. Packets in a back-off
    for the sender of the train are sent right after it, because that node listens then.
 6. Each receiver has its own queue, so that waiting for one does not delay the others. A receiver
-   that did not acknowledge a packet, and was not heard since, gets fewer tries for the next one.
+   that did not acknowledge a packet, and was not heard since, gets fewer tries for the next one; so
+   does one that has been silent for longer than nodes of a mesh at rest are.
 """
 
 from __future__ import annotations
@@ -185,10 +186,13 @@ class MediumAccess:
             counts["acknowledged"] += 1
             self._learn(packet.tries > 1)
             self._silent.discard(receiver)
+            self._heard_s[receiver] = now_s
             self._queue.remove(packet)
             return Fate.DELIVERED
-        most = rules.tries_when_silent if receiver in self._silent else rules.tries
-        if packet.tries >= most or now_s - packet.queued_s > rules.lifetime_s:
+        if (
+            packet.tries >= self._most_tries(receiver, now_s)
+            or now_s - packet.queued_s > rules.lifetime_s
+        ):
             counts["sent"] += 1
             counts["lost"] += 1
             if self._heard_s.get(receiver, -math.inf) > packet.queued_s - rules.still_there_s:
@@ -198,6 +202,13 @@ class MediumAccess:
             return Fate.GIVEN_UP
         packet.not_before_s = now_s + self._pause_s(packet.tries)
         return Fate.WAITS
+
+    def _most_tries(self, receiver: int, now_s: float) -> int:
+        """Few for a receiver that may be gone: it let a packet fail, or is silent for long."""
+        rules = self.rules
+        silent_s = now_s - self._heard_s.get(receiver, now_s)
+        gone = receiver in self._silent or silent_s > rules.perhaps_gone_s
+        return rules.tries_when_silent if gone else rules.tries
 
     def figures(self) -> dict[str, Any]:
         """Packets by outcome, and the state of the queue, as in RadioStatistics."""

@@ -203,6 +203,21 @@ def test_a_broadcast_and_the_answers_to_one_are_spread():
     assert access.next_try_s > 1.0
 
 
+@pytest.mark.parametrize(
+    ("silent_s", "tries"), [(1.0, RULES.tries), (60.0, RULES.tries_when_silent)]
+)
+def test_a_receiver_that_may_be_gone_gets_few_tries(silent_s, tries):
+    access = MediumAccess(RULES, random.Random(1))
+    access.heard(7, 0.0)
+    access.offer(7, PACKET, silent_s)
+    now_s, tried = silent_s, 0
+    while len(access):
+        now_s = max(now_s, access.next_try_s)
+        access.tried(access.due(now_s), False, now_s)
+        tried += 1
+    assert tried == tries
+
+
 @pytest.mark.parametrize("asked", Priority)
 @pytest.mark.parametrize("sent", Priority)
 def test_only_answers_wait_after_a_broadcast(asked, sent):

@@ -148,12 +148,22 @@ class GatewayConnection:
     def on_route_lost(self) -> None:
         """A route failed. If it was the only one to the gateway, look for another one at once.
 
-        On a medium that is not shared, the next check is soon enough.
+        First through the neighbour that presented itself as nearest to a gateway. On a medium that
+        is not shared, the next check is soon enough.
         """
         medium = self._parts.antenna.medium
         if medium.shared and self._states.connected and self.next_hop() == NO_ROUTE:
+            another = self.another_next_hop(NO_ROUTE)
+            if another != NO_ROUTE:
+                self._parts.routing.other_can_communicate_with_node(another, self.gateway)
             self._heartbeat_sent_s = -math.inf
             self.send_heartbeat()
+
+    def another_next_hop(self, but: int) -> int:
+        """A neighbour that may lead to the gateway, not `but`; NO_ROUTE: none is known."""
+        if not self._parts.routing.TAKES_SHORTCUTS:
+            return NO_ROUTE
+        return self._detours.nearest(but, self.hops, self._parts.now_s)
 
     # Reports of neighbours and gateways ------------------------------------------------------
 

@@ -43,8 +43,12 @@ class Delivery(IDelivery):
         attempts: int,
         report: NodeReport,
         on_neighbour_lost: Callable[[int], None],
+        another_next_hop: Callable[[int, int], int],
     ) -> None:
-        """`attempts`: failed transmissions after which the receiver counts as lost."""
+        """`attempts`: failed transmissions after which the receiver counts as lost.
+
+        `another_next_hop` returns a neighbour to try for a node, not the one given, or NO_ROUTE.
+        """
         self._node_id = node_id
         self._antenna = antenna
         self._shared = antenna.medium.shared
@@ -54,6 +58,7 @@ class Delivery(IDelivery):
         self._attempts = attempts
         self._report = report
         self._on_neighbour_lost = on_neighbour_lost
+        self._another_next_hop = another_next_hop
         self._reported_s: dict[int, float] = {}  # shared medium: when each was announced
         self._gave_up: set[int] = set()  # neighbours that were heard but took no packets
         self._strangers = Strangers()
@@ -134,6 +139,8 @@ class Delivery(IDelivery):
             self._gave_up.discard(to)
             self._neighbour_lost(to, NO_ROUTE)
         detour = self._routing.get_direction_to_node(other)
+        if detour in (NO_ROUTE, to) and other != to:
+            detour = self._another_next_hop(other, to)
         if detour in (NO_ROUTE, to):
             return False
         return self.send(messages.readdressed(payload, detour), detour)

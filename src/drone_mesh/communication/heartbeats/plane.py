@@ -14,7 +14,7 @@ from drone_mesh.communication.heartbeats.forwarding import Forwarding
 from drone_mesh.communication.heartbeats.introduction import Introduction
 from drone_mesh.communication.heartbeats.node_search import NodeSearch
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
-from drone_mesh.communication.interfaces import BROADCAST
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
@@ -41,6 +41,7 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
             basics.timing.send_attempts,
             basics.report,
             self._on_neighbour_lost,
+            self._another_next_hop,
         )
         self._forwarding = Forwarding(
             basics.node_id,
@@ -115,6 +116,8 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         """`creator` reports that it cannot reach a node."""
         missing = messages.MissingMessage.from_payload(payload).missing
         if missing != self._parts.node_id:
+            if missing == self.gateway:
+                self._neighbours.set_hops(creator, NO_ROUTE)
             self._delivery.forget_route(creator, missing, from_)
             self._after_missing(missing)
 
@@ -136,6 +139,10 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
 
     def _on_neighbour_lost(self, node: int) -> None:
         """A neighbour did not take a packet; the routes are already updated."""
+
+    def _another_next_hop(self, node: int, but: int) -> int:
+        """A neighbour to try for `node`, not `but`, beside those that the routes know."""
+        return NO_ROUTE
 
     # For the routing technique ---------------------------------------------------------------
 

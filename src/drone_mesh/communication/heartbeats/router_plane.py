@@ -21,6 +21,7 @@ from drone_mesh.communication.router_states import (
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 
 _HEARTBEAT = int(MessageType.HEARTBEAT)
+CHANGE_PERIODS = 0.3  # our choice: until the check after a neighbour was lost, on average
 
 
 class RouterHeartbeats(HeartbeatPlane):
@@ -151,6 +152,19 @@ class RouterHeartbeats(HeartbeatPlane):
     def _after_missing(self, missing: int) -> None:
         self._connection.on_route_lost()
 
+    def _check_soon(self) -> None:
+        """Its surroundings change, so the next check comes sooner; at rest, once a period."""
+        if self._antenna.medium.shared and self._states.connected:
+            share = CHANGE_PERIODS * (0.5 + self._parts.rng.random())
+            soon_s = self._deadlines.now_s + share * self._parts.timing.check_period_s
+            self._deadlines.set(Due.CHECK, min(soon_s, self._deadlines.get(Due.CHECK)))
+
+    def _another_next_hop(self, node: int, but: int) -> int:
+        if node != self.gateway:
+            return NO_ROUTE
+        return self._connection.another_next_hop(but)
+
     def _on_neighbour_lost(self, node: int) -> None:
+        self._check_soon()
         self._connection.on_route_lost()
         self._host.on_neighbour_lost(node)

@@ -551,6 +551,52 @@ def test_a_router_whose_only_route_is_gone_asks_around_at_once():
     assert packet("01 01 03 fe fe 02 00") in rig.broadcasts()
 
 
+PRESENT_OF_3 = "03 03 03 01 fe 01 01"  # one hop from its gateway, as node 2 is
+
+
+def test_a_packet_for_the_gateway_that_a_hop_does_not_take_goes_through_another_neighbour():
+    rig = shared_rig()
+    rig.antenna.medium = replace(rig.antenna.medium, silence_s=3.0)
+    rig.connect_through(2)
+    rig.hear(PRESENT_OF_3)
+    rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, rig.now_s)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00")]
+
+
+def test_a_packet_goes_through_no_neighbour_that_is_farther_from_the_gateway():
+    rig = shared_rig()
+    rig.antenna.medium = replace(rig.antenna.medium, silence_s=3.0)
+    rig.connect_through(2)
+    rig.hear("03 03 03 01 fe 03 01")
+    rig.mesh.on_undelivered(packet("01 01 04 02 00 01 00"), 9, rig.now_s)
+    assert rig.sent(HEARTBEAT) == []
+
+
+def test_a_router_whose_next_hop_lost_the_gateway_asks_through_another_neighbour():
+    """Node 2 presented itself before, so its hops count no longer."""
+    rig = shared_rig()
+    rig.connect_through(2)
+    rig.hear("02 02 03 01 fe 01 01", PRESENT_OF_3, "02 02 05 01 01 00")
+    assert rig.mesh.get_connected_to_gateway()
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 03 00 01 00")]
+
+
+def test_after_the_loss_of_a_neighbour_the_next_check_comes_soon_and_then_once_a_period():
+    """AlwaysHalf: 3 s later."""
+    rig = shared_rig()
+    rig.connect_through(2)
+    rig.know_neighbour(7)
+    rig.wait_until(6.0)
+    rig.mesh.control.neighbour_leaves(7)
+    rig.broadcasts()
+    checks = []
+    for second in range(7, 31):
+        rig.wait_until(second)
+        rig.hear("00 02 04 01 01 01 00 01")  # the gateway answers
+        checks += [second] * any(sent[2] == PRESENT for sent in rig.broadcasts())
+    assert checks == [9, 19, 29]
+
+
 def test_a_neighbour_that_was_just_heard_is_not_probed():
     """At the checks after 5 and 15 s; node 3 is heard 4 s before the second one, node 4 is not."""
     rig = shared_rig()
