@@ -78,6 +78,9 @@ def test_axe_finds_no_violation(start_console, visit, scheme, size):
         check(page, "save and load")
         keyboard.press("Escape")
     page.page.click("#demonstrate")
+    page.wait_for("the question before it", lambda: page.page.is_visible("#confirm"))
+    check(page, "the question before a demonstration")
+    page.page.click("#confirm >> text=Show it")
     page.wait_for("the story", lambda: page.page.is_visible("#story-card"))
     check(page, "a demonstration")
 

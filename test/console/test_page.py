@@ -225,8 +225,13 @@ def test_the_tab_key_reaches_every_control_and_arrows_and_enter_do_the_rest(page
     page.wait_for("the present", lambda: not page.page.is_visible("#past"))
     page.page.focus("#demonstrate")
     keyboard.press("Enter")
-    page.wait_for("a story", lambda: page.page.is_visible("#story-card"))
+    page.wait_for("a question", lambda: page.page.is_visible("#confirm"))
+    page.page.focus("#confirm [value=yes]")
     keyboard.press("Enter")
+    page.wait_for("a story", lambda: page.page.is_visible("#story-card"))
+    assert page.page.evaluate("document.activeElement.id") == "demonstrate"
+    for _ in range(2):  # put back, and at once
+        keyboard.press("Enter")
     page.wait_for("its end", lambda: page.page.inner_text("#demonstrate") == "Show a repair")
 
 
@@ -353,6 +358,34 @@ def test_a_node_that_is_found_comes_into_view(page):
             and box["y"] < on_screen(page, *PLACES[17])[1] < box["y"] + box["height"]
         ),
     )
+
+
+def test_the_map_fits_again_when_a_drone_leaves_it_unless_the_user_has_moved_it(page):
+    def scale() -> float:
+        return float(page.page.get_attribute("#map-note", "data-scale"))
+
+    before = scale()
+    page.page.select_option("#speed", "10")
+    page.page.click("#nodes tr[data-id='17']")
+    page.page.fill("#fly-x", "60")
+    page.answer_held("#held-now")
+    page.page.press("#fly-x", "Enter")
+    page.wait_for("a wider view", lambda: scale() < 0.8 * before)
+    assert page.drawn("outside") == 0
+    for _ in range(3):
+        page.page.click("#zoom-in")
+    page.wait_for("marks of drones outside", lambda: page.drawn("outside") > 0)
+    zoomed = scale()
+    page.wait_for("17 arrived", lambda: abs(float(page.row(17, 10)) - 60.0) < 0.2)
+    assert scale() == zoomed
+
+
+def test_a_drone_under_the_pointer_says_what_it_is_and_does(page):
+    page.page.mouse.move(*on_screen(page, *PLACES[14]))
+    page.page.mouse.move(*on_screen(page, *PLACES[9]), steps=3)
+    page.wait_for("a label", lambda: page.page.inner_text("#hover") == "Router 9, connected")
+    page.page.mouse.move(*on_screen(page, 3.0, 3.0))
+    page.wait_for("no label", lambda: not page.page.is_visible("#hover"))
 
 
 def test_many_events_and_ids_are_only_a_few_tab_stops(page):

@@ -1,11 +1,15 @@
 """RepairDemonstration: arranges a repair that a viewer can follow sentence by sentence.
 
 Five routers form layout 202 of 2019, scaled to the range of the radios: a chain of two, and behind
-it a group of three. Then the second router of the chain is switched off.
+it a group of three. Then the second router of the chain is switched off. It begins with any fleet,
+and puts it back as it was.
 """
 
 from __future__ import annotations
 
+import contextlib
+import math
+from dataclasses import dataclass
 from typing import Callable, Dict, Generator, List, Sequence, Tuple
 
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -17,17 +21,68 @@ from drone_mesh.state.repair_story import RepairStory, and_
 
 Order = Callable[[MeshControls], object]
 Script = Generator[List[Order], MeshStatus, None]
-Places = Dict[int, Tuple[float, float, float]]  # node -> x y z, m
+Returning = Generator[List[Order], MeshStatus, MeshStatus]
+Place = Tuple[float, float, float]  # x y z, m
+Places = Dict[int, Place]  # by node
 
 # x, y from the gateway, in ranges of the radio: first the chain, then the group that loses it.
 _PLACES = ((0.0, 4 / 9), (0.0, 12 / 9), (0.0, 18 / 9), (4 / 9, 15 / 9), (-3 / 9, 15 / 9))
 _CHAIN = 2  # routers; the last of them is switched off
-_READY_WITHIN_S = 120.0  # simulated, as all that follows: all connected at their places
+_TURNS = ((1, 0), (-1, 0), (0, 1), (0, -1))  # cosine and sine: ways in which the chain may point
+_FREE_M = 1.5  # our choice: between its places and the drones that only watch
+_READY_WITHIN_S = 300.0  # simulated, as all that follows: a fleet may have to repair itself first
+_ORDER_AGAIN_S = 5.0  # our choice: a drone that had no route may have one then
 _SETTLE_S = 25.0  # two default check periods: each node has asked for its next hop's position
 _REPAIR_WITHIN_S = 240.0
+_AT_PLACE_M = 0.5  # our choice
 # Simulated seconds per second: waiting is sped up, and brief events are slowed down.
 _FAST, _WAITING, _BIDDING, _FLYING = 5.0, 3.0, 0.2, 0.5
 _SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss what follows
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Who takes part in a demonstration, and what the fleet was like before it."""
+
+    gateway: int
+    cast: Sequence[int]  # five routers: the chain, and the group behind it
+    places: Places  # of the cast
+    resting: Sequence[int]  # the other nodes that are on: they are switched off meanwhile
+    homes: Places  # of all routers that can fly
+    was_off: Sequence[int]  # of the cast
+
+    @classmethod
+    def of(cls, mesh: MeshStatus) -> Plan:
+        """Choose the routers with the shortest routes. Raises OrderRefused if there are too few."""
+        known = [node for node in mesh.nodes if position_is_known(node)]
+        gateways = [node for node in known if node.role == Role.GATEWAY and node.on]
+        able = [n for n in known if n.role == Role.ROUTER and not (n.why_not_fly or n.crashed)]
+        if not gateways or len(able) < len(_PLACES):
+            raise OrderRefused(
+                f"this demonstration needs a gateway and {len(_PLACES)} routers that can fly"
+            )
+        able.sort(key=lambda node: (not node.connected, node.hops, node.id))
+        cast = sorted(node.id for node in able[: len(_PLACES)])
+        others = [node for node in known if node.id not in cast]
+        resting = [n.id for n in mesh.nodes if n.on and n.id not in (gateways[0].id, *cast)]
+        goals = {n.id: n.path[-3:] if len(n.path) else n.position for n in able}
+        return cls(
+            gateways[0].id,
+            cast,
+            dict(zip(cast, _free_places(gateways[0], mesh.max_distance, others))),
+            resting,
+            {node: _rounded(goal) for node, goal in goals.items()},
+            [node.id for node in able if node.id in cast and not node.on],
+        )
+
+    def in_words(self) -> str:
+        """What it will do, before the user agrees."""
+        rest = f", and switches {len(self.resting)} others off" if self.resting else ""
+        return (
+            f"This sends drones {and_(self.cast)} to places beside gateway {self.gateway}{rest}. "
+            f"Then it switches {self.cast[_CHAIN - 1]} off, and the mesh repairs itself. You can "
+            "end it at any moment: it switches everything on again and sends all drones back."
+        )
 
 
 class RepairDemonstration:
@@ -35,18 +90,19 @@ class RepairDemonstration:
 
     def __init__(self) -> None:
         self.story = RepairStory()
+        self.plan: Plan | None = None  # from the first state on
+        self.is_over = False
+        self.is_leaving = False  # it puts everything back
         self._script: Script = self._play()
         next(self._script)
         self._factor = 0.0  # ordered last; 0: none
         self._factor_before = 0.0
-        self._resting: list[int] = []  # nodes switched off so that only five take part
         self._describes_repair = False  # flights before the repair also look like losses
-        self.is_over = False
 
     def advance(self, mesh: MeshStatus) -> list[Order]:
-        """The orders due in this state of the mesh. Raises OrderRefused if it cannot continue.
+        """The orders due in this state of the mesh.
 
-        Once it is over, only `leave` returns further orders.
+        Raises OrderRefused if it cannot continue; then, and whenever it shall end, call `leave`.
         """
         if self._describes_repair:
             self.story.update(mesh)
@@ -56,67 +112,62 @@ class RepairDemonstration:
             self.is_over = True
             return []
 
-    def leave(self) -> list[Order]:
-        """The orders that undo its changes: the speed, and the drones that were switched off."""
-        orders = [_power(node_id, True) for node_id in self._resting]
-        if self._factor:
-            orders.append(_speed(self._factor_before))
-        return orders
+    def leave(self, why: str, now_s: float) -> None:
+        """From now on put everything back: power, places and speed."""
+        self.story.add(f"Not finished: {why}", now_s)
+        self._script = self._put_back()
+        next(self._script)
+
+    def power_back(self) -> list[Order]:
+        """The orders that at least leave no drone dark, if there is no time for flights."""
+        if self.plan is None:
+            return []
+        orders = [_power(node, True) for node in (*self.plan.resting, *self.plan.cast)]
+        return [*orders, *([_speed(self._factor_before)] if self._factor else [])]
 
     def _play(self) -> Script:
         mesh = yield []
         self._factor_before = mesh.real_time_factor
-        gateway, cast = _choose_cast(mesh)
-        chain, group = cast[:_CHAIN], cast[_CHAIN:]
+        self.plan = plan = Plan.of(mesh)
+        chain, group = plan.cast[:_CHAIN], plan.cast[_CHAIN:]
         lost = chain[-1]
-        orders = self._cast_orders(mesh, gateway, cast)
-        mesh = yield [*orders, *self._at_pace(_FAST)]
-        mesh = yield from self._until(
-            mesh, "the drones are not all connected", _READY_WITHIN_S, lambda m: _ready(m, cast)
-        )
         self.story.add(
             f"The gateway sends five drones out: {and_(chain)} as a chain, {and_(group)} as a "
-            "group behind it",
+            "group behind it. The others stay on until they are there, because orders need routes",
             mesh.stamp_s,
         )
-        goals = _goals(mesh, gateway, cast)
-        mesh = yield [_fly(node_id, *goals[node_id]) for node_id in reversed(cast)]
+        mesh = yield [*(_power(node, True) for node in plan.was_off), *self._at_pace(_FAST)]
+        mesh = yield from self._bring(mesh, plan.places)
+        if plan.resting:
+            count = len(plan.resting)
+            self.story.add(
+                f"{count} other drone{'s' if count > 1 else ''} could provide another route, and "
+                f"{'are' if count > 1 else 'is'} switched off during the demonstration",
+                mesh.stamp_s,
+            )
+            mesh = yield [_power(node, False) for node in plan.resting]
         mesh = yield from self._until(
             mesh,
-            "the drones are not all connected at their places",
-            _READY_WITHIN_S,
-            lambda m: _ready(m, cast) and _stand_at(m, goals),
+            f"{and_(plan.cast)} are not all connected at their places",
+            lambda m: _are_connected(m, plan.cast) and not _away(m, plan.places),
         )
         settled_s = mesh.stamp_s + _SETTLE_S
         self.story.add(
             "All are connected. Each asks for the position of its next hop to the gateway, because "
-            "it would fly to that place",
+            "it would fly to that place if the next hop fell silent: from there it must be heard",
             mesh.stamp_s,
             settled_s,
         )
         mesh = yield from self._until(
             mesh,
             "the routers do not know the places of their next hops",
-            _READY_WITHIN_S,
             lambda m: m.stamp_s >= settled_s and _know_fallback(m, group, lost),
         )
         begun_s, self._describes_repair = mesh.stamp_s, True
         self.story.update(mesh)
         mesh = yield [_power(lost, False), *self._at_pace(_WAITING)]
         yield from self._follow(mesh, group, begun_s)
-
-    def _cast_orders(self, mesh: MeshStatus, gateway: int, cast: Sequence[int]) -> list[Order]:
-        """Switch the cast on and all other nodes off."""
-        self._resting = [n.id for n in mesh.nodes if n.on and n.id not in (gateway, *cast)]
-        if self._resting:
-            count = len(self._resting)
-            self.story.add(
-                f"{count} other drone{'s' if count > 1 else ''} could provide another route, and "
-                f"{'are' if count > 1 else 'is'} switched off during the demonstration",
-                mesh.stamp_s,
-            )
-        orders = [_power(node_id, False) for node_id in self._resting]
-        return [*orders, *(_power(n.id, True) for n in mesh.nodes if n.id in cast and not n.on)]
+        yield from self._put_back()
 
     def _follow(self, mesh: MeshStatus, group: Sequence[int], begun_s: float) -> Script:
         """Describe the repair until the group is connected again, adapting the speed."""
@@ -128,22 +179,54 @@ class RepairDemonstration:
                 return
             if mesh.stamp_s > begun_s + _REPAIR_WITHIN_S:
                 raise OrderRefused(
-                    f"{and_(group)} {_why_not(nodes)} after {_REPAIR_WITHIN_S:.0f} s: the "
-                    f"demonstration ends (repair strategy: {mesh.repair_strategy or 'unknown'})"
+                    f"{and_(group)} {_why_not(nodes)} after {_REPAIR_WITHIN_S:.0f} s "
+                    f"(repair strategy: {mesh.repair_strategy or 'unknown'})"
                 )
             mesh = yield self._at_pace(_pace(nodes))
 
+    def _put_back(self) -> Script:
+        """Switch everything on, and send each drone to where it was."""
+        self._describes_repair, self.is_leaving = False, True
+        mesh = yield []
+        plan = self.plan
+        if plan is None:
+            return
+        self.story.add("Everything is put back: power, places and speed", mesh.stamp_s)
+        powers = [_power(node, True) for node in (*plan.resting, *plan.cast)]
+        mesh = yield [*map(_attempt, powers), *self._at_pace(_FAST)]
+        try:
+            mesh = yield from self._bring(mesh, plan.homes)
+            self.story.add("All drones are where they were", mesh.stamp_s)
+        except OrderRefused as error:
+            self.story.add(f"Not all drones are where they were: {error}", mesh.stamp_s)
+        yield [_attempt(_power(node, False)) for node in plan.was_off]
+        yield [_attempt(_speed(self._factor_before))]
+
+    def _bring(self, mesh: MeshStatus, places: Places) -> Returning:
+        """Order these drones to their places, as often as it takes, and wait for them."""
+        begun_s, due_s = mesh.stamp_s, dict.fromkeys(places, mesh.stamp_s)
+        while away := _away(mesh, places):
+            if mesh.stamp_s > begun_s + _READY_WITHIN_S:
+                lost = [node.id for node in away if not node.connected]
+                why = f", {and_(lost)} without a gateway" if lost else ""
+                ids = and_(node.id for node in away)
+                raise OrderRefused(f"{ids} not there after {_READY_WITHIN_S:.0f} s{why}")
+            orders = []
+            for node in reversed(away):  # those behind others first
+                may_hear = node.connected and not len(node.path)
+                if may_hear and mesh.stamp_s >= due_s[node.id]:
+                    due_s[node.id] = mesh.stamp_s + _ORDER_AGAIN_S
+                    orders.append(_attempt(_fly(node.id, *places[node.id])))
+            mesh = yield orders
+        return mesh
+
     def _until(
-        self,
-        mesh: MeshStatus,
-        complaint: str,
-        within_s: float,
-        condition: Callable[[MeshStatus], bool],
-    ) -> Generator[list[Order], MeshStatus, MeshStatus]:
+        self, mesh: MeshStatus, complaint: str, condition: Callable[[MeshStatus], bool]
+    ) -> Returning:
         begun_s = mesh.stamp_s
         while not condition(mesh):
-            if mesh.stamp_s > begun_s + within_s:
-                raise OrderRefused(f"{complaint} after {within_s:.0f} s: the demonstration ends")
+            if mesh.stamp_s > begun_s + _READY_WITHIN_S:
+                raise OrderRefused(f"{complaint} after {_READY_WITHIN_S:.0f} s")
             mesh = yield []
         return mesh
 
@@ -155,37 +238,41 @@ class RepairDemonstration:
         return [_speed(factor)]
 
 
-def _choose_cast(mesh: MeshStatus) -> tuple[int, list[int]]:
-    """The gateway and the five routers that take part. Raises OrderRefused."""
-    gateways = [n.id for n in mesh.nodes if n.role == Role.GATEWAY and position_is_known(n)]
-    routers = [n.id for n in mesh.nodes if n.role == Role.ROUTER and position_is_known(n)]
-    if not gateways or len(routers) < len(_PLACES):
-        raise OrderRefused(f"this demonstration needs a gateway and {len(_PLACES)} routers")
-    return gateways[0], routers[: len(_PLACES)]
+def _free_places(gateway: NodeStatus, range_m: float, others: Sequence[NodeStatus]) -> list[Place]:
+    """Five places beside the gateway, in the first direction where no other drone is near them."""
+    x, y, z = gateway.position
+
+    def pointing(cos: int, sin: int) -> list[Place]:
+        return [
+            _rounded((x + (cos * dx - sin * dy) * range_m, y + (sin * dx + cos * dy) * range_m, z))
+            for dx, dy in _PLACES
+        ]
+
+    def room_m(places: Sequence[Place]) -> float:
+        free = (math.dist(at[:2], other.position[:2]) for at in places for other in others)
+        return min(_FREE_M, min(free, default=_FREE_M))
+
+    return max((pointing(*turn) for turn in _TURNS), key=room_m)
 
 
-def _goals(mesh: MeshStatus, gateway: int, cast: Sequence[int]) -> Places:
-    x, y, z = next(node.position for node in mesh.nodes if node.id == gateway)
-    return {
-        node_id: (
-            round(x + dx * mesh.max_distance, 2),
-            round(y + dy * mesh.max_distance, 2),
-            max(0.0, round(z)),
-        )
-        for node_id, (dx, dy) in zip(cast, _PLACES)
-    }
+def _rounded(place: Sequence[float]) -> Place:
+    """As an order gives it: heights are whole metres."""
+    x, y, z = place
+    return round(x, 2), round(y, 2), max(0.0, float(round(z)))
 
 
-def _ready(mesh: MeshStatus, cast: Sequence[int]) -> bool:
-    return all(n.connected and n.on and not len(n.path) for n in mesh.nodes if n.id in cast)
-
-
-def _stand_at(mesh: MeshStatus, goals: Places) -> bool:
-    return all(
-        max(abs(a - b) for a, b in zip(node.position[:2], goals[node.id])) < 0.2
+def _away(mesh: MeshStatus, places: Places) -> list[NodeStatus]:
+    """The drones that are not at their places."""
+    return [
+        node
         for node in mesh.nodes
-        if node.id in goals
-    )
+        if node.id in places
+        and (len(node.path) or math.dist(node.position[:2], places[node.id][:2]) > _AT_PLACE_M)
+    ]
+
+
+def _are_connected(mesh: MeshStatus, ids: Sequence[int]) -> bool:
+    return all(node.connected and node.on for node in mesh.nodes if node.id in ids)
 
 
 def _know_fallback(mesh: MeshStatus, group: Sequence[int], lost: int) -> bool:
@@ -217,3 +304,13 @@ def _fly(node_id: int, x: float, y: float, z: float) -> Order:
 
 def _speed(factor: float) -> Order:
     return lambda controls: controls.speed(False, factor)
+
+
+def _attempt(order: Order) -> Order:
+    """This order, whose refusal changes nothing: it is repeated, or cannot be helped."""
+
+    def carry_out(controls: MeshControls) -> None:
+        with contextlib.suppress(OrderRefused):
+            order(controls)
+
+    return carry_out

@@ -195,12 +195,13 @@ class NeighbourWatch(_Request):
 
 
 class Demonstrate(_Request):
-    """Begin or end the demonstration of a repair."""
+    """Begin or end the demonstration of a repair, or ask what it would do (`plan`)."""
 
     do: Literal["demonstrate"]
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
     heard: HeardOrNone = None
     on: bool
+    plan: bool = False
 
 
 class PacketWatch(_Request):

@@ -292,7 +292,10 @@ class ConsoleServer:
             await self._preview(page, request)
         elif isinstance(request, Demonstrate):
             try:
-                text = self._stage.begin() if request.on else self._stage.end()
+                if request.plan:
+                    text = self._stage.plan()
+                else:
+                    text = self._stage.begin() if request.on else self._stage.end()
             except OrderRefused as error:
                 await self._answer(page, request.number, False, str(error))
             else:

@@ -14,11 +14,18 @@ from drone_mesh.communication.router_states import RepairState
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import REPAIR_STATES, MeshStatus, NodeStatus
 
-# Strategy -> meaning of a bid, its unit, and why the highest one wins. Other strategies only bid.
+# Strategy -> meaning of a bid, its unit, what the highest is, and why it wins. Others only bid.
 _BIDS = {
-    "thesis": ("its distance to the gateway", " m", "is farthest"),
-    "nearest": ("how near it is to that place", "", "is nearest"),
-}
+    "thesis": (
+        "its distance to the gateway", " m", "is farthest",
+        "The farthest from the gateway flies, because the fewest others depend on it",
+    ),
+    "nearest": (
+        "how near it is to that place", "", "is nearest",
+        "The nearest flies, because it is there soonest",
+    ),
+}  # fmt: skip
+_NO_BIDS = "", "", "bids most", ""
 _ELECTION = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
 
 
@@ -100,7 +107,7 @@ class RepairStory:
                 f"{and_(helped)} {_each(helped, 'is', 'are')} connected; {text}" if helped else text
             )
         waits = _each(ids, "It waits", "Each waits")
-        text += f". {waits} for another route before it negotiates"
+        text += f". {waits} for another route before it negotiates: a route costs no flight"
         self._last(("lost", len(self._fliers)), text, now_s, until_s)
 
     def _describe_bids(self, group: Sequence[NodeStatus], mesh: MeshStatus) -> None:
@@ -120,7 +127,7 @@ class RepairStory:
         for node in bidding:
             self._bids[node.id] = node.bid
         bids = sorted((n for n in bidding if n.bid >= 0), key=lambda n: (-n.bid, n.id))
-        what, unit, _why = _BIDS.get(mesh.repair_strategy, ("", "", ""))
+        what, unit, _is_best, _because = _BIDS.get(mesh.repair_strategy, _NO_BIDS)
         parts = [lost]
         if bids:
             bids_text = ", ".join(f"{n.id} bids {_bid(n.bid, unit)}" for n in bids)
@@ -155,7 +162,7 @@ class RepairStory:
             return
         others = sorted(self._lost - {node.id} - set(self._fliers))
         rest = f"; {and_(others)} wait{_each(others, 's', '')} for it" if others else ""
-        _what, unit, is_best = _BIDS.get(mesh.repair_strategy, ("", "", "bids most"))
+        _what, unit, is_best, because = _BIDS.get(mesh.repair_strategy, _NO_BIDS)
         bids = {n: bid for n, bid in self._bids.items() if bid >= 0}
         if not self._bids:
             why = f"{node.id} has no neighbours left and flies"
@@ -164,7 +171,10 @@ class RepairStory:
         else:
             bid = f" ({_bid(bids[node.id], unit)})" if node.id in bids else ""
             why = f"{node.id} {is_best}{bid} and flies"
-        self._last(("flies", node.id, node.place_of), f"{why} to {place}{rest}", now_s)
+        text = f"{why} to {place}{rest}"
+        if because and len(bids) > 1:
+            text += f". {because}: after its flight it passes on for all of them"
+        self._last(("flies", node.id, node.place_of), text, now_s)
 
     def _describe_end(self, mesh: MeshStatus) -> None:
         now_s = mesh.stamp_s

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
 from drone_mesh.console.controls import OrderRefused
-from drone_mesh.console.demonstration import RepairDemonstration
+from drone_mesh.console.demonstration import Plan, RepairDemonstration
 from drone_mesh.inprocess import Network
+from drone_mesh.layouts import Layouts
 
 STATE_PERIOD_S = 0.2  # wall time between two states
 
@@ -40,16 +44,25 @@ class Fleet:
         self.factor = factor
         return ""
 
-    def watch(self, demonstration: RepairDemonstration) -> None:
+    def watch(self, demonstration: RepairDemonstration, end_after_s: float = math.inf) -> None:
+        """As the stage does; from `end_after_s` (wall) on it shall end."""
         while not demonstration.is_over:
-            mesh = self.network.status()
-            mesh = type(mesh)(**{**vars(mesh), "real_time_factor": self.factor})
-            for order in demonstration.advance(mesh):
-                order(self)
+            mesh = replace(self.network.status(), real_time_factor=self.factor)
+            if self.wall_s >= end_after_s and not demonstration.is_leaving:
+                demonstration.leave("ended by the user", mesh.stamp_s)
+            try:
+                for order in demonstration.advance(mesh):
+                    order(self)
+            except OrderRefused as error:
+                assert not demonstration.is_leaving
+                demonstration.leave(str(error), mesh.stamp_s)
             self.network.run_for(STATE_PERIOD_S * self.factor)
             self.wall_s += STATE_PERIOD_S
-        for order in demonstration.leave():
-            order(self)
+
+    def places(self) -> dict[int, tuple[int, int]]:
+        """x and y in whole metres, by node."""
+        nodes = self.network.status().nodes
+        return {node.id: (round(node.position[0]), round(node.position[1])) for node in nodes}
 
 
 def texts(demonstration: RepairDemonstration) -> list[str]:
@@ -60,34 +73,80 @@ def test_it_arranges_five_drones_and_follows_their_repair():
     fleet, demonstration = Fleet(), RepairDemonstration()
     fleet.watch(demonstration)
     told = texts(demonstration)
-    assert told[0].startswith("12 other drones could provide another route")
+    assert told[0].startswith("The gateway sends five drones out: 1 and 2 as a chain, 3, 4 and 5")
+    assert told[1].startswith("12 other drones could provide another route")
     assert any("3 bids 18.0 m, 4 bids 15.5 m, 5 bids 15.3 m" in text for text in told)
-    assert "3, 4 and 5 are connected again" in told[-1]
-    assert 20.0 < fleet.wall_s < 60.0
+    assert any("3, 4 and 5 are connected again" in text for text in told)
+    assert told[-1] == "All drones are where they were"
+    assert 20.0 < fleet.wall_s < 90.0
 
 
-def test_afterwards_the_speed_and_the_other_drones_are_as_before():
+def test_afterwards_speed_power_and_places_are_as_before():
     fleet, demonstration = Fleet(), RepairDemonstration()
+    before = fleet.places()
+    fleet.power(17, False)
     fleet.watch(demonstration)
     assert fleet.factor == 2.0
-    assert fleet.is_off == {2}
+    assert fleet.is_off == {17}
+    assert fleet.places() == before
+
+
+def test_it_begins_with_drones_that_stand_anywhere():
+    fleet, demonstration = Fleet(), RepairDemonstration()
+    for drone, goal in sorted(Layouts({}).orders(0), reverse=True):
+        fleet.network.order(drone, goal.longitude, goal.latitude, int(goal.height))
+    fleet.network.run_for(60.0)
+    before = fleet.places()
+    fleet.watch(demonstration)
+    told = texts(demonstration)
+    assert any("are connected again" in text for text in told), told
+    assert fleet.is_off == set()
+    assert fleet.places() == before
+
+
+@pytest.mark.parametrize("after_s", [0.4, 5.0, 25.0])
+def test_it_can_be_ended_at_any_moment_and_puts_everything_back(after_s):
+    fleet, demonstration = Fleet(), RepairDemonstration()
+    before = fleet.places()
+    fleet.watch(demonstration, end_after_s=after_s)
+    assert "Not finished: ended by the user" in texts(demonstration)
+    assert (fleet.factor, fleet.is_off) == (2.0, set())
+    assert fleet.places() == before
+
+
+def test_it_asks_with_what_it_will_do():
+    words = Plan.of(Fleet().network.status()).in_words()
+    assert words.startswith("This sends drones 1, 2, 3, 4 and 5 to places beside gateway 0, and")
+    assert "switches 12 others off. Then it switches 2 off" in words
+
+
+def test_its_places_are_where_no_other_drone_stands():
+    fleet = Fleet(routers=6)
+    fleet.network.order(6, -1.0, 4.0, 0)
+    fleet.network.run_for(20.0)
+    plan = Plan.of(fleet.network.status())
+    assert all(y <= 0.0 for _x, y, _z in plan.places.values())
 
 
 def test_with_two_gateways_the_second_one_takes_no_part():
     fleet, demonstration = Fleet(gateways=2, routers=5), RepairDemonstration()
     fleet.watch(demonstration)
     told = texts(demonstration)
-    assert told[0].startswith("1 other drone could provide another route, and is switched off")
-    assert "4, 5 and 6 are connected again" in told[-1]
+    assert told[1].startswith("1 other drone could provide another route, and is switched off")
+    assert any("4, 5 and 6 are connected again" in text for text in told)
 
 
 def test_a_strategy_that_never_flies_ends_it_with_the_reason():
     fleet, demonstration = Fleet(routers=5, repair="stay"), RepairDemonstration()
-    with pytest.raises(OrderRefused, match="3, 4 and 5 have no gateway, and none flew after 240 s"):
-        fleet.watch(demonstration)
+    fleet.watch(demonstration)
+    why = "Not finished: 3, 4 and 5 have no gateway, and none flew after 240 s"
+    assert any(text.startswith(why) for text in texts(demonstration))
+    assert fleet.is_off == set()
 
 
 def test_four_routers_are_too_few():
     fleet, demonstration = Fleet(routers=4), RepairDemonstration()
-    with pytest.raises(OrderRefused, match="this demonstration needs a gateway and 5 routers"):
-        fleet.watch(demonstration)
+    fleet.watch(demonstration)
+    assert texts(demonstration) == [
+        "Not finished: this demonstration needs a gateway and 5 routers that can fly"
+    ]

@@ -79,7 +79,7 @@ flights.addEventListener("change", () => {
   map.held = flights.held;
   map.redraw();
 });
-new NodeTable(mesh, byId("nodes"));
+const table = new NodeTable(mesh, byId("nodes"));
 const panel = new NodePanel(
   mesh,
   (id, on) => {
@@ -94,8 +94,15 @@ new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"
 const charts = new Charts(mesh);
 const packets = new PacketDots(mesh, map, connection, byId("map-card"));
 new TimeLine(mesh, (request) => connection.ask({ do: "time", ...request }));
-new Story(mesh, (on) => order({ do: "demonstrate", on }));
-mesh.addEventListener("story", () => mesh.story.running && !map.moved && map.fit());
+new Story(
+  mesh,
+  (on) => order({ do: "demonstrate", on }),
+  () =>
+    connection
+      .order({ do: "demonstrate", on: true, plan: true })
+      .catch((error) => toast(error.message, true)),
+);
+mesh.addEventListener("story", () => map.setStage(mesh.story));
 
 // The header
 
@@ -290,7 +297,7 @@ byId("show-ranges").addEventListener("change", (event) =>
 byId("show-trails").addEventListener("change", (event) =>
   map.setOption("trails", event.target.checked),
 );
-byId("show-legend").addEventListener("change", () => map.moved || map.fit()); // the legend covers part of the map
+byId("show-legend").checked = matchMedia("(min-width: 761px)").matches; // a phone has little room
 byId("find-form").addEventListener("submit", (event) => {
   event.preventDefault();
   const text = byId("find").value.trim();
@@ -298,6 +305,7 @@ byId("find-form").addEventListener("submit", (event) => {
   if (!mesh.nodes.has(id)) return toast(text ? `no node ${text}` : "type a node id", true);
   mesh.select(id);
   map.show(id);
+  table.reveal(id);
   byId("find").value = "";
   byId("map").focus();
 });

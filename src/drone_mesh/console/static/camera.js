@@ -3,7 +3,7 @@
 const MIN_SCALE = 0.05; // px per m: 10 km on 500 px
 const MAX_SCALE = 400;
 const MARGIN_PX = 32;
-const LABELS_PX = 28; // at the right edge, where the grid is labelled
+const LABELS_PX = 28; // at the right and lower edges, where the grid is labelled
 
 export class Camera {
   constructor() {
@@ -42,17 +42,18 @@ export class Camera {
     this.y += y - ny;
   }
 
-  /** Shows all these [x, y], at least a few metres across; `top` and `bottom` px are covered. */
-  fit(points, top, bottom) {
+  /** Shows all these [x, y], at least a few metres across; `top` px are covered. */
+  fit(points, top) {
     if (!points.length) return;
     const xs = points.map((p) => p[0]);
     const ys = points.map((p) => p[1]);
     const [left, right] = [Math.min(...xs), Math.max(...xs)];
     const [low, high] = [Math.min(...ys), Math.max(...ys)];
     const wide = Math.max(this.width - 2 * MARGIN_PX - LABELS_PX, 60) / Math.max(right - left, 3);
-    const tall = Math.max(this.height - 2 * MARGIN_PX - top - bottom, 60) / Math.max(high - low, 3);
+    const tall =
+      Math.max(this.height - 2 * MARGIN_PX - top - LABELS_PX, 60) / Math.max(high - low, 3);
     this.scale = Math.min(MAX_SCALE, Math.max(MIN_SCALE, Math.min(wide, tall)));
     this.x = (left + right + LABELS_PX / this.scale) / 2;
-    this.y = (low + high) / 2 + (top - bottom) / 2 / this.scale;
+    this.y = (low + high) / 2 + (top - LABELS_PX) / 2 / this.scale;
   }
 }

@@ -1,7 +1,10 @@
 // Draws one picture of the mesh on a canvas.
 
 const DIGIT_WIDTH = 0.7; // of a bold digit, as a share of its height
-const SMALLEST_ID_PX = 6;
+const SMALLEST_ID_PX = 8.5; // in a drone; a smaller id is drawn beside it
+const LABEL_PX = 10;
+const ROOM_PER_DIGIT_PX = 6;
+const SHARE_OF_ROOM = 0.3; // radius of a drone, of the room that it has
 const LEAST_ARMS_PX = 7; // smallest radius of a drone that is drawn with arms and rotors
 const MOTORS = [
   [0.7, 0.7],
@@ -56,7 +59,7 @@ export function droneRadius(camera, mesh) {
   const span = (axis) =>
     Math.max(...positions.map((at) => at[axis])) - Math.min(...positions.map((at) => at[axis])) + 1;
   const apart = Math.sqrt((span(0) * span(1)) / positions.length) * camera.scale;
-  return Math.min(13, Math.max(4.5, apart * 0.3));
+  return Math.min(13, Math.max(4.5, apart * SHARE_OF_ROOM));
 }
 
 /** Whether a drone of this radius, px, is drawn with its arms and rotors. */
@@ -87,7 +90,7 @@ export function drawingOrder(mesh) {
 export function drawMesh(context, camera, mesh, colours, options, goals) {
   context.clearRect(0, 0, camera.width, camera.height);
   context.lineCap = "round";
-  drawGrid(context, camera, colours, options.covered);
+  drawGrid(context, camera, colours, options.top);
   for (const box of mesh.obstacles) drawObstacle(context, camera, box, colours);
   const selected = mesh.nodes.get(mesh.selected);
   if (options.ranges)
@@ -151,16 +154,16 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
     for (const trail of mesh.trails.values()) drawTrail(context, camera, trail, colours);
   for (const node of mesh.nodes.values()) drawHeading(context, camera, node, colours, radius);
   for (const node of mesh.nodes.values()) drawPath(context, camera, node, colours, radius);
-  for (const node of drawingOrder(mesh))
-    drawn.drones += drawDrone(
-      context,
-      camera,
-      node,
-      node.id === mesh.selected || mesh.group.has(node.id),
-      colours,
-      radius,
-      mesh.clock.shape,
-    );
+  const drones = drawingOrder(mesh);
+  const draw = (some) => {
+    for (const node of some) {
+      const selected = node.id === mesh.selected || mesh.group.has(node.id);
+      drawn.drones += drawDrone(context, camera, node, selected, colours, radius, mesh.clock.shape);
+    }
+  };
+  draw(drones.filter((node) => !options.cast.has(node.id)));
+  if (options.cast.size) dim(context, camera, mesh, colours, radius, options.cast);
+  draw(drones.filter((node) => options.cast.has(node.id)));
   for (const goal of goals)
     drawGoal(
       context,
@@ -172,6 +175,50 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
       goals.length <= MOST_GOAL_TEXTS,
     );
   return drawn;
+}
+
+/** Dims what is drawn, and draws the links and flights of these nodes above it. */
+function dim(context, camera, mesh, colours, radius, ids) {
+  context.globalAlpha = 0.75;
+  context.fillStyle = colours.card;
+  context.fillRect(0, 0, camera.width, camera.height);
+  context.globalAlpha = 1;
+  for (const [use, colour, width, dash] of [
+    ["known", "known-link", 1, []],
+    ["lost", "lost-link", 1.5, [5, 5]],
+    ["route", "route-link", 3, []],
+  ]) {
+    const links = mesh.links[use].filter(([a, b]) => ids.has(a) && ids.has(b));
+    const ends = links.map(([a, b]) => [mesh.nodes.get(a), mesh.nodes.get(b)]);
+    drawLines(context, camera, radius, ends, colours[colour], width, dash);
+  }
+  for (const id of ids) {
+    const node = mesh.nodes.get(id);
+    if (node) drawPath(context, camera, node, colours, radius);
+  }
+}
+
+/** A mark {x, y, ids, angle} at the edge: how many drones are outside there. */
+export function drawMark(context, { x, y, ids, angle }, colours) {
+  context.save();
+  context.translate(x, y);
+  context.fillStyle = colours.accent;
+  context.beginPath();
+  context.arc(0, 0, 11, 0, 2 * Math.PI);
+  context.fill();
+  context.rotate(angle);
+  context.beginPath();
+  context.moveTo(15, 0);
+  context.lineTo(9, -6);
+  context.lineTo(9, 6);
+  context.fill();
+  context.restore();
+  context.fillStyle = colours.card;
+  context.font = "600 10px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillText(ids.length, x, y + 0.5);
+  context.textBaseline = "alphabetic";
 }
 
 /** The shortest of these [node, node] pairs, at most `most` of them. */
@@ -188,7 +235,7 @@ function shortest(pairs, most) {
     .map(([, pair]) => pair);
 }
 
-function drawGrid(context, camera, colours, { top, bottom }) {
+function drawGrid(context, camera, colours, top) {
   const step = niceStep(70 / camera.scale);
   const [left, high] = camera.toWorld(0, 0);
   const [right, low] = camera.toWorld(camera.width, camera.height);
@@ -203,15 +250,14 @@ function drawGrid(context, camera, colours, { top, bottom }) {
     const px = Math.round(camera.toScreen(x, 0)[0]) + 0.5;
     context.moveTo(px, 0);
     context.lineTo(px, camera.height);
-    if (px > 60 && px < camera.width - 20)
-      context.fillText(metres(x, step), px, camera.height - bottom - 8);
+    if (px > 60 && px < camera.width - 20) context.fillText(metres(x, step), px, camera.height - 8);
   }
   context.textAlign = "right";
   for (let y = Math.ceil(low / step) * step; y <= high; y += step) {
     const py = Math.round(camera.toScreen(0, y)[1]) + 0.5;
     context.moveTo(0, py);
     context.lineTo(camera.width, py);
-    if (py > top + 12 && py < camera.height - bottom - 24)
+    if (py > top + 12 && py < camera.height - 24)
       context.fillText(metres(y, step), camera.width - 8, py - 4);
   }
   context.stroke();
@@ -380,7 +426,11 @@ function drawDrone(context, camera, node, selected, colours, radius, shape) {
   context.strokeStyle = hollow ? colour : colours.card;
   context.lineWidth = hollow ? 2 : 1.5;
   context.stroke();
-  if (idSize(node.id, r) >= SMALLEST_ID_PX) {
+  if (idSize(node.id, r) < SMALLEST_ID_PX) {
+    // Beside the drone, if the next one leaves room there.
+    if (selected || radius / SHARE_OF_ROOM > ROOM_PER_DIGIT_PX * (String(node.id).length + 1))
+      drawLabel(context, node.id, px, py + r + LABEL_PX, colours);
+  } else {
     context.fillStyle = hollow ? colour : colours.card;
     context.font = `600 ${idSize(node.id, r)}px system-ui, sans-serif`;
     context.textAlign = "center";
@@ -389,6 +439,16 @@ function drawDrone(context, camera, node, selected, colours, radius, shape) {
     context.textBaseline = "alphabetic";
   }
   return 1;
+}
+
+function drawLabel(context, text, px, py, colours) {
+  context.font = `600 ${LABEL_PX}px system-ui, sans-serif`;
+  context.textAlign = "center";
+  context.strokeStyle = colours.card;
+  context.lineWidth = 3;
+  context.strokeText(text, px, py);
+  context.fillStyle = colours.ink;
+  context.fillText(text, px, py);
 }
 
 /** Height of an id's digits, px, so that they fit into a drone of radius `r`. */

@@ -2,6 +2,7 @@
 
 import { Camera } from "./camera.js";
 import {
+  drawMark,
   drawMesh,
   drawMission,
   drawNewDrone,
@@ -17,7 +18,10 @@ const NEAR_PX = 8; // a click this close to a drone selects it
 const KEY_STEP_PX = 60;
 const ZOOM_STEP = 1.3;
 const TURN_PERIOD_MS = 50; // between two pictures of turning rotors
-const IN_VIEW_PX = 24; // a node closer to the edge is not in view
+const IN_VIEW_PX = 24; // `show` brings a node at least so far from the edge
+const OUT_OF_VIEW_PX = 6; // a fitted map is fitted again when a drone comes this near to the edge
+const MARK_PX = 15; // from a mark of drones outside to the edge
+const MARKS_APART_PX = 70;
 
 export class MapView {
   /** `fly([{id, x, y}])` is called when drones were dragged there. */
@@ -26,7 +30,7 @@ export class MapView {
     this.canvas = card.querySelector("canvas");
     this.top = card.querySelector("#map-top");
     this.note = card.querySelector("#map-note");
-    this.legend = card.querySelector(".legend");
+    this.hover = card.querySelector("#hover");
     this.legendCrashed = card.querySelector("#legend-crashed");
     this.legendObstacle = card.querySelector("#legend-obstacle");
     this.fly = fly;
@@ -44,10 +48,13 @@ export class MapView {
     this.moved = false; // whether the user has moved it since
     this.pointers = new Map();
     this.pending = false;
+    this.stage = { places: [], cast: new Set() }; // of a demonstration
+    this.marks = []; // at the edges: {x, y, ids, angle} of drones outside, px
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
     const canvas = this.canvas;
     new ResizeObserver(() => this.#resize()).observe(canvas);
     for (const what of ["frame", "select"]) mesh.addEventListener(what, () => this.redraw());
+    canvas.addEventListener("pointerleave", () => this.#point(null));
     canvas.addEventListener("pointerdown", (event) => this.#down(event));
     canvas.addEventListener("pointermove", (event) => this.#move(event));
     canvas.addEventListener("pointerup", (event) => this.#up(event));
@@ -83,18 +90,18 @@ export class MapView {
     const node = this.mesh.nodes.get(id);
     if (!node?.position) return;
     const [x, y] = this.camera.toScreen(node.position[0], node.position[1]);
-    const { top, bottom } = this.#covered();
-    const [left, low] = [IN_VIEW_PX, this.camera.height - bottom - IN_VIEW_PX];
+    const [left, low] = [IN_VIEW_PX, this.camera.height - IN_VIEW_PX];
     const px = Math.min(this.camera.width - left, Math.max(left, x));
-    const py = Math.min(low, Math.max(top + IN_VIEW_PX, y));
+    const py = Math.min(low, Math.max(this.#covered() + IN_VIEW_PX, y));
+    if (px === x && py === y) return;
+    this.moved = true;
     this.camera.pan(px - x, py - y);
     this.redraw();
   }
 
   /** The middle of the visible part, [x, y] in metres. */
   middle() {
-    const { top, bottom } = this.#covered();
-    return this.camera.toWorld(this.camera.width / 2, (this.camera.height + top - bottom) / 2);
+    return this.camera.toWorld(this.camera.width / 2, (this.camera.height + this.#covered()) / 2);
   }
 
   /** From now on a click calls `onPlace(x, y)` and selects nothing; null: it selects again. */
@@ -115,15 +122,45 @@ export class MapView {
   }
 
   fit() {
-    const points = [];
-    for (const node of this.mesh.nodes.values()) {
-      if (node.position) points.push(node.position);
-      if (node.path.length) points.push(node.path.slice(-3));
-    }
-    const { top, bottom } = this.#covered();
-    this.camera.fit(points, top, bottom);
+    this.camera.fit(this.#points(), this.#covered());
     this.moved = false;
     this.redraw();
+  }
+
+  /** The drones and places {cast: [id], places: [[x, y, z]]} of a demonstration; others are dimmed. */
+  setStage({ cast = [], places = [] }) {
+    const begins = places.length && !this.stage.places.length;
+    this.stage = { cast: new Set(cast), places };
+    if (begins && !this.moved) this.fit(); // then the scale stays
+    this.redraw();
+  }
+
+  /** What fits into the view: all drones and where they fly to; in a demonstration only its places. */
+  #points() {
+    const nodes = [...this.mesh.nodes.values()];
+    const { places, cast } = this.stage;
+    if (places.length) {
+      const shown = nodes.filter((node) => cast.has(node.id) && node.role === 1 && node.position);
+      return [...places, ...shown.map((node) => node.position)];
+    }
+    return nodes.flatMap((node) => [
+      ...(node.position ? [node.position] : []),
+      ...(node.path.length ? [node.path.slice(-3)] : []),
+    ]);
+  }
+
+  /** Whether this place is in view; `margin` px from the edges. */
+  #inView([x, y], margin) {
+    const [px, py] = this.camera.toScreen(x, y);
+    const { width, height } = this.camera;
+    const top = this.#covered();
+    return px >= margin && px <= width - margin && py >= top + margin && py <= height - margin;
+  }
+
+  /** Fits again when drones leave the view, unless the user has moved it. */
+  #follow() {
+    if (this.moved || this.drag || this.stage.places.length) return;
+    if (this.#points().some((point) => !this.#inView(point, OUT_OF_VIEW_PX))) this.fit();
   }
 
   /** Cancels a drag; returns whether there was one. */
@@ -142,13 +179,16 @@ export class MapView {
       this.fit();
     }
     if (this.following) this.#centre(this.mesh.nodes.get(this.mesh.selected));
+    else if (this.fitted) this.#follow();
+    this.marks = this.#outside();
     const context = this.canvas.getContext("2d");
     const ratio = window.devicePixelRatio;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    const options = { ...this.options, covered: this.#covered() };
+    const options = { ...this.options, top: this.#covered(), cast: this.stage.cast };
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.#goals());
     this.radius = drawn.radius;
     drawMission(context, this.camera, this.mission, this.colours);
+    for (const mark of this.marks) drawMark(context, mark, this.colours);
     if (this.newDrone)
       drawNewDrone(
         context,
@@ -174,8 +214,7 @@ export class MapView {
     if (!node?.position) return;
     this.moved = true;
     const [x, y] = this.camera.toScreen(node.position[0], node.position[1]);
-    const { top, bottom } = this.#covered();
-    this.camera.pan(this.camera.width / 2 - x, (this.camera.height + top - bottom) / 2 - y);
+    this.camera.pan(this.camera.width / 2 - x, (this.camera.height + this.#covered()) / 2 - y);
   }
 
   /** Redraws after TURN_PERIOD_MS while turning rotors are visible. */
@@ -199,15 +238,48 @@ export class MapView {
     const nodes = [...this.mesh.nodes.values()];
     this.legendCrashed.hidden = !nodes.some((node) => node.condition === "crashed");
     this.legendObstacle.hidden = !this.mesh.obstacles.length;
-    Object.assign(this.note.dataset, drawn, { x, y, scale });
+    const outside = this.marks.reduce((sum, { ids }) => sum + ids.length, 0);
+    Object.assign(this.note.dataset, drawn, { x, y, scale, outside });
   }
 
-  /** How much of the canvas its tools and its legend cover, px. */
+  /** How much of the canvas its tools cover at the top, px. */
   #covered() {
-    return {
-      top: this.top.offsetTop + this.top.offsetHeight,
-      bottom: this.legend.offsetHeight && this.camera.height - this.legend.offsetTop,
-    };
+    return this.top.offsetTop + this.top.offsetHeight;
+  }
+
+  /** A mark at the edge for each group of drones outside of the view. */
+  #outside() {
+    const marks = [];
+    if (this.stage.places.length) return marks; // they would cover what is shown
+    const { width, height } = this.camera;
+    const [left, top] = [MARK_PX, this.#covered() + MARK_PX];
+    for (const node of this.mesh.nodes.values()) {
+      if (!node.position || this.#inView(node.position, 0)) continue;
+      const [px, py] = this.camera.toScreen(node.position[0], node.position[1]);
+      const x = Math.min(width - left, Math.max(left, px));
+      const y = Math.min(height - left, Math.max(top, py));
+      const near = marks.find((mark) => Math.hypot(mark.x - x, mark.y - y) < MARKS_APART_PX);
+      if (near) near.ids.push(node.id);
+      else marks.push({ x, y, ids: [node.id], angle: Math.atan2(py - y, px - x) });
+    }
+    return marks;
+  }
+
+  /** Shows who is under the pointer; null: nobody. */
+  #point(node, event) {
+    this.hover.hidden = !node;
+    if (!node) return;
+    const parts = [
+      `${node.role === 1 ? "Gateway" : "Router"} ${node.id}`,
+      node.trouble || node.condition,
+    ];
+    if ((node.battery ?? null) !== null) parts.push(`battery ${node.battery} %`);
+    this.hover.textContent = [parts.join(", "), node.order].filter(Boolean).join("; ");
+    const { width, height } = this.camera;
+    const [x, y] = [event.offsetX, event.offsetY];
+    this.hover.style.left = `${Math.max(4, Math.min(x + 14, width - this.hover.offsetWidth - 4))}px`;
+    const below = y + 18 + this.hover.offsetHeight < height;
+    this.hover.style.top = `${below ? y + 18 : y - 12 - this.hover.offsetHeight}px`;
   }
 
   #resize() {
@@ -236,6 +308,10 @@ export class MapView {
     return nearest;
   }
 
+  #markAt(px, py) {
+    return this.marks.find(({ x, y }) => Math.hypot(x - px, y - py) < MARK_PX);
+  }
+
   #down(event) {
     if (event.button !== 0) return;
     this.canvas.focus({ preventScroll: true });
@@ -261,9 +337,13 @@ export class MapView {
   #move(event) {
     const pointer = this.pointers.get(event.pointerId);
     if (!pointer) {
-      this.canvas.style.cursor = this.#nodeAt(event.offsetX, event.offsetY) ? "pointer" : "grab";
+      const node = this.#nodeAt(event.offsetX, event.offsetY);
+      const mark = this.#markAt(event.offsetX, event.offsetY);
+      this.canvas.style.cursor = node || mark ? "pointer" : "grab";
+      this.#point(event.pointerType === "mouse" ? node : null, event);
       return;
     }
+    this.#point(null);
     const [dx, dy] = [event.offsetX - pointer.x, event.offsetY - pointer.y];
     if (Math.hypot(event.offsetX - pointer.startX, event.offsetY - pointer.startY) > DRAG_AFTER_PX)
       pointer.moved = true;
@@ -297,7 +377,9 @@ export class MapView {
       const { id, x, y } = this.drag;
       this.drag = null;
       this.fly(this.#moves(id, x, y));
-    } else if (!pointer.moved && this.onPlace)
+    } else if (!pointer.moved && this.#markAt(event.offsetX, event.offsetY))
+      this.show(this.#markAt(event.offsetX, event.offsetY).ids[0]);
+    else if (!pointer.moved && this.onPlace)
       this.onPlace(...this.camera.toWorld(event.offsetX, event.offsetY));
     else if (!pointer.moved && event.shiftKey && pointer.node !== null)
       this.mesh.toggle(pointer.node);

@@ -1,14 +1,22 @@
 // The demonstration of a repair: its sentences, and how long the mesh still waits at the last one.
 
+import { agreed } from "./confirm.js";
+
 const byId = (id) => document.getElementById(id);
 
 export class Story {
-  /** `demonstrate(on)` begins a demonstration, or ends it and closes its story. */
-  constructor(mesh, demonstrate) {
+  /**
+   * `demonstrate(on)` begins a demonstration, or ends it and closes its story; `plan()` resolves
+   * with what it would do, or with nothing if it cannot begin.
+   */
+  constructor(mesh, demonstrate, plan) {
     this.mesh = mesh;
-    this.demonstrate = demonstrate;
     mesh.addEventListener("story", () => this.#show());
-    byId("demonstrate").addEventListener("click", () => demonstrate(!this.running));
+    byId("demonstrate").addEventListener("click", async () => {
+      if (this.running) return demonstrate(false);
+      const text = await plan();
+      if (text && (await agreed(text, "Show it"))) demonstrate(true);
+    });
     byId("story-close").addEventListener("click", () => demonstrate(false));
   }
 

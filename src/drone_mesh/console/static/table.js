@@ -158,6 +158,11 @@ export class NodeTable {
     for (const row of this.body.rows) row.tabIndex = row === focusable ? 0 : -1;
   }
 
+  /** Scrolls to the row of this node. */
+  reveal(id) {
+    this.rows.get(id)?.scrollIntoView({ block: "nearest" });
+  }
+
   #choose(event) {
     const row = event.target.closest("tr");
     if (!row) return;
