@@ -49,13 +49,14 @@ class Plan:
     places: Places  # of the cast
     resting: Sequence[int]  # the other nodes that are on: they are switched off meanwhile
     homes: Places  # of all routers that can fly
-    was_off: Sequence[int]  # of the cast
+    was_off: Sequence[int]  # of the gateway and the cast
 
     @classmethod
     def of(cls, mesh: MeshStatus) -> Plan:
         """Choose the routers with the shortest routes. Raises OrderRefused if there are too few."""
         known = [node for node in mesh.nodes if position_is_known(node)]
-        gateways = [node for node in known if node.role == Role.GATEWAY and node.on]
+        gateways = [node for node in known if node.role == Role.GATEWAY]
+        gateways.sort(key=lambda node: (not node.on, node.id))
         able = [n for n in known if n.role == Role.ROUTER and not (n.why_not_fly or n.crashed)]
         if not gateways or len(able) < len(_PLACES):
             raise OrderRefused(
@@ -72,7 +73,7 @@ class Plan:
             dict(zip(cast, _free_places(gateways[0], mesh.max_distance, others))),
             resting,
             {node: _rounded(goal) for node, goal in goals.items()},
-            [node.id for node in able if node.id in cast and not node.on],
+            [node.id for node in known if node.id in (gateways[0].id, *cast) and not node.on],
         )
 
     def in_words(self) -> str:

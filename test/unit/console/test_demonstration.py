@@ -84,10 +84,12 @@ def test_it_arranges_five_drones_and_follows_their_repair():
 def test_afterwards_speed_power_and_places_are_as_before():
     fleet, demonstration = Fleet(), RepairDemonstration()
     before = fleet.places()
-    fleet.power(17, False)
+    for node in (0, 17):
+        fleet.power(node, False)
     fleet.watch(demonstration)
+    assert any("are connected again" in text for text in texts(demonstration))
     assert fleet.factor == 2.0
-    assert fleet.is_off == {17}
+    assert fleet.is_off == {0, 17}
     assert fleet.places() == before
 
 
