@@ -11,7 +11,8 @@ HASTE = ("--skip", "15", "--spacing", "1", "--haste", "5")
 # It may be over before a slow test looks.
 WATCH_COUNTDOWN = """() => {
   const wait = document.getElementById("story-wait");
-  new MutationObserver(() => (window.countedDown ||= !wait.hidden)).observe(wait, {attributes: true});
+  const look = () => (window.countedDown ||= !wait.hidden);
+  new MutationObserver(look).observe(wait, { attributes: true });
 }"""
 PHONE = {"viewport": {"width": 390, "height": 844}}
 
