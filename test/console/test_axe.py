@@ -36,6 +36,8 @@ def test_axe_finds_no_violation(start_console, visit, scheme, size):
     keyboard.press("p")
     page.page.wait_for_selector(".toast")
     check(page, "a node, and a toast with a button")
+    page.wait_for("an alarm", lambda: page.page.is_visible("#alarm-count"))
+    check(page, "alarms")
     if width < 500:
         for tab in ("nodes", "events", "charts", "map"):
             page.page.click(f"nav button[data-tab={tab}]")
@@ -74,6 +76,12 @@ def test_axe_finds_no_violation(start_console, visit, scheme, size):
         page.page.click("#nodes tr[data-id='4']", modifiers=["Shift"])
         page.wait_for("the group", lambda: page.page.is_visible("#group"))
         check(page, "several drones")
+        page.page.click("#group-formation")
+        check(page, "a formation")
+        page.page.click("#formation-close")
+        page.page.check("#only-problems")
+        check(page, "only problems")
+        page.page.uncheck("#only-problems")
         page.page.click("#files-button")
         check(page, "save and load")
         keyboard.press("Escape")

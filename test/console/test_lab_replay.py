@@ -91,11 +91,11 @@ def test_dragging_shows_the_mesh_as_it_was_at_that_moment(replay: Page) -> None:
     expect(replay.locator("#time-now")).to_contain_text(re.compile(r"^2[67]\.\d"))
     row = replay.locator("#nodes tbody tr").nth(2)
     expect(row).to_contain_text("off")
-    expect(replay.locator("#events")).to_contain_text("power off")
+    expect(replay.locator("#events")).to_contain_text("was switched off")
     drag_to(replay, 0.2)  # 12 s: it lives, and its death is not in the log any more
     expect(replay.locator("#time-now")).to_contain_text(re.compile(r"^1[123]\.\d"))
     expect(row).not_to_contain_text("off")
-    expect(replay.locator("#events")).not_to_contain_text("power off")
+    expect(replay.locator("#events")).not_to_contain_text("was switched off")
 
 
 def test_play_pause_and_step(replay: Page) -> None:

@@ -262,12 +262,12 @@ def test_the_table_sorts_by_the_column_that_is_clicked(page):
 def test_the_log_shows_events_with_simulated_time_and_neighbours_on_request(page):
     page.page.click("#nodes tr[data-id='2']")
     page.page.click("#power")
-    page.page.wait_for_selector("#events li:has-text('2 power off')")
-    row = page.page.locator("#events li:has-text('2 power off')").first.inner_text()
-    assert re.match(r"[\d.]+ s\s+2 power off", row)
-    assert page.page.locator("#events li:has-text('neighbour')").count() == 0
+    page.page.wait_for_selector("#events li:has-text('2 was switched off')")
+    row = page.page.locator("#events li:has-text('2 was switched off')").first.inner_text()
+    assert re.match(r"[\d.]+ s\s+2 was switched off", row)
+    assert page.page.locator("#events li:has-text('found')").count() == 0
     page.page.check("#show-neighbours")
-    page.page.wait_for_selector("#events li:has-text('neighbour found')")
+    page.page.wait_for_selector("#events li:has-text('found')")
 
 
 def test_the_charts_have_something_to_show(page):

@@ -1,9 +1,9 @@
 """FrameStore: the state that a page should show, and its difference to what the page has.
 
 A frame is one JSON object: `version`, `clock`, `nodes` (id -> changed fields), `gone` (ids),
-`events` and `samples` (new ones), `obstacles` and `story` (complete, if they have changed). A page
-at version v gets what changed after v, however long ago: a page that falls behind gets a larger
-difference, and nothing is queued for it.
+`events` and `samples` (new ones), `obstacles`, `alarms` and `story` (complete, if they have
+changed). A page at version v gets what changed after v, however long ago: a page that falls behind
+gets a larger difference, and nothing is queued for it.
 
 The fields of a node are those of NodeState.msg, plus decisions that the page only displays: the
 node's condition, the name of its colour, its trouble, its slot among nodes at the same position,
@@ -19,6 +19,7 @@ from dataclasses import asdict
 from typing import Any, Iterable, Mapping, Sequence
 
 from drone_mesh.console.history import History
+from drone_mesh.state.alarms import AlarmBook
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkForecast, LostLinks, known_links, links_by_use
 from drone_mesh.state.model import (
@@ -65,6 +66,8 @@ class FrameStore:
         self._forecast = LinkForecast()
         self._orders = OrderWatch()
         self._story: tuple[int, Mapping[str, Any]] = (0, {})
+        self._alarms = AlarmBook()
+        self._shown_alarms: tuple[int, list[dict[str, Any]]] = (0, [])
         self._run_began_at = 0
         self._obstacles: list[dict[str, Any]] = []
         self._obstacles_at = 0
@@ -115,6 +118,8 @@ class FrameStore:
             self._update_node(node.id, fields)
         for node_id, fields in self._links(mesh, wall_s).items():
             self._update_node(node_id, fields)
+        self._alarms.update(mesh)
+        self._show_alarms()
         if wall_s - self._sampled_at_s >= SAMPLE_PERIOD_S and not mesh.paused:
             self._sampled_at_s = wall_s
             self._samples.append((self.version, take_sample(mesh)))
@@ -124,6 +129,8 @@ class FrameStore:
         events = list(events)
         self._next_version()
         self._orders.take(events)
+        self._alarms.take(events)
+        self._show_alarms()
         if self.history is not None:
             self.history.add_events(events)
         for event in events:
@@ -150,6 +157,18 @@ class FrameStore:
         """Show earlier orders again for the drones for which no event of this order has come."""
         self._orders.forget_expected(ticket)
         self._show_orders()
+
+    def acknowledge(self, text: str) -> int:
+        """Somebody has seen all alarms with this text; returns how many."""
+        seen = self._alarms.acknowledge(text)
+        self._next_version()
+        self._show_alarms()
+        return seen
+
+    def _show_alarms(self) -> None:
+        groups = self._alarms.groups()
+        if groups != self._shown_alarms[1]:
+            self._shown_alarms = self.version, groups
 
     def _show_orders(self) -> None:
         self._next_version()
@@ -230,6 +249,8 @@ class FrameStore:
             frame["events"] = events[-EVENTS_PER_FRAME:]
         if samples := [asdict(sample) for at, sample in self._samples if at > version]:
             frame["samples"] = samples
+        if self._shown_alarms[0] > version:
+            frame["alarms"] = self._shown_alarms[1]
         if self._story[0] > version:
             frame["story"] = self._story[1]
         return frame
@@ -272,6 +293,7 @@ class FrameStore:
         self._run_began_at = self.version
         self._lost_links, self._forecast = LostLinks(), LinkForecast()
         self._orders.forget()
+        self._alarms.forget()
         self._events.clear()
         self._samples.clear()
 

@@ -204,6 +204,14 @@ class Demonstrate(_Request):
     plan: bool = False
 
 
+class Acknowledge(_Request):
+    """Somebody has seen the alarms with this text."""
+
+    do: Literal["acknowledge"]
+    number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
+    text: str = Field(max_length=300)
+
+
 class PacketWatch(_Request):
     """Start or stop sending packets to this page."""
 
@@ -227,7 +235,14 @@ class _Numbered(_Request):
 
 
 Request = Union[
-    PageOrder, NeighbourWatch, PacketWatch, Demonstrate, ReadPlaces, PreviewLayout, TimeLine
+    PageOrder,
+    NeighbourWatch,
+    PacketWatch,
+    Demonstrate,
+    ReadPlaces,
+    PreviewLayout,
+    TimeLine,
+    Acknowledge,
 ]
 
 _REQUESTS: TypeAdapter[Request] = TypeAdapter(
@@ -243,6 +258,7 @@ _REQUESTS: TypeAdapter[Request] = TypeAdapter(
             ReadPlaces,
             PreviewLayout,
             TimeLine,
+            Acknowledge,
             _Add,
             _Remove,
             _Mission,

@@ -31,6 +31,11 @@ class Page:
         self._version = 0  # of what the page has
         self._time_line: dict[str, Any] = {}
         self._marks: list[dict[str, Any]] = []
+        self._told: list[str] = []  # what other pages ordered
+
+    def tell(self, text: str) -> None:
+        """Another page ordered this."""
+        self._told.append(text)
 
     @property
     def store(self) -> FrameStore:
@@ -49,6 +54,8 @@ class Page:
             yield frame
             if self.watching is not None:
                 yield self.detail(self.watching)
+        while self._told:
+            yield json.dumps({"type": "told", "text": f"another window: {self._told.pop(0)}"})
         yield from self.packets.messages()
         if self._history.times:
             yield from self._time_line_messages()

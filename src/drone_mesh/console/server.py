@@ -37,6 +37,7 @@ from drone_mesh.console.frames import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import (
     LIMITS,
+    Acknowledge,
     Demonstrate,
     LayoutOffer,
     NeighbourWatch,
@@ -290,6 +291,9 @@ class ConsoleServer:
             await self._read_places(page, request)
         elif isinstance(request, PreviewLayout):
             await self._preview(page, request)
+        elif isinstance(request, Acknowledge):
+            seen = self._store.acknowledge(request.text)
+            await self._answer(page, request.number, True, f"acknowledged {seen}")
         elif isinstance(request, Demonstrate):
             try:
                 if request.plan:
@@ -319,6 +323,8 @@ class ConsoleServer:
         else:
             loop.call_later(EVENT_WITHIN_S, self._store.forget_expected, ticket)
             await self._answer(page, order.number, True, text)
+            for other in self._pages - {page}:
+                other.tell(text)
 
     async def _read_places(self, page: Page, request: ReadPlaces) -> None:
         loop = asyncio.get_running_loop()

@@ -72,7 +72,7 @@ class Stage:
                         if demonstration.is_leaving:
                             raise
                         demonstration.leave(str(error), mesh.stamp_s)
-                    self._ending = demonstration.is_leaving
+                    self._ending = self._ending or demonstration.is_leaving
                     self._store.set_story(describe(demonstration, mesh, running=True))
                 await asyncio.sleep(POLL_PERIOD_S)
         except (OrderRefused, asyncio.CancelledError):

@@ -1,11 +1,15 @@
 // Puts the page together: one mesh, one connection, and the views of it.
 
+import { Alarms } from "./alarms.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { chartsCsv, chartsPicture, nodesCsv, nodesPicture, placesYaml, save } from "./files.js";
 import { Fleet } from "./fleet.js";
+import { Formations } from "./formations.js";
+import { Groups } from "./groups.js";
 import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
+import { keepFocus } from "./focus.js";
 import { MapView } from "./map.js";
 import { Mesh } from "./mesh.js";
 import { Missions } from "./missions.js";
@@ -17,6 +21,7 @@ import { TimeLine } from "./timeline.js";
 
 const TOAST_MS = 5000;
 const FAILURE_MS = 9000;
+const MOST_TOASTS = 2;
 const THEME_KEY = "drone-mesh-theme";
 
 const byId = (id) => document.getElementById(id);
@@ -46,12 +51,14 @@ function toast(text, bad, undo) {
     box.append(button);
     undoLatest = takeBack;
   }
+  while (byId("toasts").children.length >= MOST_TOASTS) byId("toasts").firstElementChild.remove();
   byId("toasts").append(box);
   setTimeout(close, bad ? FAILURE_MS : TOAST_MS);
 }
 
 /** Sends an order and shows its outcome; true if it was carried out. `button` is disabled until the answer; `undo` is the order that reverses this one. */
 async function order(request, button, undo) {
+  const hadFocus = button && document.activeElement === button;
   if (button) button.disabled = true;
   try {
     toast(await connection.order(request), false, undo && (() => order(undo, button)));
@@ -61,8 +68,14 @@ async function order(request, button, undo) {
     return false;
   } finally {
     if (button) button.disabled = false;
+    if (hadFocus && document.activeElement === document.body) button.focus();
   }
 }
+
+keepFocus(() => {
+  const map = byId("map");
+  return map.checkVisibility() ? map : document.querySelector("nav [aria-current]");
+});
 
 const flights = new Flights(mesh, (request) => connection.order(request), toast);
 
@@ -79,7 +92,7 @@ flights.addEventListener("change", () => {
   map.held = flights.held;
   map.redraw();
 });
-const table = new NodeTable(mesh, byId("nodes"));
+const table = new NodeTable(mesh, byId("nodes"), byId("filter"), byId("only-problems"));
 const panel = new NodePanel(
   mesh,
   (id, on) => {
@@ -90,6 +103,21 @@ const panel = new NodePanel(
 );
 const fleet = new Fleet(mesh, map, order);
 const missions = new Missions(mesh, map, order);
+const formations = new Formations(mesh, map, (moves, what) => flights.hold(moves, what));
+new Groups(mesh, () => table.shown, toast);
+
+function lasso(on) {
+  byId("lasso").setAttribute("aria-pressed", on);
+  map.chooseLasso(on);
+  return on;
+}
+byId("lasso").addEventListener("click", () => lasso(!map.lasso));
+new Alarms(
+  mesh,
+  (text) => order({ do: "acknowledge", text }),
+  () => showTab("events"),
+);
+connection.addEventListener("told", (event) => toast(event.detail, false));
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
 const packets = new PacketDots(mesh, map, connection, byId("map-card"));
@@ -335,14 +363,15 @@ mesh.addEventListener("frame", untilLinked);
 
 byId("help-button").addEventListener("click", () => byId("help").showModal());
 
-for (const tab of document.querySelectorAll("nav button")) {
-  tab.addEventListener("click", () => {
-    document.body.dataset.tab = tab.dataset.tab;
-    for (const other of document.querySelectorAll("nav button"))
-      other.removeAttribute("aria-current");
-    tab.setAttribute("aria-current", "page");
-  });
+function showTab(name) {
+  document.body.dataset.tab = name;
+  for (const tab of document.querySelectorAll("nav button")) {
+    if (tab.dataset.tab === name) tab.setAttribute("aria-current", "page");
+    else tab.removeAttribute("aria-current");
+  }
 }
+for (const tab of document.querySelectorAll("nav button"))
+  tab.addEventListener("click", () => showTab(tab.dataset.tab));
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 function showTheme() {
@@ -379,17 +408,24 @@ const KEYS = {
   f: () => map.fit(),
   a: () => missions.close() || fleet.open(),
   m: () => fleet.close() || missions.open(),
+  l: () => lasso(!map.lasso),
   Delete: () => fleet.remove(),
   z: () => undo(),
   "?": () => byId("help").showModal(),
   Escape: () =>
-    map.cancelDrag() || fleet.close() || missions.close() || flights.undo() || mesh.select(null),
+    map.cancelDrag() ||
+    fleet.close() ||
+    missions.close() ||
+    formations.close() ||
+    flights.undo() ||
+    (map.lasso && !lasso(false)) ||
+    mesh.select(null),
 };
 
 document.addEventListener("keydown", (event) => {
   const typing = event.target.closest("input, select, dialog");
   const pressing = event.key === " " && event.target.closest("button");
-  if (typing && event.key === "Escape") event.target.blur();
+  if (typing && event.key === "Escape" && !flights.undo()) event.target.blur();
   const undoing = event.key === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey;
   const chord = event.ctrlKey || event.metaKey || event.altKey;
   if (typing || pressing || (chord && !undoing)) return;

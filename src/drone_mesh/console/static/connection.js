@@ -96,6 +96,8 @@ export class Connection extends EventTarget {
     else if (message.type === "timeline") this.mesh.applyTimeLine(message);
     else if (message.type === "marks") this.mesh.applyMarks(message);
     else if (message.type === "hello") this.mesh.applyHello(message);
+    else if (message.type === "told")
+      this.dispatchEvent(new CustomEvent("told", { detail: message.text }));
     else if (message.type === "answer") {
       const order = this.#orders.get(message.number);
       if (!order) return;

@@ -198,6 +198,21 @@ function dim(context, camera, mesh, colours, radius, ids) {
   }
 }
 
+/** The lasso that the user draws, with these corners [x, y], px. */
+export function drawLasso(context, corners, colours) {
+  context.beginPath();
+  for (const corner of corners) context.lineTo(...corner);
+  context.closePath();
+  context.strokeStyle = context.fillStyle = colours.accent;
+  context.lineWidth = 2;
+  context.setLineDash([6, 4]);
+  context.stroke();
+  context.setLineDash([]);
+  context.globalAlpha = 0.12;
+  context.fill();
+  context.globalAlpha = 1;
+}
+
 /** A mark {x, y, ids, angle} at the edge: how many drones are outside there. */
 export function drawMark(context, { x, y, ids, angle }, colours) {
   context.save();

@@ -11,6 +11,7 @@ const byId = (id) => document.getElementById(id);
 export class Flights extends EventTarget {
   #timer = null;
   #send = null; // sends the held orders
+  #from = null; // had the focus before
 
   /** `order(request)` resolves with a short text, or throws; `toast(text, bad)` shows them. */
   constructor(mesh, order, toast) {
@@ -36,9 +37,10 @@ export class Flights extends EventTarget {
     this.#timer = setTimeout(() => this.#release(), HOLD_MS);
   }
 
-  /** Drops the held orders; returns whether there were any. */
+  /** Drops the held orders and says so; returns whether there were any. */
   undo() {
     const held = this.held.length > 0;
+    if (held) this.toast(`not sent: ${byId("held-text").textContent}`, false);
     this.#hold([], null);
     return held;
   }
@@ -48,6 +50,14 @@ export class Flights extends EventTarget {
     this.held = moves;
     this.#send = send;
     byId("held").hidden = !moves.length;
+    const focused = document.activeElement;
+    if (moves.length && focused.closest("input, select")) {
+      this.#from = focused; // so that one key undoes a typed order
+      byId("held-undo").focus();
+    } else if (!moves.length && this.#from) {
+      if (focused === document.body || focused.closest("#held")) this.#from.focus();
+      this.#from = null;
+    }
     this.dispatchEvent(new Event("change"));
   }
 

@@ -2,6 +2,7 @@
 
 import { Camera } from "./camera.js";
 import {
+  drawLasso,
   drawMark,
   drawMesh,
   drawMission,
@@ -23,6 +24,15 @@ const OUT_OF_VIEW_PX = 6; // a fitted map is fitted again when a drone comes thi
 const MARK_PX = 15; // from a mark of drones outside to the edge
 const MARKS_APART_PX = 70;
 
+/** Whether a point is inside a polygon: a ray from it crosses its edges an odd number of times. */
+function isInside([x, y], corners) {
+  return corners.reduce((inside, [ax, ay], at) => {
+    const [bx, by] = corners.at(at - 1);
+    const crosses = ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax);
+    return crosses ? !inside : inside;
+  }, false);
+}
+
 export class MapView {
   /** `fly([{id, x, y}])` is called when drones were dragged there. */
   constructor(mesh, card, fly) {
@@ -40,6 +50,8 @@ export class MapView {
     this.onPlace = null; // called with the place (x, y) of a click, while the user chooses one
     this.newDrone = null; // {x, y, gateway}, where a drone would be added
     this.held = []; // [{id, x, y}] that are about to leave
+    this.shownMoves = []; // [{id, x, y}] of a formation that is planned
+    this.lasso = null; // the corners [x, y], px, while the user draws it; []: before the first
     this.mission = [];
     this.options = { known: true, ranges: false, trails: false };
     this.colours = readColours();
@@ -121,6 +133,28 @@ export class MapView {
     this.redraw();
   }
 
+  /** Shows where these drones [{id, x, y}] would fly. */
+  showMoves(moves) {
+    this.shownMoves = moves;
+    this.redraw();
+  }
+
+  /** From now on a drag draws a lasso, and selects the drones inside; false: it moves the map again. */
+  chooseLasso(on) {
+    this.lasso = on ? [] : null;
+    document.body.toggleAttribute("data-lasso", on);
+    this.redraw();
+  }
+
+  #catch() {
+    const radius = droneRadius(this.camera, this.mesh);
+    const caught = [...this.mesh.nodes.values()].filter(
+      (node) => node.position && isInside(onScreen(this.camera, node, radius), this.lasso),
+    );
+    this.mesh.selectGroup(caught.map((node) => node.id));
+    this.lasso = [];
+  }
+
   fit() {
     this.camera.fit(this.#points(), this.#covered());
     this.moved = false;
@@ -188,6 +222,7 @@ export class MapView {
     const drawn = drawMesh(context, this.camera, this.mesh, this.colours, options, this.#goals());
     this.radius = drawn.radius;
     drawMission(context, this.camera, this.mission, this.colours);
+    if (this.lasso?.length) drawLasso(context, this.lasso, this.colours);
     for (const mark of this.marks) drawMark(context, mark, this.colours);
     if (this.newDrone)
       drawNewDrone(
@@ -206,6 +241,7 @@ export class MapView {
   #goals() {
     return [
       ...this.held,
+      ...this.shownMoves,
       ...(this.drag ? this.#moves(this.drag.id, this.drag.x, this.drag.y) : []),
     ];
   }
@@ -290,7 +326,9 @@ export class MapView {
     this.canvas.height = Math.round(clientHeight * ratio);
     this.camera.width = clientWidth;
     this.camera.height = clientHeight;
-    if (this.fitted && !this.moved) this.fit();
+    const { places } = this.stage; // while they are in view, the scale stays
+    const seen = places.length && places.every((place) => this.#inView(place, IN_VIEW_PX));
+    if (this.fitted && !this.moved && !seen) this.fit();
     else if (this.mesh.selected !== null) this.show(this.mesh.selected);
     this.#draw();
   }
@@ -348,6 +386,7 @@ export class MapView {
     if (Math.hypot(event.offsetX - pointer.startX, event.offsetY - pointer.startY) > DRAG_AFTER_PX)
       pointer.moved = true;
     if (this.pointers.size > 1) this.#pinch(pointer, event);
+    else if (pointer.moved && this.lasso) this.lasso.push([event.offsetX, event.offsetY]);
     else if (pointer.moved && pointer.mayDrag) {
       const [x, y] = this.camera.toWorld(event.offsetX, event.offsetY);
       this.drag = { id: pointer.node, x, y };
@@ -373,7 +412,8 @@ export class MapView {
     const pointer = this.pointers.get(event.pointerId);
     this.pointers.delete(event.pointerId);
     if (!pointer) return;
-    if (this.drag) {
+    if (pointer.moved && this.lasso) this.#catch();
+    else if (this.drag) {
       const { id, x, y } = this.drag;
       this.drag = null;
       this.fly(this.#moves(id, x, y));

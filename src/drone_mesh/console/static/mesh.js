@@ -32,7 +32,8 @@ export class Mesh extends EventTarget {
     this.links = { known: [], lost: [], route: [], soon: [] }; // use -> [[id, higher id]]
     this.events = [];
     this.samples = [];
-    this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}}
+    this.story = {}; // of a demonstration: {running, steps: [{t, text}], wait: {left, of}, cast: [id], places: [[x, y, z]]}
+    this.alarms = []; // [{text, nodes, since, over, acknowledged}]
     this.recording = ""; // its name, if the console shows one
     this.timeline = {}; // {start, end, now, live, paused, factor, packets} of the recorded time
     this.marks = []; // on the time line: [{t, kind, node}]
@@ -49,6 +50,7 @@ export class Mesh extends EventTarget {
       this.events = [];
       this.samples = [];
       this.story = {};
+      this.alarms = [];
     }
     if (frame.full || frame.obstacles) this.obstacles = frame.obstacles ?? [];
     this.clock = frame.clock;
@@ -73,6 +75,7 @@ export class Mesh extends EventTarget {
     if (frame.events) this.events = this.events.concat(frame.events).slice(-this.limits.events);
     if (frame.samples)
       this.samples = this.samples.concat(frame.samples).slice(-this.limits.samples);
+    if (frame.alarms) this.alarms = frame.alarms;
     if (frame.story) this.story = frame.story;
     if (frame.full || frame.story) this.#notify("story");
     for (const id of this.group) if (!this.nodes.has(id)) this.group.delete(id);
@@ -146,6 +149,13 @@ export class Mesh extends EventTarget {
     if (!this.group.size && this.selected !== null) this.group.add(this.selected);
     if (!this.group.delete(id)) this.group.add(id);
     this.select(this.group.size ? [...this.group].at(-1) : null, true);
+    this.#notify("select");
+  }
+
+  /** Selects these nodes and no others. */
+  selectGroup(ids) {
+    this.group = new Set(ids.length > 1 ? ids : []);
+    this.select(ids.at(-1) ?? null, true);
     this.#notify("select");
   }
 

@@ -169,6 +169,14 @@ export function idLink(mesh, id, tabIndex = 0) {
   return link;
 }
 
+const IDS_SHOWN = 8;
+
+/** These nodes as buttons that select them: the first few, and how many more. */
+export function idLinks(mesh, ids) {
+  const shown = ids.slice(0, IDS_SHOWN).flatMap((id, at) => [at ? ", " : "", idLink(mesh, id, -1)]);
+  return ids.length > IDS_SHOWN ? [...shown, ` and ${ids.length - IDS_SHOWN} more`] : shown;
+}
+
 function byId(id) {
   return document.getElementById(id);
 }

@@ -53,8 +53,14 @@ function metres(node, axis) {
 }
 
 export class NodeTable {
-  constructor(mesh, table) {
+  /** `filter` is a field for a text, `onlyProblems` a box: rows that do not match are hidden. */
+  constructor(mesh, table, filter, onlyProblems) {
     this.mesh = mesh;
+    this.filter = filter;
+    this.onlyProblems = onlyProblems;
+    this.count = table.parentElement.parentElement.querySelector("output");
+    filter.addEventListener("input", () => this.#hide());
+    onlyProblems.addEventListener("change", () => this.#hide());
     this.body = table.tBodies[0];
     this.head = table.tHead.rows[0];
     this.rows = new Map();
@@ -105,7 +111,31 @@ export class NodeTable {
     }
     for (const id of changed) this.#fill(this.mesh.nodes.get(id));
     this.#sort();
+    this.#hide();
     this.#mark(false);
+  }
+
+  /** Whether a row is shown. */
+  #matches(node) {
+    if (this.onlyProblems.checked && !node.trouble && !node.since) return false;
+    const text = this.filter.value.trim().toLowerCase();
+    const known = [node.id, node.condition, node.trouble, node.order, node.since, node.repair];
+    return !text || known.join(" ").toLowerCase().includes(text);
+  }
+
+  /** The ids of the rows that are shown. */
+  get shown() {
+    return [...this.rows].flatMap(([id, row]) => (row.hidden ? [] : [id]));
+  }
+
+  #hide() {
+    let shown = 0;
+    for (const [id, row] of this.rows) {
+      row.hidden = !this.#matches(this.mesh.nodes.get(id));
+      shown += !row.hidden;
+    }
+    const text = shown < this.rows.size ? `${shown} of ${this.rows.size}` : "";
+    if (this.count.textContent !== text) this.count.textContent = text;
   }
 
   #fill(node) {
@@ -154,12 +184,18 @@ export class NodeTable {
       else row.removeAttribute("aria-selected");
       if (selected && scroll) row.scrollIntoView({ block: "nearest" });
     }
-    const focusable = this.rows.get(this.mesh.selected) ?? this.body.firstElementChild;
+    const focusable =
+      this.rows.get(this.mesh.selected) ?? this.body.querySelector("tr:not([hidden])");
     for (const row of this.body.rows) row.tabIndex = row === focusable ? 0 : -1;
   }
 
-  /** Scrolls to the row of this node. */
+  /** Scrolls to the row of this node; a filter that hides it ends. */
   reveal(id) {
+    if (this.rows.get(id)?.hidden) {
+      this.filter.value = "";
+      this.onlyProblems.checked = false;
+      this.#hide();
+    }
     this.rows.get(id)?.scrollIntoView({ block: "nearest" });
   }
 
@@ -172,9 +208,9 @@ export class NodeTable {
 
   #key(event) {
     const row = event.target.closest("tr");
-    const to = { ArrowDown: row.nextElementSibling, ArrowUp: row.previousElementSibling }[
-      event.key
-    ];
+    const next = { ArrowDown: "nextElementSibling", ArrowUp: "previousElementSibling" }[event.key];
+    let to = row[next];
+    while (to?.hidden) to = to[next];
     if (event.key === "Enter") this.#choose(event);
     else if (to) {
       event.preventDefault();

@@ -1,0 +1,128 @@
+"""Alarms: what needs attention, kept until somebody has seen it and it is over."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Iterable
+
+from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.drone.roles import Role
+from drone_mesh.state.condition import Condition, condition_of
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+
+LOW_BATTERY_PERCENT = 20.0  # our choice
+_ORDER_FAILURES = {  # the words of the alarm; the reason follows
+    MeshEventKind.ORDER_REFUSED.value: "refused an order",
+    MeshEventKind.ORDER_LOST_CONTACT.value: "lost contact during an order",
+    MeshEventKind.ORDER_GIVEN_UP.value: "gave up an order",
+}
+_ORDER_ENDS = (MeshEventKind.ORDER_ARRIVED.value, MeshEventKind.ORDER_ACCEPTED.value)
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """One alarm of one node."""
+
+    node: int
+    text: str  # what is wrong, after the name of the node
+    since_s: float  # simulated
+    until_s: float = math.inf  # inf: it lasts
+    acknowledged: bool = False
+
+
+class AlarmBook:
+    """All alarms of a mesh. Belongs to one thread."""
+
+    def __init__(self) -> None:
+        self._alarms: dict[tuple[int, str], Alarm] = {}  # by node and text, oldest first
+        self._was_connected: set[int] = set()
+
+    def update(self, mesh: MeshStatus) -> None:
+        """Compare with a state of the mesh: alarms begin and end."""
+        now: set[tuple[int, str]] = set()
+        for node in mesh.nodes:
+            now.update((node.id, text) for text in self._troubles(node))
+            if node.connected:
+                self._was_connected.add(node.id)
+        ids = {node.id for node in mesh.nodes}
+        for key in now:
+            if key not in self._alarms or self._alarms[key].until_s < math.inf:
+                self._alarms[key] = Alarm(*key, since_s=mesh.stamp_s)
+        for key, alarm in list(self._alarms.items()):
+            if key not in now and not (_of_order(alarm.text) and alarm.node in ids):
+                self._end(key, mesh.stamp_s)
+
+    def take(self, events: Iterable[EventRecord]) -> None:
+        """Process new events: an order failed, or a later one did not."""
+        for event in events:
+            if len(event.peers) != 1:
+                continue
+            drone = event.peers[0]
+            if event.kind in _ORDER_FAILURES:
+                _order, _, why = event.detail.partition(": ")
+                key = drone, f"{_ORDER_FAILURES[event.kind]}: {why}"
+                self._alarms[key] = Alarm(*key, since_s=event.stamp_s)
+            elif event.kind in _ORDER_ENDS:
+                for key in [key for key in self._alarms if key[0] == drone and _of_order(key[1])]:
+                    self._end(key, event.stamp_s)
+
+    def acknowledge(self, text: str) -> int:
+        """Somebody has seen the alarms with this text; returns how many. What is over goes."""
+        seen = [key for key in self._alarms if key[1] == text]
+        for key in seen:
+            if self._alarms[key].until_s < math.inf:
+                del self._alarms[key]
+            else:
+                self._alarms[key] = replace(self._alarms[key], acknowledged=True)
+        return len(seen)
+
+    def groups(self) -> list[dict[str, Any]]:
+        """For pages: nodes with the same alarm together, those that last and are new first."""
+        found: dict[tuple[bool, bool, str], list[Alarm]] = {}
+        for alarm in self._alarms.values():
+            key = alarm.acknowledged, alarm.until_s < math.inf, alarm.text
+            found.setdefault(key, []).append(alarm)
+        return [
+            {
+                "text": text,
+                "nodes": sorted(alarm.node for alarm in alarms),
+                "since": round(min(alarm.since_s for alarm in alarms), 1),
+                "over": over,
+                "acknowledged": acknowledged,
+            }
+            for (acknowledged, over, text), alarms in sorted(
+                found.items(), key=lambda item: item[0]
+            )
+        ]
+
+    def forget(self) -> None:
+        """A new run has begun."""
+        self._alarms.clear()
+        self._was_connected.clear()
+
+    def _end(self, key: tuple[int, str], now_s: float) -> None:
+        alarm = self._alarms[key]
+        if alarm.acknowledged:
+            del self._alarms[key]
+        elif alarm.until_s == math.inf:
+            self._alarms[key] = replace(alarm, until_s=now_s)
+
+    def _troubles(self, node: NodeStatus) -> list[str]:
+        condition = condition_of(node)
+        if condition is Condition.SILENT:
+            return ["does not report"]
+        found = []
+        if node.crashed:
+            found.append("crashed")
+        if node.battery <= LOW_BATTERY_PERCENT:  # false if it is not known
+            found.append("low battery")
+        is_lost = condition is Condition.DISCONNECTED and node.role == Role.ROUTER
+        if is_lost and node.id in self._was_connected:
+            found.append("lost the gateway")
+        return found
+
+
+def _of_order(text: str) -> bool:
+    """Whether an alarm is about an order, and lasts until the next one."""
+    return text.startswith(tuple(_ORDER_FAILURES.values()))

@@ -1,0 +1,75 @@
+"""Alarms last until somebody has seen them and they are over."""
+
+from __future__ import annotations
+
+from drone_mesh.state.alarms import AlarmBook
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+
+
+def state(now_s, *nodes):
+    return MeshStatus(now_s, nodes)
+
+
+def lost(node):
+    return NodeStatus(node)
+
+
+def well(node, **fields):
+    return NodeStatus(node, connected=True, **fields)
+
+
+def said(book):
+    return [(g["text"], g["nodes"], g["over"], g["acknowledged"]) for g in book.groups()]
+
+
+def test_nodes_with_the_same_alarm_are_one_entry_since_the_first():
+    book = AlarmBook()
+    book.update(state(1.0, well(1), well(2)))
+    book.update(state(5.0, lost(1), well(2)))
+    book.update(state(6.0, lost(1), lost(2)))
+    assert said(book) == [("lost the gateway", [1, 2], False, False)]
+    assert book.groups()[0]["since"] == 5.0
+
+
+def test_a_node_that_never_had_a_gateway_has_lost_none():
+    book = AlarmBook()
+    book.update(state(1.0, lost(1)))
+    assert said(book) == []
+
+
+def test_an_alarm_that_is_over_stays_until_it_is_acknowledged():
+    book = AlarmBook()
+    book.update(state(1.0, well(1)))
+    book.update(state(2.0, lost(1)))
+    book.update(state(3.0, well(1)))
+    assert said(book) == [("lost the gateway", [1], True, False)]
+    assert book.acknowledge("lost the gateway") == 1
+    assert said(book) == []
+
+
+def test_an_acknowledged_alarm_stays_until_it_is_over_and_comes_back_as_new():
+    book = AlarmBook()
+    book.update(state(1.0, well(1, battery=12.0)))
+    book.acknowledge("low battery")
+    book.update(state(2.0, well(1, battery=11.0)))
+    assert said(book) == [("low battery", [1], False, True)]
+    book.update(state(3.0, well(1, battery=90.0)))
+    assert said(book) == []
+    book.update(state(4.0, well(1, battery=12.0)))
+    assert said(book) == [("low battery", [1], False, False)]
+
+
+def test_a_failed_order_is_an_alarm_until_a_later_order_is_accepted():
+    book = AlarmBook()
+    order = "order 7 to x 1.00 m, y 2.00 m, z 3 m"
+    book.take([EventRecord(1.0, 0, "order refused", (4,), f"{order}: battery at 9 %")])
+    book.update(state(2.0, well(4)))
+    assert said(book) == [("refused an order: battery at 9 %", [4], False, False)]
+    book.take([EventRecord(3.0, 0, "order accepted", (4,), "order 8 to x 0.00 m")])
+    assert said(book) == [("refused an order: battery at 9 %", [4], True, False)]
+
+
+def test_silent_and_crashed_nodes_are_alarms():
+    book = AlarmBook()
+    book.update(state(1.0, well(1, report_age=60.0), well(2, crashed=True)))
+    assert {text for text, *_ in said(book)} == {"does not report", "crashed"}
