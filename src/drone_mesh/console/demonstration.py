@@ -41,7 +41,7 @@ _SLOW_DOWN_S = 4.0  # before the wait ends, so that a slow page does not miss wh
 
 
 @dataclass(frozen=True)
-class Plan:
+class Casting:
     """Who takes part in a demonstration, and what the fleet was like before it."""
 
     gateway: int
@@ -52,7 +52,7 @@ class Plan:
     was_off: Sequence[int]  # of the gateway and the cast
 
     @classmethod
-    def of(cls, mesh: MeshStatus) -> Plan:
+    def of(cls, mesh: MeshStatus) -> Casting:
         """Choose the routers with the shortest routes. Raises OrderRefused if there are too few."""
         known = [node for node in mesh.nodes if position_is_known(node)]
         gateways = [node for node in known if node.role == Role.GATEWAY]
@@ -91,7 +91,7 @@ class RepairDemonstration:
 
     def __init__(self) -> None:
         self.story = RepairStory()
-        self.plan: Plan | None = None  # from the first state on
+        self.plan: Casting | None = None  # from the first state on
         self.is_over = False
         self.is_leaving = False  # it puts everything back
         self._script: Script = self._play()
@@ -129,7 +129,7 @@ class RepairDemonstration:
     def _play(self) -> Script:
         mesh = yield []
         self._factor_before = mesh.real_time_factor
-        self.plan = plan = Plan.of(mesh)
+        self.plan = plan = Casting.of(mesh)
         chain, group = plan.cast[:_CHAIN], plan.cast[_CHAIN:]
         lost = chain[-1]
         self.story.add(

@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from typing import Any, Mapping, Sequence
 
 from drone_mesh.console.controls import MeshControls, OrderRefused
-from drone_mesh.console.demonstration import Order, Plan, RepairDemonstration
+from drone_mesh.console.demonstration import Order, Casting, RepairDemonstration
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.state.model import MeshStatus
 
@@ -30,7 +30,7 @@ class Stage:
         """What a demonstration would do, as a question. Raises OrderRefused if it cannot begin."""
         if self._store.mesh is None:
             raise OrderRefused("no state of a mesh yet")
-        return Plan.of(self._store.mesh).in_words()
+        return Casting.of(self._store.mesh).in_words()
 
     def begin(self) -> str:
         """Begin a demonstration; returns words for the page. Raises OrderRefused."""

@@ -229,14 +229,22 @@ byId("speed").addEventListener("change", (event) => {
   setSpeed(Boolean(mesh.clock.paused), Number(event.target.value));
   event.target.blur();
 });
-byId("layout-form").addEventListener("submit", (event) => {
+byId("layout-form").addEventListener("submit", async (event) => {
   event.preventDefault();
   const number = Number(byId("layout").value);
   const [, , places] = mesh.layouts.find(([known]) => known === number);
   const moves = movesTo(places);
   const send = () => order({ do: "layout", case: number }, event.submitter);
-  if (moves.length) flights.hold(moves, namesIn(`Layout ${number}`, moves, places), send);
-  else send();
+  if (!moves.length) return send();
+  await flights.hold(moves, namesIn(`Layout ${number}`, moves, places), send);
+  const { held } = flights;
+  if (!held.length) return;
+  connection
+    .request({ do: "preview", case: number })
+    .then(
+      ({ text, preview }) => flights.held === held && flights.foresee(text, preview.out_of_reach),
+    )
+    .catch(() => {}); // the order itself is answered
 });
 
 byId("load-places").addEventListener("change", async (event) => {

@@ -85,7 +85,8 @@ export function drawingOrder(mesh) {
 
 /**
  * Returns the counts {drones, links, linksDrawn, routeLinks, lostLinks} and the radius of drones, px; links are the known and the route links.
- * `goals` are [{id, x, y}] of drones that are dragged or about to leave, in metres.
+ * `goals` are [{id, x, y, lost}] of drones that are dragged or about to leave, in metres; `lost`: whether they would be out of
+ * reach there, if that is known.
  */
 export function drawMesh(context, camera, mesh, colours, options, goals) {
   context.clearRect(0, 0, camera.width, camera.height);
@@ -164,6 +165,7 @@ export function drawMesh(context, camera, mesh, colours, options, goals) {
   draw(drones.filter((node) => !options.cast.has(node.id)));
   if (options.cast.size) dim(context, camera, mesh, colours, radius, options.cast);
   draw(drones.filter((node) => options.cast.has(node.id)));
+  for (const goal of goals) drawReach(context, camera, goal, mesh.clock.range, colours);
   for (const goal of goals)
     drawGoal(
       context,
@@ -471,10 +473,23 @@ export function idSize(id, r) {
   return Math.min(0.95 * r, (1.6 * r) / (DIGIT_WIDTH * String(id).length));
 }
 
+/** How far (`range`, m) a drone's radio would reach at its goal, if that was looked into. */
+function drawReach(context, camera, goal, range, colours) {
+  if (goal.lost === undefined) return;
+  context.strokeStyle = goal.lost ? colours.disconnected : colours.accent;
+  context.lineWidth = 1;
+  context.globalAlpha = goal.lost ? 0.7 : 0.25;
+  context.beginPath();
+  context.arc(...camera.toScreen(goal.x, goal.y), range * camera.scale, 0, 2 * Math.PI);
+  context.stroke();
+  context.globalAlpha = 1;
+}
+
 function drawGoal(context, camera, node, goal, colours, r, withText) {
   if (!node?.position) return;
   const [px, py] = camera.toScreen(goal.x, goal.y);
-  context.strokeStyle = colours.accent;
+  const colour = goal.lost ? colours.disconnected : colours.accent;
+  context.strokeStyle = colour;
   context.lineWidth = 2;
   context.setLineDash([6, 4]);
   context.beginPath();
@@ -485,7 +500,7 @@ function drawGoal(context, camera, node, goal, colours, r, withText) {
   context.beginPath();
   context.arc(px, py, r, 0, 2 * Math.PI);
   context.globalAlpha = 0.5;
-  context.fillStyle = colours.accent;
+  context.fillStyle = colour;
   context.fill();
   context.globalAlpha = 1;
   if (!withText) return;

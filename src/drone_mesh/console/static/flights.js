@@ -37,6 +37,14 @@ export class Flights extends EventTarget {
     this.#timer = setTimeout(() => this.#release(), HOLD_MS);
   }
 
+  /** Says what will come of the held orders; `lost` are the drones that would be out of reach. */
+  foresee(text, lost) {
+    if (!this.held.length) return;
+    byId("held-text").textContent += `: ${text}`;
+    this.held = this.held.map((move) => ({ ...move, lost: lost.includes(move.id) }));
+    this.dispatchEvent(new Event("change"));
+  }
+
   /** Drops the held orders and says so; returns whether there were any. */
   undo() {
     const held = this.held.length > 0;

@@ -157,9 +157,9 @@ export class Formations {
     const typed = this.#typed();
     byId("formation-error").textContent = typed.wrong?.error ?? "";
     const moves = typed.wrong ? [] : this.#moves(typed);
-    this.map.showMoves(moves);
-    byId("formation-send").disabled = !moves.length;
     const lost = outOfReach(this.mesh, moves);
+    this.map.showMoves(moves.map((move) => ({ ...move, lost: lost.includes(move.id) })));
+    byId("formation-send").disabled = !moves.length;
     const ids = lost.slice(0, 8).join(", ") + (lost.length > 8 ? " …" : "");
     byId("formation-text").textContent =
       `${moves.length} drones around ${this.middle.join(", ")} m. ` +

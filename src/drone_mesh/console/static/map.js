@@ -177,10 +177,12 @@ export class MapView {
       const shown = nodes.filter((node) => cast.has(node.id) && node.role === 1 && node.position);
       return [...places, ...shown.map((node) => node.position)];
     }
-    return nodes.flatMap((node) => [
+    const planned = this.shownMoves.map(({ x, y }) => [x, y]);
+    const present = nodes.flatMap((node) => [
       ...(node.position ? [node.position] : []),
       ...(node.path.length ? [node.path.slice(-3)] : []),
     ]);
+    return [...planned, ...present];
   }
 
   /** Whether this place is in view; `margin` px from the edges. */
