@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from typing import Any, Mapping, Sequence
 
 from drone_mesh.console.controls import MeshControls, OrderRefused
-from drone_mesh.console.demonstration import Order, Casting, RepairDemonstration
+from drone_mesh.console.demonstration import Casting, Order, RepairDemonstration
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.state.model import MeshStatus
 
