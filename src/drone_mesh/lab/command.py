@@ -19,7 +19,7 @@ from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
 from drone_mesh.lab.proofs.attacks import ATTACKS
-from drone_mesh.lab.proofs.damage import KEY, damage_table, keys_of
+from drone_mesh.lab.proofs.damage import KEY, TABLE_HEAD, damage_row, keys_of, with_row
 from drone_mesh.lab.proofs.fuzz import NODES, crowd, fuzz
 from drone_mesh.lab.status import describe_folder
 from drone_mesh.lab.template import write_template
@@ -163,6 +163,9 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         metavar="N",
         help="number of seeds (default %(default)s)",
     )
+    attack.add_argument(
+        "--page", type=Path, metavar="FILE", help="also write the rows into the table of this page"
+    )
     attack.set_defaults(run=_attack)
 
     fuzzing = commands.add_parser(
@@ -213,8 +216,12 @@ def _attack(options: argparse.Namespace) -> int:
     if options.runs < 1:
         raise MeshError(f"invalid --runs {options.runs}: must be 1 or more")
     logging.disable(logging.WARNING)  # an attacked mesh logs a lot
-    for line in damage_table(options.attacks or list(ATTACKS), options.runs):
-        print(line, flush=True)
+    print(*TABLE_HEAD, sep="\n", flush=True)
+    for name in options.attacks or ATTACKS:
+        row = damage_row(name, options.runs)
+        print(row, flush=True)
+        if options.page is not None:
+            options.page.write_text(with_row(options.page.read_text("utf-8"), row), "utf-8")
     return 0
 
 

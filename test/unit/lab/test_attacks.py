@@ -9,7 +9,15 @@ import pytest
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.command import main
 from drone_mesh.lab.proofs.attacks import ATTACKS, RECORDING
-from drone_mesh.lab.proofs.damage import KEY, Threat, damage_table, keys_of, trial
+from drone_mesh.lab.proofs.damage import (
+    KEY,
+    TABLE_HEAD,
+    Threat,
+    damage_row,
+    keys_of,
+    trial,
+    with_row,
+)
 from drone_mesh.lab.proofs.fuzz import crowd, fuzz, tables
 
 # Tolerance where an attack must have no effect: the scenario alone has slightly different results
@@ -80,12 +88,20 @@ def test_the_bids_of_a_captured_node_delay_a_repair_and_do_not_prevent_it(name):
 def test_the_table_has_a_cell_for_each_case():
     name = "order replayed after 1 s"
     assert ATTACKS[name] in RECORDING
-    heading, _, row = damage_table([name], runs=1)
-    assert heading == "| attack | no attack | without key | with key | captured node |"
+    row = damage_row(name, runs=1)
+    assert TABLE_HEAD[0] == "| attack | no attack | without key | with key | captured node |"
     cells = [cell.strip() for cell in row.split("|")[1:-1]]
     assert cells[0] == name
     assert all("later 0 %" in cell for cell in cells[1:4])
     assert cells[4] == ""
+
+
+def test_a_new_row_replaces_the_old_one_of_its_attack_in_the_page():
+    page = "\n".join(("before", *TABLE_HEAD, "| one | 1 |", "| two | 2 |", "", "after"))
+    page = with_row(page, "| one | 3 |")
+    page = with_row(page, "| four | 4 |")
+    rows = ("| one | 3 |", "| two | 2 |", "| four | 4 |")
+    assert page == "\n".join(("before", *TABLE_HEAD, *rows, "", "after"))
 
 
 def test_an_unknown_attack_is_an_error_in_one_line(capsys):

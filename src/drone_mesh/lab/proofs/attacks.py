@@ -24,6 +24,7 @@ from drone_mesh.communication.messages import (
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.radio import InProcessAir
+from drone_mesh.lab.proofs import claims
 from drone_mesh.lab.proofs.stranger import Stranger
 
 ATTACK_S = 60.0
@@ -206,6 +207,12 @@ ATTACKS: Mapping[str, Attack] = {
     "relay that swallows": swallowing_relay,
     "heartbeats of invented ids": invented_ids,
     "frames in neighbours' names": borrowed_names,
+    "a counter far ahead": claims.far_counter,
+    "packets in receivers' own names": claims.own_names,
+    "nonces in drones' names": claims.claimed_nonces,
+    "beacons of a black hole": claims.beacon_black_hole,
+    "beacons with numbers ahead": claims.beacons_ahead,
+    "beacons in neighbours' names": claims.beacons_in_names,
 }
 RECORDING = (replayed_order, replay_after_restart, replay_on_another_path)
 

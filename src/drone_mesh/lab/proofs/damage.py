@@ -5,10 +5,11 @@ from __future__ import annotations
 import enum
 import math
 import statistics
-from typing import AbstractSet, Iterator, NamedTuple, Sequence
+from typing import AbstractSet, NamedTuple, Sequence
 
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.messages import present
+from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.seals.keys import Keys, MeshKey
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import MeshError
@@ -20,6 +21,7 @@ from drone_mesh.lab.proofs.attacks import (
     invented_ids,
     plausible_bid,
 )
+from drone_mesh.lab.proofs.claims import BY_BEACONS
 from drone_mesh.lab.proofs.stranger import BESIDE, Stranger
 
 NODES, SHARED_NODES = 25, 9
@@ -58,7 +60,10 @@ def trial(name: str, threat: Threat, seed: int) -> Damage:
     shared = attack is invented_ids  # where an answer to an absent node costs airtime
     radio = "shared" if shared else "disc"
     network = Network(
-        seed, radio=radio, key=keys_of if threat in (Threat.WITH_KEY, Threat.CAPTURED) else None
+        seed,
+        radio=radio,
+        key=keys_of if threat in (Threat.WITH_KEY, Threat.CAPTURED) else None,
+        routing="beacon" if attack in BY_BEACONS else DEFAULT_ROUTING,
     )
     if attack in (highest_bid, plausible_bid):
         network.add_gateway(0, 0.0, 0.0)
@@ -101,19 +106,35 @@ def share_cut_off(network: Network, swallow: AbstractSet[int] = frozenset()) -> 
     return sum(not _arrives(network, n, swallow) for n in powered) / len(powered)
 
 
-def damage_table(names: Sequence[str], runs: int) -> Iterator[str]:
-    """The lines of a Markdown table: means over the runs, and the farthest of all drones."""
-    yield "| attack | " + " | ".join(threat.value for threat in Threat) + " |"
-    yield "|---" * (1 + len(Threat)) + "|"
-    for name in names:
-        cells = []
-        for threat in Threat:
-            if threat is Threat.CAPTURED and ATTACKS[name] in RECORDING:
-                cells.append("")  # a captured node replays recordings like any other radio
-                continue
-            damage = [trial(name, threat, seed) for seed in range(runs)]
-            cells.append(_in_words(damage))
-        yield f"| {name} | " + " | ".join(cells) + " |"
+TABLE_HEAD = (
+    "| attack | " + " | ".join(threat.value for threat in Threat) + " |",
+    "|---" * (1 + len(Threat)) + "|",
+)
+
+
+def damage_row(name: str, runs: int) -> str:
+    """A line of the Markdown table: means over the runs, and the farthest of all drones."""
+    cells = []
+    for threat in Threat:
+        if threat is Threat.CAPTURED and ATTACKS[name] in RECORDING:
+            cells.append("")  # a captured node replays recordings like any other radio
+            continue
+        cells.append(_in_words([trial(name, threat, seed) for seed in range(runs)]))
+    return f"| {name} | " + " | ".join(cells) + " |"
+
+
+def with_row(page: str, row: str) -> str:
+    """The page with this row in its table of attacks: in place of its old one, or at the end."""
+    lines = page.split("\n")
+    first = lines.index(TABLE_HEAD[0])
+    end = next(at for at in range(first, len(lines)) if not lines[at].startswith("|"))
+    name = row.split("|")[1]
+    old = [at for at in range(first, end) if lines[at].split("|")[1] == name]
+    if old:
+        lines[old[0]] = row
+    else:
+        lines.insert(end, row)
+    return "\n".join(lines)
 
 
 def _in_words(damage: Sequence[Damage]) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import random
+import struct
 from collections import Counter
 from typing import Callable, Iterator, NamedTuple
 
@@ -15,6 +17,8 @@ from drone_mesh.communication.seals.sealed_antenna import SealedAntenna
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess.drone import InProcessDrone
 from drone_mesh.inprocess.network import Network
+
+_ANSWER = struct.Struct("<QQI")  # the nonce of the challenge, epoch, counter
 
 BESIDE = 201  # a router of the stranger, without a key
 
@@ -83,6 +87,7 @@ class Stranger(IMeshNetwork):
         )
         self._receiver: IMeshNetwork = self
         self._is_inside = False
+        self._network_key = b"a guess"
         self._air = network.air
         rng = random.Random(f"stranger {node_id}")
         self.antenna: IWirelessCommunication = network.air.antenna(self, rng)
@@ -92,6 +97,7 @@ class Stranger(IMeshNetwork):
         rng = random.Random(f"stranger {self.node_id}")
         clock = self.network.now_s
         self._is_inside = True
+        self._network_key = keys.network
         self.antenna = sealed = SealedAntenna(self.antenna, self.node_id, keys, rng, clock)
         self._receiver = sealed
 
@@ -138,6 +144,37 @@ class Stranger(IMeshNetwork):
             self.antenna.send_message_to(packet)
         else:
             self.play(to, messages.packet(kind, creator, creator, to, forward, body))
+
+    def pass_on(
+        self, kind: int, creator: int, from_: int, to: int, forward: int, body: bytes
+    ) -> None:
+        """Hand `to` a packet of `creator` that `from_` seems to pass on; a captured node does it.
+
+        A captured node cannot pose as another sender: what it has no key for, it sends itself.
+        """
+        if self._is_inside and not self.mute:
+            self.antenna.send_message_to(
+                messages.packet(kind, creator, self.node_id, to, forward, body)
+            )
+        else:
+            self.play(to, messages.packet(kind, creator, from_, to, forward, body))
+
+    def epochs(self) -> dict[int, tuple[int, int]]:
+        """Epoch and counter of the nodes whose answers to challenges it has recorded."""
+        known = {}
+        for recorded in self.record:
+            if recorded.payload[messages.TYPE_AT] == MessageType.SEAL_ANSWER:
+                _nonce, epoch, count = _ANSWER.unpack_from(messages.body(recorded.payload))
+                known[messages.sender(recorded.payload)] = epoch, count
+        return known
+
+    def sealed_to_all(self, payload: bytes, epoch: int, count: int) -> bytes:
+        """A broadcast with the seal of docs/security.md; without its key a wrong one."""
+        head = payload[: messages.TO_AT] + bytes((BROADCAST,))
+        covered = head + payload[messages.FORWARD_AT : 25]
+        tag = hashlib.blake2s(key=self._network_key, digest_size=5, person=b"hop")
+        tag.update(struct.pack("<QI", epoch, count) + covered)
+        return payload[:25] + struct.pack("<H", count % 2**16) + tag.digest()
 
     def play(self, receiver: int, payload: bytes) -> None:
         """Send bytes to one node."""
