@@ -23,9 +23,11 @@ CHECK_S = MeshTiming.check_period_s
 TRIES_PER_YEAR = 500 * 365.25 * 86400
 PAUSE_S = seal.CHALLENGE_AGAIN_S
 
+WORDS = ("no", "one", "two", "three")
+
 SENTENCES = [
     f"limited to three check periods ({antenna.FRESH_PERIODS * CHECK_S:.0f} s)",
-    f"after {['', 'one', 'two', 'three'][bid_credit.WINNERS_WITHOUT_FLIGHT]} winners that do not fly",
+    f"after {WORDS[bid_credit.WINNERS_WITHOUT_FLIGHT]} winners that do not fly",
     f"at most once in {complaints.COMPLAINT_PERIOD_S:g} s per kind",
     f"in {guarded_app.REFUSAL_LOG_PERIOD_S:g} s. In the simulation",
     f"makes a mesh key of {8 * keys.KEY_BYTES} random bits",
@@ -33,8 +35,8 @@ SENTENCES = [
     f"BLAKE2s with {seal.TAG_BYTES} bytes of output over epoch (8 bytes), counter (4 bytes)",
     f"none that is more than {replay.WIDTH - 1} behind the highest",
     f"while more than {seal.WAITING_CHALLENGES // 2} challenges are pending",
-    f"At most {seal.WAITING_CHALLENGES} challenges are pending, each for {seal.CHALLENGE_OUT_S:g} s "
-    f"to {PAUSE_S:g} s, and a node challenges each neighbour at most once in {PAUSE_S:g} s",
+    f"At most {seal.WAITING_CHALLENGES} challenges are pending, each for "
+    f"{seal.CHALLENGE_OUT_S:g} s to {PAUSE_S:g} s, and a node challenges each neighbour at most once in {PAUSE_S:g} s",
     f"at most {seal.WAITING_CHALLENGES / seal.CHALLENGE_OUT_S:g} challenges a second",
     f"claimed more than {seal.OVERTAKING} beyond it",
     f"then doubles, from {PAUSE_S:g} s to {PAUSE_S * 2**seal.DOUBTS:g} s, and all neighbours "
@@ -42,16 +44,16 @@ SENTENCES = [
     f"at most {seal.ANSWERS} of one neighbour and {seal.MOST_ANSWERS} of all in {PAUSE_S:g} s",
     f"remembers the last {seal.NONCES_KEPT} nonces",
     f"at most every {end_to_end.NEW_NONCE_AFTER_S:g} s",
-    f"Its last {['', 'one', 'two', 'three'][end_to_end.NONCES]} nonces are valid",
+    f"Its last {WORDS[end_to_end.NONCES]} nonces are valid",
     f"in the {message_seal.ACK_TAG_BYTES} bytes that are left",
-    f"every {['', 'one', 'two', 'three'][int(swallowing.ASK_PERIODS)]} check periods",
-    f"(at least {['', 'one', 'two'][swallowing.LEAST_UNANSWERED]}) bring no answer",
+    f"every {WORDS[int(swallowing.ASK_PERIODS)]} check periods",
+    f"(at least {WORDS[swallowing.LEAST_UNANSWERED]}) bring no answer",
     f"that next hop for {'ten' if detours.SWALLOWER_AVOIDED_S == 600 else '?'} minutes",
     f"brings no answer for {'a minute' if detours.AVOIDED_S == 60 else '?'}",
     f"one stranger next to the gateway of {damage.NODES} nodes, {damage.SPACING_M:g} m apart",
     f"for invented ids, {damage.SHARED_NODES} nodes on the shared channel",
-    f"Each attack takes {attacks.ATTACK_S:g} s (bids {attacks.BIDDING_S:g} s, relay that swallows "
-    f"{attacks.SWALLOWING_S:g} s, far place {attacks.OUTAGE_S:g} s more, nonces "
+    f"Each attack takes {attacks.ATTACK_S:g} s (bids {attacks.BIDDING_S:g} s, relay that swallows and "
+    f"jammed requests {attacks.SWALLOWING_S:g} s, far place {attacks.OUTAGE_S:g} s more, nonces "
     f"{len(claims.ORDERED)} orders of {claims.ORDER_PERIOD_S:g} s); seeds 0 to 11",
     f"{claims.FAR_AHEAD:,} counts ahead",
     f"*Packets in receivers' own names*: {claims.CLAIMS_PER_S} a second",
