@@ -36,7 +36,8 @@ SENTENCES = [
     f"none that is more than {replay.WIDTH - 1} behind the highest",
     f"while more than {seal.WAITING_CHALLENGES // 2} challenges are pending",
     f"At most {seal.WAITING_CHALLENGES} challenges are pending, each for "
-    f"{seal.CHALLENGE_OUT_S:g} s to {PAUSE_S:g} s, and a node challenges each neighbour at most once in {PAUSE_S:g} s",
+    f"{seal.CHALLENGE_OUT_S:g} s to {PAUSE_S:g} s, and a node challenges each neighbour at most "
+    f"once in {PAUSE_S:g} s",
     f"at most {seal.WAITING_CHALLENGES / seal.CHALLENGE_OUT_S:g} challenges a second",
     f"claimed more than {seal.OVERTAKING} beyond it",
     f"then doubles, from {PAUSE_S:g} s to {PAUSE_S * 2**seal.DOUBTS:g} s, and all neighbours "
@@ -52,9 +53,9 @@ SENTENCES = [
     f"brings no answer for {'a minute' if detours.AVOIDED_S == 60 else '?'}",
     f"one stranger next to the gateway of {damage.NODES} nodes, {damage.SPACING_M:g} m apart",
     f"for invented ids, {damage.SHARED_NODES} nodes on the shared channel",
-    f"Each attack takes {attacks.ATTACK_S:g} s (bids {attacks.BIDDING_S:g} s, relay that swallows and "
-    f"jammed requests {attacks.SWALLOWING_S:g} s, far place {attacks.OUTAGE_S:g} s more, nonces "
-    f"{len(claims.ORDERED)} orders of {claims.ORDER_PERIOD_S:g} s); seeds 0 to 11",
+    f"Each attack takes {attacks.ATTACK_S:g} s (bids {attacks.BIDDING_S:g} s, relay that swallows "
+    f"and jammed requests {attacks.SWALLOWING_S:g} s, far place {attacks.OUTAGE_S:g} s more, "
+    f"nonces {len(claims.ORDERED)} orders of {claims.ORDER_PERIOD_S:g} s); seeds 0 to 11",
     f"{claims.FAR_AHEAD:,} counts ahead",
     f"*Packets in receivers' own names*: {claims.CLAIMS_PER_S} a second",
     f"*Nonces in drones' names*: {claims.CLAIMS_PER_S} a second at the gateway, while the owner "
@@ -114,6 +115,13 @@ def test_the_table_has_a_row_of_the_command_for_each_attack():
                 assert cell == ""
             else:
                 assert re.fullmatch(r"\d+ %, later \d+ %(; \d+\.\d lured, \d+ m)?", cell), name
+
+
+def test_the_page_counts_the_orders_that_claimed_nonces_silence():
+    captured = rows()["nonces in drones' names"][-1]
+    ordered, lost = len(claims.ORDERED), float(re.findall(r"([0-9.]+) lured", captured)[0])
+    done = f"with {claims.CLAIMS_PER_S} claims a second {ordered - lost:.1f} of {ordered} orders"
+    assert f"{done} are carried out" in TEXT
 
 
 def test_what_the_threat_table_calls_prevented_does_no_harm_in_the_attack_table():
