@@ -4,8 +4,8 @@ A message is cut into fragments. The receiver of a reliable one reports the frag
 an ACK: when the message is complete, when its last fragment arrived but others are missing, and in
 answer to a POLL. Missing fragments are then sent again. The sender sends a POLL when no ACK arrives
 in time, and when the window is full; while one is unanswered, it sends nothing else. If there are
-relays on a shared channel on the way, a train takes the place of the window (see Train), also for
-messages that are not reliable, and a pause may follow an answer (see MessagePause).
+relays on a shared channel on the way, a train takes the place of the window (see RelayedWay), also
+for messages that are not reliable, and a pause may follow an answer.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from typing import Callable, Iterator
 from drone_mesh.communication.data import packets
 from drone_mesh.communication.data.congestion_window import CongestionWindow
 from drone_mesh.communication.data.fragmentation import Fragmentation, Seal, leave_plain
-from drone_mesh.communication.data.message_pause import MessagePause
 from drone_mesh.communication.data.outgoing import LIFETIME_S, DataPacket, OutgoingMessage
 from drone_mesh.communication.data.packets import COMPLETE, NO_ANSWER, Ack, Poll
+from drone_mesh.communication.data.relayed_way import RelayedWay
 from drone_mesh.communication.data.round_trip import RoundTrip
 from drone_mesh.communication.data.ticket import TicketState, destination_in_words
-from drone_mesh.communication.data.train import LEAST_LENGTH, Train
+from drone_mesh.communication.data.train import Train
 
 
 class Outbox:
@@ -50,9 +50,8 @@ class Outbox:
         self._fragmentation = Fragmentation(session, room, seal, self._open)
         self._window = CongestionWindow()
         self._round_trip = RoundTrip()
-        self._pace = MessagePause()
+        self._way = RelayedWay(self._round_trip)
         self._nonce = 0
-        self._train: Train | None = None  # while relays share the channel with this node
         self._latest: OutgoingMessage | None = None  # message whose fragment left last
         self._may_begin = True  # another message, after its pause
         self.not_before_s = -math.inf  # no route: time of the next attempt
@@ -68,7 +67,7 @@ class Outbox:
     @property
     def is_idle(self) -> bool:
         """Whether it has nothing to send, now or later."""
-        return not len(self) and (self._train is None or not self._train.is_open)
+        return not len(self) and not self._way.is_open
 
     def add(self, message: OutgoingMessage) -> None:
         """Add a message for this destination."""
@@ -76,20 +75,17 @@ class Outbox:
 
     def set_relayed(self, relayed: bool) -> None:
         """Set whether there are relays on the same channel on the way to the destination."""
-        if not relayed:
-            self._train = None
-        elif self._train is None:
-            self._train = Train()
+        self._way.set_relayed(relayed)
 
     def next_packet(self, now_s: float) -> DataPacket | None:
         """The next packet to send; call `on_sent` once it was sent."""
-        self._may_begin = self._train is None or now_s >= self._pace.until_s
-        train = self._train
+        self._may_begin = not self._way.pauses(now_s)
+        train = self._way.train
         if train is None:
             poll = self._timely_poll(now_s)
             return poll if poll is not None or self._unanswered else self._fragment()
         if train.waits:
-            if now_s < self._train_due_s(train):
+            if now_s < self._way.waits_until_s(train):
                 return None
             if any(message.in_flight for message in self._open.values()):
                 return self._end_of_train()
@@ -117,7 +113,7 @@ class Outbox:
     def _fragment(self) -> DataPacket | None:
         """The next fragment; a POLL if the window is full."""
         in_flight, window = 0, math.inf
-        if self._train is None:
+        if self._way.train is None:
             in_flight, window = self._in_flight(), self._window.size
         for message in self._open.values():
             if message.to_send and message.asked_s == math.inf:
@@ -139,26 +135,17 @@ class Outbox:
         """The packet was sent."""
         message = packet.message
         if packet.ends_train:
-            assert self._train is not None
-            if self._train.waits:
-                self._pace.on_silence(now_s - self._train.asked_s)
-            poll = packets.poll_of(packet.body)
-            self._train.is_open = False
-            if poll.nonce != NO_ANSWER:
-                self._train.asked(poll.nonce, now_s)
+            self._way.end_left(packets.poll_of(packet.body).nonce, now_s)
             return
         if packet.kind == packets.POLL:
-            if self._train is not None:
-                self._train.is_open = False
+            self._way.interrupted()
             if message.asks:
-                self._pace.on_silence(now_s - message.asked_s)
+                self._way.silence(now_s - message.asked_s)
             message.asked_s, message.asks = now_s, message.asks + 1
             return
         self._latest = message
         message.ticket.reason = ""
-        if self._train is not None:
-            self._train.left += 1
-            self._train.is_open |= packet.kind != packets.FRAGMENTS.start
+        self._way.fragment_left(packet.kind)
         index = message.to_send.popleft()
         message.sent |= 1 << index
         if message.to_send:
@@ -194,43 +181,31 @@ class Outbox:
             message = self._open[number]
             if number == ack.number:
                 self._measure(message, ack, now_s)
-                self._rest(patience, now_s)
+                self._way.rest(patience, now_s)
             self._window.grow(message.in_flight)
             self._close(message, TicketState.DELIVERED)
-        self._train_answered(ack, now_s, patience)
-
-    def _train_answered(self, ack: Ack, now_s: float, patience: float) -> None:
-        train = self._train
-        if train is None:
-            return
-        arrived = not self._in_flight()
-        if train.waits and ack.nonce == train.nonce:
-            self._round_trip.measured(now_s - train.asked_s)
-            self._rest(patience, now_s)
-            train.end(arrived)
+        if self._way.answered(ack.nonce, not self._in_flight(), now_s, patience):
             for message in self._open.values():
                 if not message.ticket.reliable:
                     message.sent &= message.known  # lost fragments are not sent again
-        elif arrived and not train.waits:
-            train.end(arrived)
 
     def due_s(self, now_s: float) -> float:
         """When to check this outbox next; infinity while nothing waits in it."""
         due_s = math.inf
         if self.is_idle:
             return due_s
-        train = self._train
+        train = self._way.train
         waits = train is not None and train.waits
         if train is not None and train.waits:
-            due_s = self._train_due_s(train)
+            due_s = self._way.waits_until_s(train)
         for message in self._open.values():
             if message.asked_s < math.inf and not waits:
                 due_s = min(due_s, message.asked_s + self._timeout_s(message))
             due_s = min(due_s, message.expires_s)
         if self._waiting:
             due_s = min(due_s, self._waiting[0].expires_s)
-            if now_s < self._pace.until_s:
-                due_s = min(due_s, self._pace.until_s)
+            if now_s < self._way.pause_ends_s():
+                due_s = min(due_s, self._way.pause_ends_s())
         return self.not_before_s if now_s < self.not_before_s else due_s
 
     def expire(self, now_s: float, has_route: bool) -> None:
@@ -254,8 +229,7 @@ class Outbox:
 
     def waits_because(self, reason: str) -> None:
         """Nothing is sent for now."""
-        if self._train is not None:
-            self._train.is_open = False
+        self._way.interrupted()
         for message in self:
             message.ticket.reason = reason
 
@@ -277,7 +251,7 @@ class Outbox:
             self._remove(message)
             message.begin_again()
         if messages:
-            self._train = None  # it ended with them
+            self._way.begin_again()
         return messages
 
     # One message ------------------------------------------------------------------------------
@@ -341,19 +315,13 @@ class Outbox:
             again = [index for index in range(len(packets.FRAGMENTS)) if lost >> index & 1]
             message.to_send.extendleft(reversed(again))
 
-    def _rest(self, patience: float, now_s: float) -> None:
-        """An answer came: pause, for a shorter time after a train that can still become shorter."""
-        if self._train is not None:
-            share = min(1.0, LEAST_LENGTH / max(1, self._train.left))
-            self._pace.on_answer(share * self._round_trip.mean_s, patience, now_s)
-
     def _measure(self, message: OutgoingMessage, ack: Ack, now_s: float) -> None:
         """Learn the round trip from an answer: to its latest POLL, or to its last fragment.
 
         The latter may arrive after a POLL; without it, a timeout that is too short would stay so.
         """
-        if self._train is not None and ack.nonce == self._train.nonce != 0:
-            return  # an answer to the train, which measures itself
+        if self._way.measures(ack.nonce):
+            return
         if ack.nonce and ack.nonce == message.nonce:
             self._round_trip.measured(now_s - message.asked_s)
         elif ack.nonce == 0 and message.whole:
@@ -371,9 +339,6 @@ class Outbox:
             del self._open[message.head.number]
 
     # Timeouts ---------------------------------------------------------------------------------
-
-    def _train_due_s(self, train: Train) -> float:
-        return train.asked_s + self._round_trip.timeout_s(max(0, train.asks - 1))
 
     def _timeout_s(self, message: OutgoingMessage) -> float:
         return self._round_trip.timeout_s(max(0, message.asks - 1))

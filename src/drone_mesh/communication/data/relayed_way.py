@@ -1,0 +1,98 @@
+"""RelayedWay: how one outbox shares the channel with the relays on its way.
+
+It sends trains instead of single packets (see Train), and pauses between messages (MessagePause).
+Without relays on the same channel there is no train, and no pause counts.
+"""
+
+from __future__ import annotations
+
+from drone_mesh.communication.data import packets
+from drone_mesh.communication.data.message_pause import MessagePause
+from drone_mesh.communication.data.round_trip import RoundTrip
+from drone_mesh.communication.data.train import LEAST_LENGTH, Train
+
+
+class RelayedWay:
+    """The train that is under way, if there are relays, and the pause after it."""
+
+    def __init__(self, round_trip: RoundTrip) -> None:
+        """`round_trip`: of the outbox; answers to trains are measured in it."""
+        self.train: Train | None = None
+        self._round_trip = round_trip
+        self._pause = MessagePause()
+
+    def set_relayed(self, relayed: bool) -> None:
+        """Set whether there are relays on the same channel."""
+        if not relayed:
+            self.train = None
+        elif self.train is None:
+            self.train = Train()
+
+    def begin_again(self) -> None:
+        """Its messages were taken away."""
+        self.train = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether relays wait for more of a train."""
+        return self.train is not None and self.train.is_open
+
+    def pauses(self, now_s: float) -> bool:
+        """Whether no message begins now."""
+        return self.train is not None and now_s < self._pause.until_s
+
+    def pause_ends_s(self) -> float:
+        """When the latest pause ends, or ended."""
+        return self._pause.until_s
+
+    def waits_until_s(self, train: Train) -> float:
+        """When to ask again for the answer that a train waits for."""
+        return train.asked_s + self._round_trip.timeout_s(max(0, train.asks - 1))
+
+    def interrupted(self) -> None:
+        """Nothing follows for now, so relays need not wait."""
+        if self.train is not None:
+            self.train.is_open = False
+
+    def fragment_left(self, kind: int) -> None:
+        """A fragment was sent."""
+        if self.train is not None:
+            self.train.left += 1
+            self.train.is_open |= kind != packets.FRAGMENTS.start
+
+    def end_left(self, nonce: int, now_s: float) -> None:
+        """The POLL that ends a train was sent."""
+        train = self.train
+        assert train is not None
+        if train.waits:
+            self.silence(now_s - train.asked_s)
+        train.is_open = False
+        if nonce != packets.NO_ANSWER:
+            train.asked(nonce, now_s)
+
+    def silence(self, timeout_s: float) -> None:
+        """No answer came in time."""
+        self._pause.on_silence(timeout_s)
+
+    def rest(self, patience: float, now_s: float) -> None:
+        """An answer came: pause, for a shorter time after a train that can still become shorter."""
+        if self.train is not None:
+            share = min(1.0, LEAST_LENGTH / max(1, self.train.left))
+            self._pause.on_answer(share * self._round_trip.mean_s, patience, now_s)
+
+    def answered(self, nonce: int, arrived: bool, now_s: float, patience: float) -> bool:
+        """An answer came; `arrived`: nothing is known to be missing. True: it ends a train."""
+        train = self.train
+        if train is None:
+            return False
+        ends = train.waits and nonce == train.nonce
+        if ends:
+            self._round_trip.measured(now_s - train.asked_s)
+            self.rest(patience, now_s)
+        if ends or (arrived and not train.waits):
+            train.end(arrived)
+        return ends
+
+    def measures(self, nonce: int) -> bool:
+        """Whether an answer with this nonce is to the train, which measures itself."""
+        return self.train is not None and nonce == self.train.nonce != 0
