@@ -105,6 +105,21 @@ def test_a_drone_that_turns_tells_its_neighbours_at_once():
     assert motion.velocity[2] == pytest.approx(1.5, abs=0.1)
 
 
+def test_a_parent_asked_for_a_sign_of_life_sends_a_beacon_for_all_its_children():
+    network = grid(side=2, radio="disc")
+    sent = []
+    broadcast = network.nodes[0].antenna.broadcast_message
+    network.nodes[0].antenna.broadcast_message = lambda packet: sent.append(broadcast(packet))
+    network.run_for(20.0)
+    sent.clear()
+    assert network.run_until(lambda: sent, within_s=2.0)
+    network.run_for(0.5)
+    sent.clear()
+    network.inject(0, bytes.fromhex("01 01 2b 00 00").ljust(32, b"\0"))
+    network.run_for(0.1)
+    assert len(sent) == 1
+
+
 def test_a_drone_that_others_fly_stays_reachable():
     echoes, served = arrivals(moving(), 30)
     assert echoes >= 0.95

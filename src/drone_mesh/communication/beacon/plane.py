@@ -7,7 +7,7 @@ import math
 from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.own_motion import OwnMotion
 from drone_mesh.communication.beacon.packets import Beacon, Found, Motion, Search
-from drone_mesh.communication.beacon.routes import BeaconRoutes
+from drone_mesh.communication.beacon.routes import BeaconRoutes, Neighbour
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
 from drone_mesh.communication.beacon.trickle import Trickle
 from drone_mesh.communication.control_plane import IControlHost, IControlPlane, IControlTechnique
@@ -23,7 +23,8 @@ from drone_mesh.drone.location import Location
 HELD_S = 2.5  # our choice: a packet without a next hop waits this long
 RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
 CHECK_S = 1.0  # our choice: how often a router without a gateway considers its repair
-LATE = 1.3  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
+LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
+TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
 LATE_S = 2.0  # our choice: one lost beacon of a frequent sender says little
 GATEWAY_PLACE_EVERY = 4  # beacons: one of so many carries the gateway's place
 DIGEST_EVERY = 4  # beacons: one of so many carries the digest of the origin
@@ -33,7 +34,7 @@ NOT_HELD = (MessageType.MOVEMENT_NEGOTIATION, MessageType.FOUND)  # soon sent ag
 SEALED_ROOM = 20  # bytes of a beacon with a seal
 MOVED = 0.05  # of the range: a drone that is further from where it stood flies; from where the
 # others expect it, it has turned
-DRIVER_TRIES = 4  # per hop: nearly all that fail four are out of reach; more delay the others
+DRIVER_TRIES = 5  # per hop: nearly all that fail five are out of reach; more delay the others
 
 
 class BeaconPlane(IControlPlane):
@@ -64,6 +65,7 @@ class BeaconPlane(IControlPlane):
         self._searches = Searches(self._me, self._routes, self._broadcast)
         self._sent = 0  # beacons
         self._probed_s = self._retry_s = self._check_s = -math.inf
+        self._turn = basics.rng.random()  # among the children of its parent
         self._asks = True  # whether its next beacon asks for those of the neighbours
         self._was_connected = self._told = False
         self.learn = self._learn
@@ -128,18 +130,29 @@ class BeaconPlane(IControlPlane):
             self._trickle.reset(now_s)
             self._lost(node)
         parent = routes.neighbours.get(routes.parent)
-        if parent is not None and parent.usable:
-            late_s = parent.alive_s + _late_after_s(parent.beacon.interval_s)
-            if now_s >= late_s and now_s - self._probed_s > parent.beacon.interval_s:
-                self._probed_s = now_s
-                me, to = self._me, parent.node
-                self._courier.send(messages.packet(MessageType.PROBE, me, me, to, to), to)
+        if parent is not None and parent.usable and self._is_silent(parent):
+            self._probed_s = now_s
+            me, to = self._me, parent.node
+            self._courier.send(messages.packet(MessageType.PROBE, me, me, to, to), to)
         self._choose()
         states = self._states
         if states is not None and not states.connected and now_s >= self._check_s:
             self._check_s = now_s + CHECK_S
             if self._may_repair(states, now_s):
                 self._host.on_unconnected_check(now_s)
+
+    def _is_silent(self, parent: Neighbour) -> bool:
+        """Whether it is time to probe the parent, again perhaps."""
+        now_s = self._routes.now_s
+        again_s = self._probed_s + parent.beacon.interval_s
+        return now_s >= self._late_s(parent) and now_s > again_s
+
+    def _late_s(self, parent: Neighbour) -> float:
+        """From when on the parent, if it stays silent, has to acknowledge a probe."""
+        interval_s = parent.beacon.interval_s
+        silent_s = max(LATE * interval_s, min(2.0 * interval_s, LATE_S))
+        turns_s = TURN_HOPS * self._antenna.medium.hop_s * len(self._routes.neighbours)
+        return parent.alive_s + silent_s + self._turn * turns_s
 
     def _may_repair(self, states: RouterStates, now_s: float) -> bool:
         """Whether a lost connection counts: not in flight, whoever flies the drone."""
@@ -214,8 +227,8 @@ class BeaconPlane(IControlPlane):
             due_s = min(due_s, neighbour.until_s() + 1e-3)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None:
-            late_s = parent.alive_s + _late_after_s(parent.beacon.interval_s)
-            due_s = min(due_s, max(late_s, self._probed_s + parent.beacon.interval_s + 1e-3))
+            again_s = self._probed_s + parent.beacon.interval_s + 1e-3
+            due_s = min(due_s, max(self._late_s(parent), again_s))
         if self._courier.holds:
             due_s = min(due_s, self._retry_s)
         if self._states is not None and not self._states.connected:
@@ -228,6 +241,7 @@ class BeaconPlane(IControlPlane):
         routes, basics, now_s = self._routes, self._basics, self._routes.now_s
         self._trickle.sent(now_s)
         self._sent += 1
+        self._turn = basics.rng.random()
         if self._states is None:
             routes.number = (routes.number + 1) % 256
         beacon = Beacon(
@@ -293,7 +307,7 @@ class BeaconPlane(IControlPlane):
         if creator == routes.parent:
             self._show()
         if beacon.looks and routes.hops != NO_ROUTE:
-            self._trickle.answer(now_s)
+            self._trickle.answer(now_s, alone=False)
         if self._courier.holds:
             self._courier.retry()
         self._plan()
@@ -314,7 +328,10 @@ class BeaconPlane(IControlPlane):
                 places.update_gateway(place, now_s)
 
     def receive_probe(self, payload: bytes, creator: int, from_: int) -> None:
-        """The radio has acknowledged it."""
+        """The radio has acknowledged it; a beacon spares the other children the same question."""
+        self._set_time()
+        self._trickle.answer(self._routes.now_s, alone=True)
+        self._plan()
 
     # Packets ---------------------------------------------------------------------------------
 
@@ -442,11 +459,6 @@ class BeaconPlane(IControlPlane):
 
     def give_up_routes(self) -> None:
         """There are none."""
-
-
-def _late_after_s(interval_s: float) -> float:
-    """After how long a silence the parent has to acknowledge a probe."""
-    return max(LATE * interval_s, min(2.0 * interval_s, LATE_S))
 
 
 class BeaconTechnique(IControlTechnique):

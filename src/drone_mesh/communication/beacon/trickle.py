@@ -54,7 +54,8 @@ class Trickle:
         not_before_s = max(now_s, self._sent_s + 0.2 * self._least_s)
         self.due_s = min(self.due_s, not_before_s + self._soon_s * self._rng.random())
 
-    def answer(self, now_s: float) -> None:
-        """A neighbour asks for a beacon."""
+    def answer(self, now_s: float, alone: bool) -> None:
+        """A neighbour asks for a beacon, of this node `alone` or of all its neighbours."""
         if now_s - self._sent_s > 0.2 * self._least_s:
-            self.due_s = min(self.due_s, now_s + 4 * self._soon_s * self._rng.random())
+            within_s = self._soon_s if alone else 4 * self._soon_s
+            self.due_s = min(self.due_s, now_s + within_s * self._rng.random())

@@ -45,6 +45,16 @@ def test_no_two_intervals_are_equal(trickle):
     assert all(0.4 <= step <= 0.6 for step in steps)
 
 
+@pytest.mark.parametrize(("alone", "within_s"), [(True, 0.0132), (False, 0.0528)])
+def test_who_is_asked_alone_answers_sooner(trickle, alone, within_s):
+    waits = []
+    for turn in range(1, 40):
+        trickle.sent(10.0 * turn)
+        trickle.answer(10.0 * turn + 0.3, alone=alone)
+        waits.append(trickle.due_s - 10.0 * turn - 0.3)
+    assert 0.8 * within_s < max(waits) <= within_s
+
+
 def test_an_urgent_beacon_leaves_within_milliseconds_but_not_at_once_after_another(trickle):
     trickle.sent(10.0)
     trickle.hurry(10.3)
