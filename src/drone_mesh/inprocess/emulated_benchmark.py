@@ -13,6 +13,7 @@ from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.arguments import MOST, whole
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.inprocess.chip_air import ChipAir
+from drone_mesh.inprocess.load_benchmark import MESSAGE_BYTES, busiest_relay
 from drone_mesh.inprocess.network import Network
 from drone_mesh.inprocess.wall_mesh import WallMesh
 from drone_mesh.nrf24.emulator.air import Air
@@ -24,6 +25,9 @@ from drone_mesh.nrf24.high_level import NRF24HighLevelInterface
 from drone_mesh.nrf24.settings import DATA_RATES, DEFAULT_RATE, RadioSettings
 
 PROGRESS_S = 5.0  # of wall time
+MESSAGE_PERIOD_S = 1.0
+ANSWER_WITHIN_S = 30.0  # after the last message
+MENDED_WITHIN_S = 300.0
 
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
@@ -67,6 +71,19 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         "as measured in 2019, scaled to 9 m (default %(default)s)",
     )
     parser.add_argument(
+        "--messages",
+        type=int,
+        default=0,
+        help="then send this many reliable messages of 16 bytes, one a second, from random routers "
+        "to the gateway, and print what arrives, and when",
+    )
+    parser.add_argument(
+        "--death",
+        action="store_true",
+        help="then switch off the router that most paths lead through, and print how soon all "
+        "others are connected again",
+    )
+    parser.add_argument(
         "--wall", action="store_true", help="run in real time and print how late the emulator is"
     )
     parser.add_argument(
@@ -78,6 +95,8 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     for name in ("spacing", "seconds"):
         if not getattr(arguments, name) > 0:
             parser.error(f"--{name} must be above 0")
+    if arguments.wall and (arguments.messages or arguments.death):
+        parser.error("--messages and --death need emulated time: leave --wall out")
     return arguments
 
 
@@ -135,12 +154,14 @@ def main(argv: list[str] | None = None) -> int:
         bench.air.observe(trace.see)
     begin_s = mesh.now_s()
     connected_s = None
+    rest = _Rest(mesh, bench.air)
     shown = started
     try:
         while mesh.now_s() - begin_s < arguments.seconds:
             mesh.run_for(0.1)
             if connected_s is None and mesh.all_connected():
                 connected_s = mesh.now_s() - begin_s
+                rest = _Rest(mesh, bench.air)
             if time.perf_counter() - shown > PROGRESS_S:
                 shown = time.perf_counter()
                 print(f"{mesh.now_s() - begin_s:.0f} of {arguments.seconds:g} s", file=sys.stderr)
@@ -149,7 +170,13 @@ def main(argv: list[str] | None = None) -> int:
     simulated_s = mesh.now_s() - begin_s
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
     _report(bench, simulated_s, wall_s, cpu_s, connected_s)
-    if isinstance(mesh, WallMesh):
+    print(rest.in_words())
+    if isinstance(mesh, Network):
+        if arguments.messages:
+            print(_send_messages(mesh, arguments.messages, arguments.seed))
+        if arguments.death:
+            print(_switch_off_a_relay(mesh))
+    else:
         print(f"events were late by at most   {mesh.clock.latest_ns / 1e6:.1f} ms")
     mesh.stop()
     if arguments.trace:
@@ -160,6 +187,61 @@ def main(argv: list[str] | None = None) -> int:
             return 1
         print(f"{written} frames written to {arguments.trace}")
     return 0
+
+
+class _Rest:
+    """The frames from a moment on, in which nothing happens."""
+
+    def __init__(self, mesh: Network | WallMesh, air: Air) -> None:
+        self._mesh, self._air = mesh, air
+        self._begun_s, self._frames = mesh.now_s(), air.frames
+
+    def in_words(self) -> str:
+        """Their number per second until now."""
+        passed_s = self._mesh.now_s() - self._begun_s
+        frames = self._air.frames - self._frames
+        return f"frames once connected         {frames / max(passed_s, 1e-9):.1f} per s"
+
+
+def _send_messages(network: Network, count: int, seed: int) -> str:
+    rng = random.Random(f"{seed} messages")
+    sent_s: dict[bytes, float] = {}
+    for number in range(count):
+        sender = rng.choice(sorted(set(network.nodes) - {0}))
+        payload = number.to_bytes(MESSAGE_BYTES, "little")
+        sent_s[payload] = network.now_s()
+        network.send(sender, 0, payload)
+        network.run_for(MESSAGE_PERIOD_S)
+    network.run_for(ANSWER_WITHIN_S)
+    received = network.received.get(0, [])
+    delays_ms = sorted(1e3 * (one.received_s - sent_s[one.payload]) for one in received)
+    text = f"messages that arrived         {len(delays_ms)} of {count}"
+    if delays_ms:
+        median, late = (delays_ms[int(share * (len(delays_ms) - 1))] for share in (0.5, 0.95))
+        text += f"; delay p50 {median:.0f} ms, p95 {late:.0f} ms, longest {delays_ms[-1]:.0f} ms"
+    return text
+
+
+def _switch_off_a_relay(network: Network) -> str:
+    if all(hops < 2 for hops in network.shortest_hops().values()):
+        return "no router is a relay: none is switched off"
+    dead = busiest_relay(network)
+    begun_s = network.now_s()
+    cut = [node for node in network.nodes if dead in (network.path_to_gateway(node) or ())]
+    network.power(dead, False)
+
+    def mended() -> bool:
+        return all(
+            network.connected(node) and dead not in (network.path_to_gateway(node) or [dead])
+            for node in network.nodes
+            if node != dead
+        )
+
+    if not network.run_until(mended, MENDED_WITHIN_S):
+        return f"after the death of node {dead}  not mended within {MENDED_WITHIN_S:g} s"
+    took_s = network.now_s() - begun_s
+    behind = len(cut) - 1
+    return f"after the death of node {dead:<5} the {behind} behind it connected in {took_s:.1f} s"
 
 
 def _report(
