@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import time
+from typing import Callable
 
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.component import MeshnetworkComponent
@@ -31,7 +32,7 @@ class WallMesh:
         self._settings = settings
         self._seed = seed
         self._executor = MeshExecutor(self.clock.runtime.now_s, clock_notifies=False)
-        self._components: list[MeshnetworkComponent] = []
+        self.components: list[MeshnetworkComponent] = []
         self._executor.start()
 
     def add(self, node_id: int, x: float, y: float, *, gateway: bool) -> None:
@@ -57,7 +58,7 @@ class WallMesh:
 
         self.chips.append(chip)
         self.antennas.append(antenna)
-        self._components.append(component)
+        self.components.append(component)
         slot.submit(start)
 
     def now_s(self) -> float:
@@ -71,13 +72,17 @@ class WallMesh:
     def all_connected(self) -> bool:
         """Whether every node has power and is connected to a gateway."""
         on = all(antenna.on() for antenna in self.antennas)
-        return on and all(c.get_connected_to_gateway() for c in self._components)
+        return on and all(c.get_connected_to_gateway() for c in self.components)
+
+    def submit(self, function: Callable[[float], None]) -> None:
+        """Have the worker call this with the time."""
+        self._executor.submit(function)
 
     def stop(self) -> None:
         """Stop all nodes and end all threads."""
 
         def stop_all(_now_s: float) -> None:
-            for component in self._components:
+            for component in self.components:
                 component.stop()
 
         self._executor.submit(stop_all)

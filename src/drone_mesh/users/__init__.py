@@ -2,3 +2,7 @@
 
 No ROS and no hardware.
 """
+
+from drone_mesh.users.mesh import ALL, GATEWAY, Mesh, Message
+
+__all__ = ["ALL", "GATEWAY", "Mesh", "Message"]

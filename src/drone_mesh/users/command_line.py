@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
 from typing import Callable
@@ -13,10 +12,8 @@ from drone_mesh.communication.data.packets import MAX_DATA_PORT, MAX_MESSAGE_BYT
 from drone_mesh.communication.data.ticket import TO_ALL, TO_GATEWAY
 from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
-from drone_mesh.users.local_client import LocalClient
-from drone_mesh.users.socket_path import node_of, served_sockets, socket_folder, socket_path
+from drone_mesh.users.local_client import NODE_VARIABLE, LocalClient, node_here
 
-NODE_VARIABLE = "DRONE_MESH_NODE"
 MOST_SECONDS = 86400.0  # our choice: a day
 
 node_id = whole(0, MAX_NODE_ID)
@@ -71,27 +68,7 @@ def destination(text: str) -> int:
 
 def client(parsed: argparse.Namespace) -> LocalClient:
     """The node that the options select. Raises MeshError."""
-    if parsed.socket is not None:
-        return LocalClient(parsed.socket)
-    chosen = parsed.node
-    if chosen is None and os.environ.get(NODE_VARIABLE):
-        try:
-            chosen = node_id(os.environ[NODE_VARIABLE])
-        except argparse.ArgumentTypeError as error:
-            raise MeshError(f"{NODE_VARIABLE}: {error}") from None
-    found = served_sockets()
-    if chosen is not None:
-        of_chosen = [path for path in found if node_of(path) == str(chosen)]
-        return LocalClient(of_chosen[0] if of_chosen else socket_path(chosen))
-    if len(found) == 1:
-        return LocalClient(found[0])
-    if not found:
-        raise MeshError(
-            f"no node runs here (no socket in {socket_folder()}): start raspberry_router or "
-            "raspberry_gateway (without hardware: raspberry_gateway --emulated 7)"
-        )
-    ids = ", ".join(node_of(path) for path in found)
-    raise MeshError(f"several nodes run here ({ids}): choose one with --node")
+    return node_here(parsed.node) if parsed.socket is None else LocalClient(parsed.socket)
 
 
 def run(command: str, work: Callable[[], int]) -> int:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
 import base64
 import contextlib
 import json
+import os
 import socket
 from pathlib import Path
 from typing import Any, Iterator
 
+from drone_mesh.arguments import whole
+from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.errors import MeshError
+from drone_mesh.users.socket_path import node_of, served_sockets, socket_folder, socket_path
 
+NODE_VARIABLE = "DRONE_MESH_NODE"  # the id to use if a program does not name one
 CONNECT_WITHIN_S = 5.0  # our choice
 
 
@@ -84,6 +90,32 @@ class LocalClient:
             connection.settimeout(timeout_s)
             with connection.makefile("rb") as lines:
                 yield lines
+
+
+def node_here(chosen: int | None = None) -> LocalClient:
+    """This node of this machine; None: the one in NODE_VARIABLE, or else the only one.
+
+    Raises MeshError.
+    """
+    given = os.environ.get(NODE_VARIABLE, "")
+    if chosen is None and given:
+        try:
+            chosen = whole(0, MAX_NODE_ID)(given)
+        except argparse.ArgumentTypeError as error:
+            raise MeshError(f"{NODE_VARIABLE}: {error}") from None
+    found = served_sockets()
+    if chosen is not None:
+        of_chosen = [path for path in found if node_of(path) == str(chosen)]
+        return LocalClient(of_chosen[0] if of_chosen else socket_path(chosen))
+    if len(found) == 1:
+        return LocalClient(found[0])
+    if not found:
+        raise MeshError(
+            f"no node runs here (no socket in {socket_folder()}): start raspberry_router or "
+            "raspberry_gateway (without hardware: raspberry_gateway --emulated 7)"
+        )
+    ids = ", ".join(node_of(path) for path in found)
+    raise MeshError(f"several nodes run here ({ids}): choose one with --node")
 
 
 def _checked(line: bytes) -> dict[str, Any]:

@@ -11,31 +11,12 @@ import sys
 import threading
 
 import pytest
-from users_rig import UsersRig
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.users import listen_command, ping_command, send_command, trace_command
 from drone_mesh.users.local_client import LocalClient
 from drone_mesh.users.local_socket import LocalSocket, warn_of_unreachable
 from drone_mesh.users.socket_path import socket_path
-
-
-@pytest.fixture(autouse=True)
-def _own_folder(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    monkeypatch.delenv("RUNTIME_DIRECTORY", raising=False)
-    monkeypatch.delenv("DRONE_MESH_NODE", raising=False)
-
-
-@pytest.fixture
-def rig():
-    rig = UsersRig()
-    served = [LocalSocket(desk, socket_path(desk.node_id)) for desk in rig.desks.values()]
-    for one in served:
-        one.start()
-    yield rig
-    for one in served:
-        one.stop()
 
 
 def test_ping_prints_hops_time_and_loss(rig, capsys):
