@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import tempfile
+import threading
 import time
 import unittest
 from pathlib import Path
@@ -39,11 +40,17 @@ class MqttTest(unittest.TestCase):
         self.messages: queue.Queue[mqtt.MQTTMessage] = queue.Queue()
         self.client = mqtt.Client(CallbackAPIVersion.VERSION2, client_id="test")
         self.client.on_message = lambda _client, _data, message: self.messages.put(message)
+        # On each connection: a broken one takes its subscriptions along.
+        self.client.on_connect = lambda *_: self.client.subscribe("drone_mesh/test/#", 1)
+        subscribed = threading.Event()
+        self.client.on_subscribe = lambda *_: subscribed.set()
         wait_for("no broker", WALL_LIMIT_S, self.connects)
         self.client.loop_start()
         self.addCleanup(self.client.loop_stop)
         self.addCleanup(self.client.disconnect)
-        self.client.subscribe("drone_mesh/test/#", 1)
+        self.assertTrue(
+            subscribed.wait(WALL_LIMIT_S), "the broker did not confirm the subscription"
+        )
         broker = f"broker:=mqtt://127.0.0.1:{self.port}/test"
         command = ["roslaunch", "drone_mesh", "factory.launch", "routers:=2", "internet:=mqtt"]
         self.start([*command, broker])
@@ -75,7 +82,8 @@ class MqttTest(unittest.TestCase):
         mesh = MeshWatch(3)
         wait_for("no clock", WALL_LIMIT_S, lambda: rospy.get_time() > 0.0)
         mesh.wait("all connected", 60, mesh.connected)
-        call("/Nodes/2/send", SendData, GATEWAY, 7, True, b"21.5", 20.0)
+        sent = call("/Nodes/2/send", SendData, GATEWAY, 7, True, b"21.5", 20.0)
+        self.assertTrue(sent.success, sent.message)
         self.assertEqual(self.next("2/rx/7"), b"21.5")
         self.client.publish("drone_mesh/test/1/tx", b"blink", 1)
         self.assertIn(b'"delivered"', self.next("1/event"))

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import sys
 
+from drone_mesh.extras import Main, run_with_extra
+
+
+def _load() -> Main:
+    from drone_mesh.console.gateway_command import main
+
+    return main
+
 
 def main() -> int:
     """Run the program; the exit status."""
-    try:
-        from drone_mesh.console.gateway_command import main as serve
-    except ImportError as error:
-        print(
-            f"drone_mesh_console needs the Python package {error.name}: "
-            "pip install 'drone_mesh[console]'",
-            file=sys.stderr,
-        )
-        return 1
-    return serve()
+    return run_with_extra("drone_mesh_console", "console", _load)
 
 
 if __name__ == "__main__":

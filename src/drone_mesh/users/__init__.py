@@ -3,6 +3,6 @@
 No ROS and no hardware.
 """
 
-from drone_mesh.users.mesh import ALL, GATEWAY, Mesh, Message
+from drone_mesh.users.mesh import ALL, GATEWAY, Mesh, MeshMessage
 
-__all__ = ["ALL", "GATEWAY", "Mesh", "Message"]
+__all__ = ["ALL", "GATEWAY", "Mesh", "MeshMessage"]

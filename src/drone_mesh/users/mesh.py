@@ -10,7 +10,7 @@ from drone_mesh.users.local_client import node_here
 GATEWAY, ALL = TO_GATEWAY, TO_ALL
 
 
-class Message(NamedTuple):
+class MeshMessage(NamedTuple):
     """A message that arrived."""
 
     node: int  # who sent it
@@ -39,7 +39,7 @@ class Mesh:
         )
         return arrived
 
-    def read(self, type: int | None = None) -> Iterator[Message]:
+    def read(self, type: int | None = None) -> Iterator[MeshMessage]:
         """The messages that arrive from now on, of one type or of all, until the node stops."""
         for message in self._node.listen(type):
-            yield Message(message["sender"], message["port"], message["payload"])
+            yield MeshMessage(message["sender"], message["port"], message["payload"])

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from drone_mesh.errors import MeshError
-from drone_mesh.users import ALL, GATEWAY, Mesh, Message
+from drone_mesh.users import ALL, GATEWAY, Mesh, MeshMessage
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
@@ -28,7 +28,7 @@ def test_what_one_program_writes_another_reads(rig):
     listens_at(rig.desks[0])
     assert Mesh(2).write(0, 7, b"\x00\xff")
     reader.join(10.0)
-    assert arrived == [Message(2, 7, b"\x00\xff")]
+    assert arrived == [MeshMessage(2, 7, b"\x00\xff")]
 
 
 def test_a_message_to_all_is_sent_once(rig):
