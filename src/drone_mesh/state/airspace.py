@@ -12,6 +12,7 @@ from drone_mesh.state.separation import nearest_m, segments, ways_of
 
 APART_M = 1.0  # least distance between two drones on the way
 SWAY_M = 0.5  # our choice: how far physics may move a drone from its path
+ONE_PLACE_M = 0.2  # the size of a drone: places nearer than that are one, and not for two drones
 _TOUCH_M = 1e-3  # rounding of positions
 
 
@@ -56,6 +57,7 @@ class Airspace:
         starts_m, ends_m = (
             _away_m(self._ends[:, end], point) for end, point in enumerate((path.start, path.goal))
         )
+        ends_m = np.where(ends_m < ONE_PLACE_M, APART_M, ends_m)
         allowed_m = np.minimum(self._apart_m, np.minimum(starts_m, ends_m)) - _TOUCH_M
         return bool((nearest_m(ways_of(path), self._ways) < allowed_m).any())
 
@@ -72,7 +74,8 @@ class Airspace:
         for index, other in enumerate(others):
             goal = self._goals.get(int(other))
             if goal is not None and np.array_equal(goal.round(2), places[index].round(2)):
-                ends_m[index] = _away_m(places[index], path.goal)
+                away_m = _away_m(places[index], path.goal)
+                ends_m[index] = away_m if away_m >= ONE_PLACE_M else APART_M
         starts_m = _away_m(places, path.start)
         allowed_m = np.minimum(self._apart_m, np.minimum(starts_m, ends_m)) - _TOUCH_M
         near_m = nearest_m(ways_of(path), np.stack([places, places], axis=1))

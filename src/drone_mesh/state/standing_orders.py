@@ -51,7 +51,8 @@ class _Part:
     reason: str = ""  # of a refusal
     pause_s: float = FIRST_PAUSE_S
     due_s: float = -math.inf  # when to order it next
-    settled: bool = False  # it was connected at its place: a repair may take it elsewhere
+    arrived: bool = False  # it has been at its place
+    settled: bool = False  # it was connected there: a repair may take it elsewhere
     sent_to: Location | None = None  # by an order that it may still follow
     sent_s: float = -math.inf
 
@@ -127,6 +128,11 @@ class _StandingOrder:
         self.at_once = at_once
         self.parts = {drone: _Part(goal) for drone, goal in goals.items()}
 
+    def is_moving(self) -> bool:
+        """Whether a drone is still to come to its place: it may bring the others the mesh."""
+        on_the_way = (PartState.LATER, PartState.FLYING)
+        return any(part.state in on_the_way and not part.arrived for part in self.parts.values())
+
     def progress(self) -> StandingProgress:
         """A snapshot."""
         by_state = {
@@ -187,6 +193,8 @@ class StandingOrders:
                 continue
             if event.kind == MeshEventKind.ORDER_REFUSED.value:
                 part.stay(PartState.REFUSED, words)
+            elif event.kind == MeshEventKind.NO_ROUTE.value:
+                part.sent_to = None
             elif event.kind == MeshEventKind.ORDER_SENT.value and not what.endswith(
                 (_to(part.goal), _to(part.sent_to or part.goal))
             ):
@@ -203,8 +211,9 @@ class StandingOrders:
         together: dict[int, _Part] = {}
         due: dict[int, _Part] = {}
         for order in self._orders.values():
+            is_moving = order.is_moving()
             for drone, part in sorted(order.parts.items(), reverse=True):
-                if not part.is_followed:
+                if not part.is_followed or (part.state is PartState.ARRIVED and not is_moving):
                     continue
                 if self._follow(part, nodes.get(drone), order.at_once, mesh.stamp_s):
                     if part.sent_to is not None:
@@ -253,6 +262,7 @@ class StandingOrders:
             if end.distance_m(_as_ordered(part.goal)) <= AT_PLACE_M:
                 part.stay(PartState.FLYING if flies else PartState.ARRIVED)
                 part.pause_s = FIRST_PAUSE_S
+                part.arrived = part.arrived or not flies
                 part.settled = not flies and (node.connected or node.role == Role.GATEWAY)
                 return False
             is_aside = part.sent_to is not None and end.distance_m(part.sent_to) <= AT_PLACE_M

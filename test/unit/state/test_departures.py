@@ -74,6 +74,14 @@ def test_a_goal_is_free_only_when_the_drone_that_stands_there_has_left():
     assert choice.blocked == {1: "drone 3 is in the way"}
 
 
+def test_two_formations_with_one_place_do_not_stack_their_drones():
+    places = {1: at(3, 0), 2: at(-3, 0), **{n: at(0, 0.9 * n) for n in range(3, 14)}}
+    goals = {1: at(5, 5), 2: at(5, 5)}
+    assert list(choose(mesh(places), goals).set_out) == [2]
+    there = mesh({**places, 2: at(5, 5)})
+    assert choose(there, goals).blocked == {1: "drone 2 is in the way"}
+
+
 def test_drones_that_change_places_let_each_other_pass():
     places = {1: at(3, 0), 2: at(6, 0)}
     found = preview(mesh(places), {1: places[2], 2: places[1]})

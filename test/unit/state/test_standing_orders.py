@@ -97,9 +97,21 @@ def test_a_drone_that_found_no_mesh_at_its_place_is_ordered_back_once_it_is_conn
     orders = StandingOrders()
     orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
     orders.update(state(0.0, drone(4), drone(5)))
-    orders.update(state(9.0, drone(4, at=EAST, connected=False), drone(5, connected=False)))
+    late = drone(5, to=NORTH)
+    orders.update(state(9.0, drone(4, at=EAST, connected=False), late))
     repaired = drone(4, at=Location(latitude=-6.0, longitude=0.0, height=0.0))
-    assert orders.update(state(60.0, repaired, drone(5, connected=False))) == [(4, EAST)]
+    others = [drone(n, at=Location(n - 10.0, -3.0, 0.0)) for n in range(10, 20)]  # the mesh holds
+    assert orders.update(state(60.0, gateway(), repaired, late, *others)) == [(4, EAST)]
+
+
+def test_a_drone_that_finds_no_mesh_at_its_place_is_not_ordered_back_when_nobody_else_comes():
+    orders = StandingOrders()
+    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    off = drone(5, connected=False)
+    orders.update(state(0.0, drone(4), off))
+    orders.update(state(9.0, drone(4, at=EAST, connected=False), off))
+    repaired = drone(4, at=Location(latitude=-6.0, longitude=0.0, height=0.0))
+    assert orders.update(state(60.0, repaired, off)) == []
 
 
 def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
