@@ -9,7 +9,6 @@ from drone_mesh.inprocess import Network
 from drone_mesh.inprocess.status import event_records
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 from drone_mesh.layouts import Layouts
-from drone_mesh.state.departures import AT_PLACE_M
 from drone_mesh.state.formation_preview import preview
 from drone_mesh.state.standing_orders import PartState, StandingOrders
 
@@ -63,16 +62,18 @@ class Formations:
         network.clock.call_at(network.clock.now_s + LOOK_S, self._look, None)
 
     def _observe(self) -> None:
-        """A drone can be reached while it flies, or has power and a path to a gateway."""
+        """A drone can be reached while it flies, or has power and a path to a gateway.
+
+        One that has been at its place and left it for a repair is not missing.
+        """
         network = self._network
         reach = physical_graph(network).hops_from(gateways_of(network))
         (progress,) = [p for p in self._orders.all_progress() if p.number == self._number]
+        done = {*progress.drones[PartState.ARRIVED], *progress.drones[PartState.REFUSED]}
         self.missing = [
             drone
-            for drone, goal in self._goals.items()
-            if network.location(drone).distance_m(goal) > AT_PLACE_M
-            and drone not in progress.drones[PartState.REFUSED]
-            and (drone in reach or network.nodes[drone].drone.path is not None)
+            for drone in self._goals.keys() - done
+            if drone in reach or network.nodes[drone].drone.path is not None
         ]
         if self.missing:
             self.reached_s = None
