@@ -10,6 +10,7 @@ SIGNAL_TOPIC = "WirelessSignalSimulator"  # DroneInfo: every engine and antenna 
 SIGNAL_QUEUE = 4096  # DroneInfo that may wait for a slow simulator; the oldest is dropped
 MESSAGE_SERVICE = "SignalSimulator/message"
 OTHERS_IN_RANGE_SERVICE = "SignalSimulator/othersinRange"
+JAMMER_TOPIC = "jammer"  # Bool, latched: users -> simulator and virtual antennas
 # Additions: one call instead of one per packet or per neighbour.
 MESSAGES_SERVICE = "SignalSimulator/messages"
 BROADCAST_SERVICE = "SignalSimulator/broadcast"

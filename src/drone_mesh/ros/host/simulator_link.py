@@ -8,6 +8,7 @@ import threading
 from typing import Sequence
 
 import rospy
+from std_msgs.msg import Bool
 
 from drone_mesh.execution import MeshExecutor
 from drone_mesh.msg import DroneInfo
@@ -28,6 +29,7 @@ class SimulatorLink(rospy.SubscribeListener):
     """Finds a simulator, announces the antennas to it, and hands packets over.
 
     Publishes: /WirelessSignalSimulator (DroneInfo)
+    Subscribes: /jammer (Bool: whether all its antennas measure the power of a jammer)
     Calls:     /SignalSimulator/message, messages, broadcast, othersinRange
 
     Three threads meet here. The executor's worker sends. The link's own thread connects, which can
@@ -54,7 +56,12 @@ class SimulatorLink(rospy.SubscribeListener):
             queue_size=names.SIGNAL_QUEUE,
         )
         self.antennas = Announcements(self._publisher.publish, place_of)
+        self.jammed = False  # written by a thread of rospy
+        rospy.Subscriber(names.JAMMER_TOPIC, Bool, self._jam)
         self._thread = threading.Thread(target=self._keep_connected, name="simulator_link")
+
+    def _jam(self, on: Bool) -> None:
+        self.jammed = on.data
 
     def start(self) -> None:
         """Start looking for a simulator."""

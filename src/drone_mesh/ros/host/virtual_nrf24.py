@@ -81,6 +81,10 @@ class VirtualNRF24(IWirelessCommunication):
         if self._on:
             self._link.broadcast(payload)
 
+    def hears_power(self) -> bool:
+        """Whether a jammer is on; a real chip measures its power (RPD)."""
+        return self._link.jammed
+
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Start or stop publishing NodeDebugInfo."""
         self._panel.debugging_mode(info, on)

@@ -9,6 +9,7 @@ import logging
 import threading
 
 import rospy
+from std_msgs.msg import Bool
 
 from drone_mesh.air.node import AirError
 from drone_mesh.air.node_table import NodeTable, Sees
@@ -48,7 +49,7 @@ class WirelessSignalSimulator:
     Parameters (private): ~max_distance (float, metres), ~obstacles (the path of a file of boxes)
                 and ~obstacle_radio (block or wall), overriding the YAML file in ~config
                 (config/factory.yaml by default)
-    Subscribes: /WirelessSignalSimulator (DroneInfo)
+    Subscribes: /WirelessSignalSimulator (DroneInfo), /jammer (Bool: while true, no packet arrives)
     Publishes:  the topic in each antenna's DroneInfo, usually /Node/<id> (NRF24); while there is
                 a subscriber, a sample of all packets on /mesh/packets (PacketSample)
     Services:   /SignalSimulator/message (WirelessMessage), /SignalSimulator/othersinRange
@@ -71,6 +72,7 @@ class WirelessSignalSimulator:
         self._topics: dict[int, str] = {}  # the topic of each registered node; under _opening
         self._throttled_log = ThrottledLog(_log)
         self._delivered = self._lost = 0
+        self._jammed = False  # set by a thread of rospy
         self._samples = PacketSamples()
         self._samples.start()
         # The services first: a host that sees the subscription may call at once.
@@ -79,7 +81,12 @@ class WirelessSignalSimulator:
         rospy.Service(names.OTHERS_IN_RANGE_SERVICE, AreaScan, self._others_in_range)
         rospy.Service(names.BROADCAST_SERVICE, Broadcast, self._broadcast)
         rospy.Subscriber(names.SIGNAL_TOPIC, DroneInfo, self._drone_info, tcp_nodelay=True)
+        rospy.Subscriber(names.JAMMER_TOPIC, Bool, self._jam)
         FiguresPublisher("air", self._figures).start()
+
+    def _jam(self, on: Bool) -> None:
+        self._jammed = on.data
+        _log.info("a jammer is %s", "on" if on.data else "off")
 
     def _drone_info(self, info: DroneInfo) -> None:
         try:
@@ -189,7 +196,7 @@ class WirelessSignalSimulator:
 
     def _carry(self, topic: str, message: NRF24) -> bool:
         listener = self._antenna_topics.get(topic)
-        delivered = listener is not None and listener.deliver(message)
+        delivered = not self._jammed and listener is not None and listener.deliver(message)
         if delivered and self._samples.watched:
             self._samples.note(message.payload)
         with self._lock:
