@@ -6,6 +6,10 @@ class Header(Message):
     frame_id: str
     def __init__(self, seq: int = ..., stamp: Time = ..., frame_id: str = ...) -> None: ...
 
+class Bool(Message):
+    data: bool
+    def __init__(self, data: bool = ...) -> None: ...
+
 class Float32(Message):
     data: float
     def __init__(self, data: float = ...) -> None: ...
