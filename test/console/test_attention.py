@@ -46,7 +46,7 @@ def test_the_table_shows_only_problems_or_what_matches_until_one_goes_to_another
     page.page.click("#power")
     page.page.check("#only-problems")
     page.wait_for("one row", lambda: shown.count() == 1)
-    assert page.page.inner_text("#nodes-card output") == "1 of 18"
+    assert page.page.inner_text("#shown") == "1 of 18"
     page.page.uncheck("#only-problems")
     page.page.fill("#filter", "17")
     assert shown.count() == 1

@@ -58,7 +58,7 @@ def test_axe_finds_no_violation(start_console, visit, scheme, size):
     page.wait_for("a held order", lambda: page.page.is_visible("#held"))
     check(page, "a held order")
     page.page.click("#held-undo")
-    keyboard.press("a")
+    page.page.click("#add")
     page.page.fill("#add-x", "far")
     page.page.press("#add-x", "Enter")
     check(page, "a drone to add, at a refused place")

@@ -1,5 +1,6 @@
 // The table of nodes: one row per node, sorted by the column that was clicked.
 
+import { arrowKeys } from "./arrows.js";
 import { orDash } from "./mesh.js";
 
 const COLUMNS = [
@@ -58,7 +59,7 @@ export class NodeTable {
     this.mesh = mesh;
     this.filter = filter;
     this.onlyProblems = onlyProblems;
-    this.count = table.parentElement.parentElement.querySelector("output");
+    this.count = document.getElementById("shown");
     filter.addEventListener("input", () => this.#hide());
     onlyProblems.addEventListener("change", () => this.#hide());
     this.body = table.tBodies[0];
@@ -82,6 +83,7 @@ export class NodeTable {
       th.scope = "col";
       const button = document.createElement("button");
       button.type = "button";
+      button.tabIndex = index ? -1 : 0;
       button.textContent = column.name;
       button.title = column.title;
       button.addEventListener("click", () => {
@@ -92,6 +94,7 @@ export class NodeTable {
       th.append(button);
       this.head.append(th);
     });
+    arrowKeys(this.head, "button"); // one tab stop
     this.#showSort();
   }
 
