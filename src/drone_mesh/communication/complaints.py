@@ -44,6 +44,10 @@ class Complaints:
         reason, at_s = self._foreign
         return reason if now_s - at_s <= FOREIGN_FOR_S else ""
 
+    def own_id_heard(self, now_s: float) -> None:
+        """A packet came from a radio with this node's id."""
+        self.add(f"another radio uses id {self._node_id}", "give each node its own", now_s)
+
     def dropped(self, reason: str, payload: bytes, now_s: float) -> None:
         """Count and log a dropped packet."""
         self.add(f"dropped {reason}", payload.hex(), now_s)

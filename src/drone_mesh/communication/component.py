@@ -103,7 +103,10 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._drop(f"a packet of {len(payload)} bytes instead of {PAYLOAD_BYTES}", payload)
             return
         me = self._node_id
-        if creator > MAX_NODE_ID or from_ > MAX_NODE_ID or from_ == me or forward > BROADCAST:
+        if from_ == me:
+            self.complaints.own_id_heard(now_s)
+            return
+        if creator > MAX_NODE_ID or from_ > MAX_NODE_ID or forward > BROADCAST:
             self._drop("a packet with invalid ids", payload)
             return
         if to != me:

@@ -288,6 +288,16 @@ def test_a_packet_that_it_made_itself_is_not_forwarded_and_its_entry_forgotten()
     assert rig.routing.get_set_of_children() == {2, 3}
 
 
+def test_another_radio_with_its_id_is_named(caplog):
+    rig = Rig()
+    caplog.clear()
+    rig.hear("01 01 03 01 fe ff 00")
+    assert [record.getMessage() for record in caplog.records] == [
+        "node 1: another radio uses id 1: give each node its own (1 so far)"
+    ]
+    assert rig.sent() == []
+
+
 @pytest.mark.parametrize("forged", ["01 02 80 01 09", "01 02 04 01 09 01 00 02", "01 02 06 01 09"])
 def test_a_packet_in_its_name_that_it_did_not_send_says_nothing_about_a_route(forged):
     rig = Rig()

@@ -213,7 +213,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def _not_opened(self, payload: bytes, now_s: float) -> None:
         from_, kind = messages.sender(payload), messages.type_of(payload)
-        if from_ > MAX_NODE_ID or from_ == self._node_id:
+        if from_ == self._node_id:
+            self.complaints.own_id_heard(now_s)
+        elif from_ > MAX_NODE_ID:
             self.complaints.dropped("a packet with invalid ids", payload, now_s)
         elif kind == _CHALLENGE:
             self._on_challenge(payload, from_, now_s)
