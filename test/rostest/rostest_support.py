@@ -205,10 +205,10 @@ class Stranger:
     def register(self) -> None:
         """Return when the simulator has registered it and can send to it."""
         wait_for("no simulator", WALL_LIMIT_S, lambda: self._publisher.get_num_connections() > 0)
-        self.announce(self._place, self._topic)
         hello = bytes((self.node_id, self.node_id, 0, self.node_id, self.node_id))
 
         def reachable() -> bool:
+            self.announce(self._place, self._topic)  # others may subscribe before the simulator
             return self.send(hello) and hello.ljust(PAYLOAD_BYTES, b"\0") in self.heard
 
         wait_for(f"stranger {self.node_id} was not registered", WALL_LIMIT_S, reachable)

@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+"""A client that knows only what the original design names sees the same mesh in every world.
+
+document.test runs it against this package's own simulator and engines, document_strangers.test
+against those of others.
+"""
+
+from __future__ import annotations
+
+import unittest
+
+import rospy
+import rostest
+from rostest_support import Stranger, call, wait_for
+
+from drone_mesh.msg import NodeDebugInfo
+from drone_mesh.srv import Casus, PowerSwitch, RequestDroneFlight, RequestGPS
+
+WITHIN_S = 90  # wall
+REQUESTLOCATION, LOCATION = 2, 1
+STRANGER = 200
+
+
+class DocumentTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        rospy.init_node("test_document")
+        cls.debug: dict[int, NodeDebugInfo] = {}
+        for node in range(4):
+            rospy.Subscriber(f"/Nodes/{node}/debug", NodeDebugInfo, cls.heard)
+
+    @classmethod
+    def heard(cls, info: NodeDebugInfo) -> None:
+        cls.debug[info.nodeID] = info
+
+    def hops(self) -> dict[int, int]:
+        return {n: i.hops for n, i in sorted(self.debug.items()) if i.ConnectedWithGateway}
+
+    def wait_for_hops(self, *hops: int) -> None:
+        expected = dict(enumerate(hops))
+        wait_for(f"hops {expected}", WITHIN_S, lambda: self.hops() == expected)
+
+    def wait_for_place(self, drone: int, longitude: float, latitude: float) -> None:
+        def is_there() -> bool:
+            place = call(f"/Drones/{drone}/gps", RequestGPS)
+            return abs(place.longitude - longitude) + abs(place.latitude - latitude) < 0.1
+
+        wait_for(f"drone {drone} at x {longitude}, y {latitude}", WITHIN_S, is_there)
+
+    def test_1_the_mesh_connects_and_a_layout_is_flown(self) -> None:
+        self.wait_for_hops(0, 1, 1, 2)
+        call("/DroneManager/SetToCasus", Casus, 201)
+        for drone, latitude in ((1, 4.0), (2, 10.0), (3, 16.0)):
+            self.wait_for_place(drone, -1.0, latitude)
+        self.wait_for_hops(0, 1, 2, 3)
+
+    def test_2_a_drone_is_sent_elsewhere_and_found_over_other_hops(self) -> None:
+        answer = call("/DroneManager/requestDroneMovement", RequestDroneFlight, 3, 5.0, 4.0, 0)
+        self.assertEqual(answer.status, 1)
+        self.wait_for_place(3, 4.0, 5.0)
+        self.wait_for_hops(0, 1, 2, 1)
+
+    def test_3_a_switch_silences_a_node(self) -> None:
+        call("/Nodes/3/powerSwitch", PowerSwitch, False)
+        wait_for("3 is not connected", WITHIN_S, lambda: 3 not in self.hops())
+        self.assertFalse(self.debug[3].on)
+        call("/Nodes/3/powerSwitch", PowerSwitch, True)
+        self.wait_for_hops(0, 1, 2, 1)
+
+    def test_4_a_foreign_antenna_gets_the_place_of_its_neighbour(self) -> None:
+        stranger = Stranger(STRANGER, "/some/topic", (4.0, 6.0, 0.5))
+        stranger.register()
+        self.assertTrue(stranger.send(bytes((STRANGER, STRANGER, REQUESTLOCATION, 3, 3))))
+        stranger.wait_for_packet(bytes((3, 3, LOCATION, STRANGER, STRANGER)), "no location")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("drone_mesh", "document", DocumentTest)
