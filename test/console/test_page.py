@@ -360,6 +360,10 @@ def test_a_node_that_is_found_comes_into_view(page):
     )
 
 
+# The map draws before the next frame.
+DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
 def test_the_map_fits_again_when_a_drone_leaves_it_unless_the_user_has_moved_it(page):
     def scale() -> float:
         return float(page.page.get_attribute("#map-note", "data-scale"))
@@ -374,6 +378,7 @@ def test_the_map_fits_again_when_a_drone_leaves_it_unless_the_user_has_moved_it(
     assert page.drawn("outside") == 0
     for _ in range(3):
         page.page.click("#zoom-in")
+    page.page.evaluate(DRAWN)
     page.wait_for("marks of drones outside", lambda: page.drawn("outside") > 0)
     zoomed = scale()
     page.wait_for("17 arrived", lambda: abs(float(page.row(17, 10)) - 60.0) < 0.2)
