@@ -2,7 +2,7 @@
 
 A comment line before a block, which is not shown, decides: `<!-- test: simulation -->` for commands
 that test/rostest/test_documentation.py runs beside a simulation, `<!-- test: none, REASON -->` for
-what cannot run on a bare machine. Blocks of Python need no comment: the unit tests run them all.
+what cannot run on a bare machine. A block of Python without a comment is run by the unit tests.
 """
 
 from __future__ import annotations

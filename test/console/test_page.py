@@ -446,7 +446,8 @@ DRAW_LOST = """async (count) => {
   };
   const mesh = { nodes, links: { known: [], lost, route: [], soon: [] }, clock: {}, obstacles: [],
     trails: new Map(), selected: null, group: new Set() };
-  const options = { known: true, ranges: false, covered: { top: 0, bottom: 0 } };
+  const options = { known: true, ranges: false, cast: new Set(),
+    covered: { top: 0, bottom: 0 } };
   const drawn = drawMesh(context, new Camera(), mesh, readColours(), options, []);
   return [drawn.lostLinks, alpha];
 }"""

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from fenced_blocks import PAGES, ROOT, blocks  # noqa: E402
 
-PYTHON = blocks("python")
+PYTHON = [block for block in blocks("python") if not block.test]
 
 
 @pytest.mark.slow
@@ -37,7 +37,9 @@ def test_the_python_of_a_page_runs_from_top_to_bottom(page, tmp_path):
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("block", blocks("bash"), ids=str)
+@pytest.mark.parametrize(
+    "block", [*blocks("bash"), *(b for b in blocks("python") if b.test)], ids=str
+)
 def test_each_block_of_commands_is_run_by_a_test_or_says_why_not(block):
     assert block.test == "simulation" or re.fullmatch(r"none, \w.+", block.test), block.test
 

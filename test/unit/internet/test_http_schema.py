@@ -13,6 +13,7 @@ pytestmark = pytest.mark.slow  # all: scripts/test leaves the file out of the fa
 
 schemathesis = pytest.importorskip("schemathesis")
 ignored_auth = schemathesis.checks.ignored_auth
+negative_data_rejection = schemathesis.checks.negative_data_rejection
 not_a_server_error = schemathesis.checks.not_a_server_error
 
 schema = schemathesis.openapi.from_dict(
@@ -34,7 +35,10 @@ def test_whatever_is_asked_is_answered_as_described(ordered_mesh, case):
     """
     sent = ordered_mesh.sent()
     answer = case.call(ordered_mesh.internet.url, headers=dict(ordered_mesh.client.headers))
-    case.validate_response(answer, excluded_checks=[not_a_server_error, ignored_auth])
+    excluded = [not_a_server_error, ignored_auth]
+    if answer.status_code == 413:  # also refuses a request, but is not in the library's list
+        excluded.append(negative_data_rejection)
+    case.validate_response(answer, excluded_checks=excluded)
     assert answer.status_code not in (500, 504)
     if answer.status_code != 200:
         assert answer.json()["detail"]

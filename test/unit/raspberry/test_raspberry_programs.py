@@ -160,7 +160,7 @@ def test_an_emulated_gateway_sends_an_order_over_several_hops_and_ends_on_sigter
         assert client.get("/ready").json() == {"ready": True, "gateway": 0}
         wait_until(lambda: ask_hops(client).get(3, 0) >= 2, "the gateway never heard of node 3")
         wait_until(
-            lambda: client.post("/DroneMovement/3/1.5/-2.5/4").status_code == 200,
+            lambda: client.post("/DroneMovement/3/21.5/-22.5/4").status_code == 200,
             "the gateway found no route to drone 3",
         )
         program.wait_for("node 3: order refused: drone 3 cannot fly: it stands on the ground")
