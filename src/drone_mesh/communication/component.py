@@ -90,9 +90,12 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             period_s = self._timing.check_period_s
             deadlines.set(Due.CHECK, due_s + period_s * ((now_s - due_s) // period_s + 1.0))
             if self._antenna.on():
-                self.control.check(due_s)
+                self._check(due_s)
             else:
                 self._antenna_is_off()
+
+    def _check(self, due_s: float) -> None:
+        self.control.check(due_s)
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """Learn from a packet, then process or forward it. Bad packets are dropped."""

@@ -77,10 +77,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
-        is_check = now_s >= self._deadlines.get(Due.CHECK)
         super().tick(now_s)
-        if is_check and self._states.connected:
-            self.places.connected_here(self._pilot.place(), self.control.hops)
         if now_s >= self._deadlines.get(Due.GOAL):
             self._deadlines.set(Due.GOAL, math.inf)
             goal = self._pilot.goal
@@ -89,6 +86,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
         if now_s >= self._deadlines.get(Due.REPAIR) and self._repair.on_due():
             self._landed()
         self._repair_status = self._repair.status()
+
+    def _check(self, due_s: float) -> None:
+        super()._check(due_s)
+        if self._states.connected:
+            self.places.connected_here(self._pilot.place(), self.control.hops)
 
     def on_msg(self, payload: bytes, now_s: float) -> None:
         """Like MeshnetworkComponent."""
@@ -141,9 +143,10 @@ class MeshnetworkRouter(MeshnetworkComponent):
         """Relays use the gateway's place as well, unless only the addressee can check it."""
         if self._parts.seals.reserved_bytes(MessageType.LOCATION):
             return
-        place = place_in(payload)
-        if creator == self.control.gateway and self._is_possible(place, gateway=True):
-            self.places.update_gateway(place, self._deadlines.now_s)
+        if creator == self.control.gateway:
+            place = place_in(payload)
+            if self._is_possible(place, gateway=True):
+                self.places.update_gateway(place, self._deadlines.now_s)
 
     def _on_negotiation(
         self, bid: MovementNegotiationMessage, gateway: GatewayPlace | None
@@ -184,6 +187,8 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _is_possible(self, place: Location, gateway: bool) -> bool:
         """Whether the gateway, or else the next hop, can be at `place`."""
+        if place == (self.places.gateway if gateway else self.places.good):  # mostly: no news
+            return True
         possible = self.places.is_possible(place, self._repair.range_m, gateway)
         if not possible:
             who = "gateway" if gateway else "next hop"
