@@ -55,8 +55,11 @@ class DocumentTest(unittest.TestCase):
         self.wait_for_hops(0, 1, 2, 3)
 
     def test_2_a_drone_is_sent_elsewhere_and_found_over_other_hops(self) -> None:
-        answer = call("/DroneManager/requestDroneMovement", RequestDroneFlight, 3, 5.0, 4.0, 0)
-        self.assertEqual(answer.status, 1)
+        def is_sent() -> bool:  # not before the gateway has a route to 3
+            service = "/DroneManager/requestDroneMovement"
+            return call(service, RequestDroneFlight, 3, 5.0, 4.0, 0).status == 1
+
+        wait_for("a gateway sends the order to 3", WITHIN_S, is_sent)
         self.wait_for_place(3, 4.0, 5.0)
         self.wait_for_hops(0, 1, 2, 1)
 

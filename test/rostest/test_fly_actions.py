@@ -74,7 +74,9 @@ class FlyActionsTest(unittest.TestCase):
         )
 
     def test_1_the_example_follows_a_flight_to_its_end(self) -> None:
+        self.speed(1.0)  # the drone's answer comes long before its flight ends
         example = self.example("2", "6", "4")
+        self.speed(FAST)
         self.assertEqual(example.returncode, 0, example.stdout)
         self.assertRegex(example.stdout, r"under way, \d+ m and \d+ s left: x ")
         self.assertEqual(example.stdout.splitlines()[-1], "arrived")
