@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, Request, expect, sync_playwright
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -172,6 +172,9 @@ UNDO_TOAST = """() => {
 }"""
 
 
+ABANDONED = "net::ERR_ABORTED"  # by the browser: a reload does not wait for the icon
+
+
 class Visit:
     """One page, and everything that went wrong on it."""
 
@@ -183,7 +186,11 @@ class Visit:
         page.on("console", self._on_console)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("request", lambda request: self.requests.append(request.url))
-        page.on("requestfailed", lambda request: self.complaints.append(f"failed {request.url}"))
+        page.on("requestfailed", self._on_request_failed)
+
+    def _on_request_failed(self, request: Request) -> None:
+        if request.failure != ABANDONED:
+            self.complaints.append(f"failed {request.url}: {request.failure}")
 
     def _on_console(self, message: object) -> None:
         if message.type in ("error", "warning"):  # type: ignore[attr-defined]

@@ -187,9 +187,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def _is_possible(self, place: Location, gateway: bool) -> bool:
         """Whether the gateway, or else the next hop, can be at `place`."""
-        if place == (self.places.gateway if gateway else self.places.good):  # mostly: no news
-            return True
-        possible = self.places.is_possible(place, self._repair.range_m, gateway)
+        possible = self.places.is_possible(place, self._options.range_m, gateway)
         if not possible:
             who = "gateway" if gateway else "next hop"
             reason = f"a place where the {who} cannot be"

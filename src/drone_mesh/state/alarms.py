@@ -61,10 +61,12 @@ class AlarmBook:
             drone = event.peers[0]
             if event.kind in _ORDER_FAILURES:
                 _order, _, why = event.detail.partition(": ")
+                for key in self._of_orders(drone):
+                    del self._alarms[key]
                 key = drone, f"{_ORDER_FAILURES[event.kind]}: {why}"
                 self._alarms[key] = Alarm(*key, since_s=event.stamp_s)
             elif event.kind in _ORDER_ENDS:
-                for key in [key for key in self._alarms if key[0] == drone and _of_order(key[1])]:
+                for key in self._of_orders(drone):
                     self._end(key, event.stamp_s)
 
     def acknowledge(self, text: str) -> int:
@@ -100,6 +102,9 @@ class AlarmBook:
         """A new run has begun."""
         self._alarms.clear()
         self._was_connected.clear()
+
+    def _of_orders(self, drone: int) -> list[tuple[int, str]]:
+        return [key for key in self._alarms if key[0] == drone and _of_order(key[1])]
 
     def _end(self, key: tuple[int, str], now_s: float) -> None:
         alarm = self._alarms[key]

@@ -69,6 +69,14 @@ def test_a_failed_order_is_an_alarm_until_a_later_order_is_accepted():
     assert said(book) == [("refused an order: battery at 9 %", [4], True, False)]
 
 
+def test_of_the_failed_orders_of_a_drone_the_last_one_is_an_alarm():
+    book = AlarmBook()
+    for second in range(100):
+        reason = f"order {second} to x 0.00 m: battery at {100 - second} %"
+        book.take([EventRecord(float(second), 0, "order refused", (4,), reason)])
+    assert said(book) == [("refused an order: battery at 1 %", [4], False, False)]
+
+
 def test_silent_and_crashed_nodes_are_alarms():
     book = AlarmBook()
     book.update(state(1.0, well(1, report_age=60.0), well(2, crashed=True)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import threading
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Callable, NamedTuple, Sequence
 
 import actionlib
@@ -149,7 +149,7 @@ class StandingLayouts:
             self._shown.pop(number, None)
             if progress is None:
                 return None
-            self._reporter.submit(self._report_withdrawn, progress, handle)
+            self._later(self._report_withdrawn, progress, handle)
             self._save()
         return progress.in_words()
 
@@ -161,7 +161,9 @@ class StandingLayouts:
 
     def _state_came(self, state: MeshState) -> None:
         mesh = mesh_status(state)
-        rules = flight_rules() if self._orders.all_progress() else FlightRules()
+        with self._lock:
+            is_idle = not self._orders.all_progress()
+        rules = FlightRules() if is_idle else flight_rules()
         with self._lock:
             self._mesh = mesh
             wanted = self._orders.update(mesh, rules)
@@ -194,7 +196,7 @@ class StandingLayouts:
                 handle = self._handles.get(progress.number)
                 if progress.is_over:
                     self._handles.pop(progress.number, None)
-                self._reporter.submit(self._report, progress, handle)
+                self._later(self._report, progress, handle)
             if changed:
                 self._save()
 
@@ -203,7 +205,11 @@ class StandingLayouts:
         left = json.dumps(self._orders.saved())
         if left != self._saved:
             self._saved = left
-            self._reporter.submit(_store, left)
+            self._later(_store, left)
+
+    def _later(self, work: Callable[..., None], *what: object) -> None:
+        """Let the reporter's thread do it. The caller holds the lock."""
+        self._reporter.submit(work, *what).add_done_callback(_log_failure)
 
     # The reporter's thread -------------------------------------------------------------------
 
@@ -236,6 +242,12 @@ class StandingLayouts:
             return
         for progress in self._orders.all_progress():
             _log.info("case %d: goes on: %s", progress.case, progress.in_words())
+
+
+def _log_failure(report: Future[None]) -> None:
+    error = report.exception()
+    if error is not None and not rospy.is_shutdown():  # whose topics are closed
+        _log.error("a report of a layout is lost", exc_info=error)
 
 
 def _store(left: str) -> None:
