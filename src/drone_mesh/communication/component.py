@@ -149,8 +149,6 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         else:
             self._receivers[kind](payload, creator, from_)
 
-    _receive = on_msg  # for an override of on_msg: super() costs as much as a small packet
-
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
         """A neighbour has received a packet; the routes learn from this."""
         self._deadlines.now_s = now_s

@@ -177,7 +177,7 @@ class Pilot:
 
     def _located(self) -> Location:
         location = self._engine.get_location()
-        if not all(map(math.isfinite, location)):
+        if not math.isfinite(sum(location)):
             raise LocationUnknown(f"invalid position of the drone: {location}")
         return location
 

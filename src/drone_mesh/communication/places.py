@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.location import Location
 
@@ -33,7 +35,7 @@ class KnownPlaces:
         """Whether the next hop, or the gateway, can be there, as far as one radio reaches."""
         hops = self._connected_hops if gateway else 1
         here = self.connected_at
-        return here is None or here.distance_m(place) <= (hops + 1) * range_m
+        return here is None or math.dist(here, place) <= (hops + 1) * range_m
 
     def update_gateway(self, place: Location, seen_s: float) -> None:
         """The preferred gateway itself was at `place` at `seen_s`; older news is ignored."""

@@ -24,7 +24,7 @@ from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
 from drone_mesh.communication.repair.options import RepairOptions
-from drone_mesh.communication.repair.status import NOTHING_TO_REPAIR, RepairStatus
+from drone_mesh.communication.repair.status import RepairStatus
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.router_states import RepairState, RouterStates
 from drone_mesh.communication.timing import MeshTiming
@@ -73,7 +73,6 @@ class MeshnetworkRouter(MeshnetworkComponent):
             repair or Thesis(),
             self._options,
         )
-        self._repair_status = NOTHING_TO_REPAIR  # replaced whole: any thread reads it
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""
@@ -85,20 +84,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
                 self._repair.announce_place(goal)
         if now_s >= self._deadlines.get(Due.REPAIR) and self._repair.on_due():
             self._landed()
-        self._repair_status = self._repair.status()
 
     def _check(self, due_s: float) -> None:
         super()._check(due_s)
         if self._states.connected:
             self.places.connected_here(self._pilot.place(), self.control.hops)
-
-    def on_msg(self, payload: bytes, now_s: float) -> None:
-        """Like MeshnetworkComponent."""
-        self._receive(payload, now_s)
-        if self._states.nothing_to_repair:  # most packets
-            self._repair_status = NOTHING_TO_REPAIR
-        else:
-            self._repair_status = self._repair.status()
 
     def get_connected_to_gateway(self) -> bool:
         """Whether a gateway answered the last heartbeat, or may still answer."""
@@ -114,7 +104,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
 
     def get_repair_status(self) -> RepairStatus:
         """What the node does about a lost connection, and why."""
-        return self._repair_status
+        return self._repair.status()
 
     # For the control plane -------------------------------------------------------------------
 
