@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import TYPE_CHECKING
 
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.deadlines import Due
@@ -15,24 +16,25 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
     KnownNode,
 )
+from drone_mesh.communication.mesh_node import NodeSettings
 from drone_mesh.communication.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
     type_of,
 )
-from drone_mesh.communication.observer import MeshObserver, ignore_events
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
 from drone_mesh.communication.orders.final_places import FinalPlaces
 from drone_mesh.communication.orders.messages import OrderReply
-from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.reports.node_reports import ReportBook, ReportedNode
-from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 SEARCH_WITHIN_S = 600.0  # our choice: search for nodes that were heard within this time
 
@@ -48,23 +50,10 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         routing: ITechnique,
         internet: IInternetConnection,
         rng: random.Random,
-        timing: MeshTiming | None = None,
-        observer: MeshObserver = ignore_events,
-        debug: bool = True,
-        options: RepairOptions | None = None,
+        **settings: Unpack[NodeSettings],
     ) -> None:
-        """Like MeshnetworkComponent; orders arrive through `internet`."""
-        super().__init__(
-            node_id,
-            antenna,
-            engine,
-            routing,
-            rng,
-            timing,
-            observer,
-            debug,
-            options=options,
-        )
+        """Like MeshNode; orders arrive through `internet`."""
+        super().__init__(node_id, antenna, engine, routing, rng, None, **settings)
         self._internet = internet
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
         self._reports = ReportBook()

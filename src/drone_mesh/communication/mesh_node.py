@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import abc
 import random
+from typing import TypedDict
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.complaints import Complaints
@@ -47,6 +48,15 @@ from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.interfaces import IDroneEngine
 
 
+class NodeSettings(TypedDict, total=False):
+    """The arguments of every MeshNode that have a default."""
+
+    timing: MeshTiming | None
+    observer: MeshObserver
+    debug: bool
+    options: RepairOptions | None
+
+
 class MeshNode(IMeshDebugInfo, IControlHost):
     """Owns the parts; MeshnetworkComponent passes them packets and deadlines."""
 
@@ -57,10 +67,11 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         engine: IDroneEngine,
         routing: ITechnique,
         rng: random.Random,
+        states: RouterStates | None,
+        *,
         timing: MeshTiming | None = None,
         observer: MeshObserver = ignore_events,
         debug: bool = True,
-        states: RouterStates | None = None,
         options: RepairOptions | None = None,
     ) -> None:
         """`rng` spreads simultaneous actions of many nodes; `debug`: the antenna displays the node.

@@ -7,30 +7,31 @@ from __future__ import annotations
 
 import math
 import random
+from typing import TYPE_CHECKING
 
 from drone_mesh.communication.component import MeshnetworkComponent
 from drone_mesh.communication.deadlines import Due
-from drone_mesh.communication.interfaces import (
-    IWirelessCommunication,
-)
+from drone_mesh.communication.interfaces import IWirelessCommunication
 from drone_mesh.communication.last_places import LastPlace
+from drone_mesh.communication.mesh_node import NodeSettings
 from drone_mesh.communication.messages import (
     GatewayPlace,
     MovementNegotiationMessage,
     place_in,
 )
-from drone_mesh.communication.observer import MeshEventKind, MeshObserver, ignore_events
+from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.repair.connection_repair import ConnectionRepair
 from drone_mesh.communication.repair.interfaces import IRepairStrategy
-from drone_mesh.communication.repair.options import RepairOptions
 from drone_mesh.communication.repair.status import RepairStatus
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 from drone_mesh.communication.router_states import RepairState, RouterStates
-from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.communication.ways import ITechnique
 from drone_mesh.drone.interfaces import IDroneEngine
 from drone_mesh.drone.location import Location
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 GOAL_AGAIN_S = 0.15  # our choice: broadcasts are not acknowledged, and it is soon out of reach
 SHORT_FLIGHT = 0.25  # of the range, our choice: the discs before and after share 84 % of their area
@@ -46,32 +47,14 @@ class MeshnetworkRouter(MeshnetworkComponent):
         engine: IDroneEngine,
         routing: ITechnique,
         rng: random.Random,
-        timing: MeshTiming | None = None,
-        observer: MeshObserver = ignore_events,
-        debug: bool = True,
         repair: IRepairStrategy | None = None,
-        repair_options: RepairOptions | None = None,
+        **settings: Unpack[NodeSettings],
     ) -> None:
-        """Like MeshnetworkComponent; the default of `repair` is Thesis."""
-        self._states = RouterStates()
-        super().__init__(
-            node_id,
-            antenna,
-            engine,
-            routing,
-            rng,
-            timing,
-            observer,
-            debug,
-            self._states,
-            repair_options,
-        )
+        """Like MeshNode; the default of `repair` is Thesis."""
+        self._states = states = RouterStates()
+        super().__init__(node_id, antenna, engine, routing, rng, states, **settings)
         self._repair = ConnectionRepair(
-            self._parts,
-            self._states,
-            self.control,
-            repair or Thesis(),
-            self._options,
+            self._parts, states, self.control, repair or Thesis(), self._options
         )
 
     def tick(self, now_s: float) -> None:

@@ -196,7 +196,7 @@ class Network:
             timing=self._timing,
             observer=self._observe,
             repair=self._make_repair(),
-            repair_options=self._repair_options,
+            options=self._repair_options,
         )
         node.component.data.on_received(functools.partial(self._receive, node_id))
         node.deadlines = node.component.deadlines

@@ -92,7 +92,7 @@ class RadioNode:
             internet=self._internet,
             routing=options.routing,
             repair=options.repair,
-            repair_options=options.repair_options,
+            options=options.repair_options,
             timing=options.timing,
             observer=self.events.observe,
             debug=options.debug_period_s > 0.0,

@@ -145,27 +145,27 @@ class Rig:
         self.routing = routing or ChildTableTree()
         self.events = []
         carried = (self.antenna, self.engine, self.routing)
+        settings = {
+            "timing": timing,
+            "observer": self.events.append,
+            "debug": debug,
+            "options": options,
+        }
         if gateway:
             self.mesh = MeshnetworkGateway(
                 node_id,
                 *carried,
                 self.internet,
                 AlwaysHalf(),
-                timing,
-                self.events.append,
-                debug,
-                options,
+                **settings,
             )
         else:
             self.mesh = MeshnetworkRouter(
                 node_id,
                 *carried,
                 AlwaysHalf(),
-                timing,
-                self.events.append,
-                debug,
                 repair,
-                options,
+                **settings,
             )
         self.mesh.start(self.now_s)
         self.forget()

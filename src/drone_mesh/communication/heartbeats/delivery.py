@@ -10,21 +10,17 @@ from collections import deque
 from typing import Callable, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.deadlines import Deadlines
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard
-from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE, IWirelessCommunication
+from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.limits import REPEATS, RateLimit, Strangers
 from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT
-from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshEventKind
+from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import CIRCULATION_S
 from drone_mesh.communication.ways import IDelivery
 
 DATA_PERSISTENCE = 3  # our choice: users' packets are many, so a chain of losses is more likely
-
-NodeReport = Callable[[MeshEventKind, int], None]
-"""Called with an event and the other node concerned."""
 
 
 class Delivery(IDelivery):
@@ -35,28 +31,20 @@ class Delivery(IDelivery):
 
     def __init__(
         self,
-        node_id: int,
-        antenna: IWirelessCommunication,
+        basics: NodeBasics,
         routing: IRoutingTechnique,
-        neighbours: Neighbours,
-        deadlines: Deadlines,
-        attempts: int,
-        report: NodeReport,
         on_neighbour_lost: Callable[[int], None],
         another_next_hop: Callable[[int, int], int],
     ) -> None:
-        """`attempts`: failed transmissions after which the receiver counts as lost.
-
-        `another_next_hop` returns a neighbour to try for a node, not the one given, or NO_ROUTE.
-        """
-        self._node_id = node_id
-        self._antenna = antenna
+        """`another_next_hop`: a neighbour to try for a node, not the one given, or NO_ROUTE."""
+        self._node_id = basics.node_id
+        self._antenna = antenna = basics.antenna
         self._shared = antenna.medium.shared
         self._routing = routing
-        self._neighbours = neighbours
-        self._deadlines = deadlines
-        self._attempts = attempts
-        self._report = report
+        self._neighbours = basics.neighbours
+        self._deadlines = basics.deadlines
+        self._attempts = basics.timing.send_attempts  # that fail: then the receiver counts as lost
+        self._report = basics.report
         self._on_neighbour_lost = on_neighbour_lost
         self._another_next_hop = another_next_hop
         self._reported_s: dict[int, float] = {}  # shared medium: when each was announced

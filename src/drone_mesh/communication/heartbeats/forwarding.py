@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Hashable, Sequence
 
 from drone_mesh.communication import messages
-from drone_mesh.communication.complaints import Complaints
 from drone_mesh.communication.heartbeats.circulation import CirculationGuard, came_round
-from drone_mesh.communication.heartbeats.delivery import Delivery, NodeReport
+from drone_mesh.communication.heartbeats.delivery import Delivery
 from drone_mesh.communication.interfaces import NO_ROUTE
-from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.packet_types import MessageType
+from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 from drone_mesh.communication.timing import CIRCULATION_S
 
@@ -21,22 +20,14 @@ _HEARTBEAT = int(MessageType.HEARTBEAT)
 class Forwarding:
     """Sends packets of other nodes to their next hop. Called only by the node's component."""
 
-    def __init__(
-        self,
-        node_id: int,
-        routing: IRoutingTechnique,
-        delivery: Delivery,
-        complaints: Complaints,
-        report: NodeReport,
-        medium: Medium,
-    ) -> None:
-        self._node_id = node_id
+    def __init__(self, basics: NodeBasics, routing: IRoutingTechnique, delivery: Delivery) -> None:
+        self._node_id = basics.node_id
         self._routing = routing
         self._floods = routing.FLOODS
         self._delivery = delivery
-        self._complaints = complaints
-        self._report = report
-        self._circulation = CirculationGuard(medium.stretched(CIRCULATION_S))
+        self._complaints = basics.complaints
+        self._report = basics.report
+        self._circulation = CirculationGuard(basics.antenna.medium.stretched(CIRCULATION_S))
 
     def forward(
         self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float

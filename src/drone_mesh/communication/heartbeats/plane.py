@@ -33,24 +33,9 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
         self._deadlines = basics.deadlines
         self._neighbours = basics.neighbours
         self._delivery = self.delivery = Delivery(
-            basics.node_id,
-            basics.antenna,
-            technique,
-            basics.neighbours,
-            basics.deadlines,
-            basics.timing.send_attempts,
-            basics.report,
-            self._on_neighbour_lost,
-            self._another_next_hop,
+            basics, technique, self._on_neighbour_lost, self._another_next_hop
         )
-        self._forwarding = Forwarding(
-            basics.node_id,
-            technique,
-            self._delivery,
-            basics.complaints,
-            basics.report,
-            basics.antenna.medium,
-        )
+        self._forwarding = Forwarding(basics, technique, self._delivery)
         self._parts = HeartbeatParts(**vars(basics), routing=technique, delivery=self._delivery)
         self._introduction = Introduction(self._parts, host, lambda node: self.send_heartbeat(node))
         self._search = NodeSearch(self._parts, self._answer_search)

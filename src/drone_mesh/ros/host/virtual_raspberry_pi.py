@@ -64,7 +64,7 @@ class VirtualRaspberryPi(abc.ABC):
             internet=self._make_internet(),
             routing=settings.routing,
             repair=settings.repair,
-            repair_options=settings.repair_options,
+            options=settings.repair_options,
             timing=settings.timing,
             observer=self._observers,
             debug=settings.debug,
