@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import socket
 import threading
@@ -21,6 +22,9 @@ ALL = Permissions(may_arm=True, may_take_off=True, may_change_mode=True)
 LIMITS = FlightLimits(speed_m_s=5.0, cruise_height_m=6.0, layer_m=1.0)
 FLIGHT_S = 150.0
 REPORTED_WITHIN_S = 5.0
+DISARM_DELAY_S = 10.0  # ArduPilot's default, after arming without a take-off
+FLOWN = "flights"  # a test's property: what flew, how often, how often to its goal
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # each flies a copter of its own
 
 
 class LossyLine:
@@ -91,7 +95,7 @@ class CopterRig:
         self,
         program: tuple[Path, Path],
         folder: Path,
-        instance: int = 0,
+        instance: int = WORKER,
         speedup: float = 5.0,
         permissions: Permissions = ALL,
         losing: float = 0.0,
@@ -99,8 +103,13 @@ class CopterRig:
         ready: bool = True,
         limits: FlightLimits = LIMITS,
     ) -> None:
-        timeout = {"FS_GCS_TIMEOUT": min(120.0, GCS_TIMEOUT_S * max(1.0, speedup))}
-        wanted = {**SAFE, **timeout, **(parameters or {})}
+        # The copter's clock runs faster than the node's: what it waits for lasts longer there.
+        faster = max(1.0, speedup)
+        waits = {
+            "FS_GCS_TIMEOUT": min(120.0, GCS_TIMEOUT_S * faster),
+            "DISARM_DELAY": min(127.0, DISARM_DELAY_S * faster),
+        }
+        wanted = {**SAFE, **waits, **(parameters or {})}
         self.copter = ArduCopter(program, folder, instance, ORIGIN, speedup, wanted)
         self.line: LossyLine | None = None
         address = self.copter.address

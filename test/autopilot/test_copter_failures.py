@@ -6,20 +6,26 @@ autopilot or the pilot has chosen a mode, until the pilot gives it back.
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Callable, Mapping
 
 import pytest
+from copter_fleet import Fleet
 from copter_rig import CopterRig
+from hill import SLOPE_M, Hill
 
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import GoalRefused
 
 pytestmark = pytest.mark.timeout(1800)  # flights last
 
 WATCH_S = 12.0  # of the wall, five times as many of the copter
 SPEEDUP = 5.0
+NODE = 1
+PACE = float(os.environ.get("AUTOPILOT_PACE", "1"))
 STALLED = "the drone has not moved for 20 s"
 
 
@@ -31,9 +37,9 @@ class Failure:
     happens: Mapping[str, float]  # simulator's parameters
     mode: str  # that the copter chooses; empty: it stays in GUIDED
     ends: bool = True  # the flight
-    words: str = ""  # a part of what the engine says
     before: Mapping[str, float] = field(default_factory=dict)  # set before the flight
     gone: Mapping[str, float] = field(default_factory=dict)  # ends it again
+    hill: bool = False  # 30 m high, in its way
 
 
 FAILURES = (
@@ -56,7 +62,8 @@ FAILURES = (
     # Targets beyond the fence are dropped without a word: it hovers at the fence.
     Failure("the goal is beyond the fence", {}, "", before={"FENCE_RADIUS": 30}),
     Failure("fence breached", {"FENCE_RADIUS": 12}, "RTL"),
-    Failure("all motors stop", {"SIM_ENGINE_MUL": 0}, ""),
+    Failure("one of four motors stops", {"SIM_ENGINE_MUL": 0}, ""),
+    Failure("a hill in its way", {}, "", hill=True),
 )
 
 
@@ -76,6 +83,8 @@ def test_a_failure_in_flight_ends_it_and_nobody_takes_the_copter(
     with CopterRig(program, tmp_path, speedup=SPEEDUP) as rig:
         for name, value in failure.before.items():
             rig.pilot.set(name, value)
+        if failure.hill:
+            Hill(rig.pilot, rig.copter.system_id)
         rig.set_out(150.0, 0.0, 7.0)
         for name, value in failure.happens.items():
             rig.pilot.set(name, value)
@@ -91,6 +100,8 @@ def test_a_failure_in_flight_ends_it_and_nobody_takes_the_copter(
         )
         words = rig.engine.why_ended()
         assert words
+        if failure.hill:
+            assert SLOPE_M[0] < rig.engine.get_location().latitude < SLOPE_M[1]
         asked = nobody_flies_it(rig)
         assert rig.pilot.mode == (failure.mode or "GUIDED")
         did = failure.mode or ("disarmed" if not rig.pilot.armed else "stayed in GUIDED")
@@ -132,7 +143,42 @@ def test_when_the_node_is_killed_the_copter_goes_home_and_the_next_node_leaves_i
         row(Failure("the node is killed", {}, "RTL"), rig, "RTL", "", asked)
 
 
+@pytest.mark.parametrize("failure", FAILURES, ids=lambda failure: failure.what)
+def test_gateway_and_page_say_why_a_flight_ended(
+    program: tuple[Path, Path], tmp_path: Path, failure: Failure
+) -> None:
+    home, goal = Location(0.0, 0.0, 0.0), Location(50.0, 0.0, 18.0)
+    with Fleet(program, tmp_path, {NODE: home}, PACE, speed_m_s=1.5) as fleet:
+        pilot = fleet.pilots[NODE]
+        for name, value in failure.before.items():
+            pilot.set(name, value)
+        if failure.hill:
+            Hill(pilot, fleet.copters[NODE].system_id)
+        fleet.until("connected", lambda: fleet.reachable() == {NODE})
+        with fleet.page() as page:
+            fleet.order(NODE, goal)
+            fleet.until("on its way", lambda: fleet.places[NODE].latitude > 15.0)
+            for name, value in failure.happens.items():
+                pilot.set(name, value)
+            words = [fleet.outcome(NODE)]
+            if failure.ends:
+                assert words[0].startswith("given up: ")
+                fleet.order(NODE, home)
+                words.append(fleet.outcome(NODE))
+            else:
+                assert words[0].startswith("arrived")
+            fleet.watch_for(3.0 * PACE)
+            said = page.locator("#events li", has_text="order").all_inner_texts()
+            print(f"| {failure.what} | {words} | {said} |", flush=True)
+            for reason in words[: failure.ends]:  # the page shows it word by word
+                assert any(reason.partition(": ")[2] in text for text in said)
+
+
 def row(failure: Failure, rig: CopterRig, did: str, words: str, asked: str) -> None:
     """A row of the table in docs/flying.md."""
-    said = [t for t in rig.pilot.texts if any(k in t for k in ("ailsafe", "Crash", "EKF", "each"))]
+    said = [
+        t
+        for t in rig.pilot.texts
+        if any(k in t for k in ("ailsafe", "Crash", "EKF", "each", "Hit"))
+    ]
     print(f"| {failure.what} | {did} | `{words}` | `{asked}` |   <!-- {said[-2:]} -->")

@@ -35,6 +35,7 @@ class PilotSide:
         """Connect, as soon as the copter listens. Raises PilotSideError."""
         self.texts: list[str] = []
         self.parameters: dict[str, float] = {}
+        self.answer: Callable[[Message], None] = lambda _: None  # what else to do with a message
         self._system_id = system_id
         self._codec = mavlink.MAVLink(None, SYSTEM_ID, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         self._codec.robust_parsing = True
@@ -185,6 +186,8 @@ class PilotSide:
                 self._send(self._mission[message.seq])
         elif kind == "PARAM_VALUE":
             self.parameters[message.param_id] = float(message.param_value)
+        else:
+            self.answer(message)
 
     def _command(self, command: int, *parameters: float) -> None:
         padded = (*parameters, *(0.0,) * (7 - len(parameters)))

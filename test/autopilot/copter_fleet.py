@@ -1,0 +1,253 @@
+"""Copters of ArduPilot, gateway and routers: programs of their own, on one emulated air."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import math
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping
+
+from copter_rig import ORIGIN, WORKER
+
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.location import Location
+from drone_mesh.raspberry.arducopter import SAFE, ArduCopter
+from drone_mesh.raspberry.pilot_side import PilotSide
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+SOURCE = Path(__file__).resolve().parents[2] / "src"
+HEARD_S = 12.0  # two check periods
+READY_S = 120.0
+FIRST_INSTANCE = 20 + 10 * WORKER  # apart from those of other tests
+NODE_OPTIONS = (
+    *("--origin", "52.0907,5.1214,3", "--check-period", "5", "--connection-lost-after", "15"),
+)
+FLIGHT_OPTIONS = (
+    *("--may-arm", "--may-take-off", "--may-change-mode"),
+    *("--cruise-height", "12", "--layers", "6"),
+)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Fleet:
+    """The copters and their pilots, the gateway and the routers."""
+
+    def __init__(
+        self,
+        program: tuple[Path, Path],
+        folder: Path,
+        homes: Mapping[int, Location],
+        pace: float,
+        speed_m_s: float = 5.0,
+        hovers_on: int | None = None,
+    ) -> None:
+        """Copters on the ground at `homes`; `hovers_on`: of this one no failsafe acts.
+
+        `pace`: how fast the clocks of the copters and of all programs go; 1: as the wall's.
+        """
+        self._homes = homes
+        self._pace = pace
+        self._flight_options = (*FLIGHT_OPTIONS, "--speed", f"{speed_m_s:g}")
+        self._stack = contextlib.ExitStack()
+        self._folder = folder
+        self._air, self._http = free_port(), free_port()
+        self.nearest = (math.inf, "")
+        self.places: dict[int, Location] = {}
+        self.copters: dict[int, ArduCopter] = {}
+        self.pilots: dict[int, PilotSide] = {}
+        self.routers: dict[int, subprocess.Popen[bytes]] = {}
+        self._log = (folder / "positions.csv").open("w")
+        for node, home in homes.items():
+            own = folder / f"copter{node}"
+            own.mkdir()
+            parameters = {**SAFE, "FS_GCS_ENABLE": 0.0 if node == hovers_on else 1.0}
+            earth = Origin(*ORIGIN.to_earth(home))
+            copter = ArduCopter(program, own, FIRST_INSTANCE + node, earth, pace, parameters)
+            self._stack.callback(copter.close)
+            self.copters[node] = copter
+        for node, copter in self.copters.items():
+            self.pilots[node] = PilotSide(copter.pilot_address, copter.system_id)
+        for pilot in self.pilots.values():
+            pilot.make_ready(READY_S / pace)
+        serving = ("--emulated-air-serve", str(self._air), "--port", str(self._http))
+        self._start("gateway", "raspberry.gateway", *serving, *NODE_OPTIONS)
+        self.until("the gateway answers", lambda: bool(self.ask("ready")))
+        for node in homes:
+            self.start_router(node)
+
+    def __enter__(self) -> Fleet:
+        return self
+
+    def __exit__(
+        self,
+        _type: type[BaseException] | None,
+        _error: BaseException | None,
+        _traceback: TracebackType | None,
+    ) -> None:
+        for process in self.routers.values():
+            process.kill()
+        for pilot in self.pilots.values():
+            pilot.close()
+        self._stack.close()
+        self._log.close()
+
+    def now_s(self) -> float:
+        """The clock of the copters and of the nodes' programs."""
+        return time.monotonic() * self._pace
+
+    def start_router(self, node: int) -> None:
+        self.routers[node] = self._start(
+            *(f"router{node}", "raspberry.router", "--id", str(node)),
+            *("--emulated-air", str(self._air), "--drone", f"mavlink:{self.copters[node].address}"),
+            *(*self._flight_options, *NODE_OPTIONS),
+        )
+
+    def kill_router(self, node: int) -> None:
+        self.routers[node].kill()
+        self.routers[node].wait()
+
+    def ask(self, path: str, data: bytes | None = None) -> Any:
+        request = urllib.request.Request(
+            f"http://127.0.0.1:{self._http}/{path}", data, method="GET" if data is None else "POST"
+        )
+        try:
+            with urllib.request.urlopen(request, timeout=10) as answer:
+                return json.loads(answer.read() or b"true")
+        except (OSError, ValueError):
+            return None
+
+    def order(self, node: int, goal: Location) -> None:
+        path = f"DroneMovement/{node}/{goal.latitude:g}/{goal.longitude:g}/{goal.height:g}"
+        self.until(f"order for {node} is sent", lambda: self.ask(path, b"") is not None)
+
+    def fly_layout(self, layout: Mapping[int, Location]) -> None:
+        """Order it, and again what was given up, as its operator would; each time is printed."""
+        for node, goal in layout.items():
+            self.order(node, goal)
+
+        def is_flown() -> bool:
+            latest = {o["drone"]: o for o in (self.ask("orders") or {"orders": []})["orders"]}
+            for node, order in latest.items():
+                if order["state"] in ("given up", "refused", "no route"):
+                    print(f"{node} again: {order['state']}, {order['reason']}", flush=True)
+                    self.order(node, layout[node])
+            return all(self.is_at(node, goal) for node, goal in layout.items())
+
+        self.until("the layout is flown", is_flown, 300.0)
+
+    def outcome(self, node: int) -> str:
+        """What the gateway says in the end about the latest order of this drone."""
+        latest: dict[str, Any] = {}
+
+        def is_over() -> bool:
+            orders = (self.ask("orders") or {"orders": []})["orders"]
+            latest.update([o for o in orders if o["drone"] == node][-1:][0])
+            return latest["state"] in ("refused", "given up", "arrived", "no route")
+
+        self.until(f"the order for {node} is over", is_over)
+        return f"{latest['state']}: {latest['reason']}"
+
+    def reachable(self) -> set[int]:
+        """The nodes that the gateway heard within two check periods."""
+        nodes = (self.ask("nodes") or {"nodes": []})["nodes"]
+        heard = [n for n in nodes if n["next_hop"] is not None and n["heard_s_ago"] is not None]
+        return {n["id"] for n in heard if n["heard_s_ago"] < HEARD_S}
+
+    def gateway_error_m(self) -> float:
+        """How far the places that the gateway shows are from those of the ground stations."""
+        shown = {n["id"]: n["place"] for n in (self.ask("mesh?after=0") or {"nodes": []})["nodes"]}
+        if any(shown.get(node) is None for node in self._homes):
+            return math.inf
+        return max(self.places[node].distance_m(Location(*shown[node])) for node in self._homes)
+
+    def watch(self) -> None:
+        """Read all positions once; keep the smallest distance."""
+        for node, pilot in self.pilots.items():
+            pilot.read(0.01)
+            if pilot.place is not None:
+                self.places[node] = ORIGIN.to_frame(pilot.place)
+        for one, other in itertools.combinations(sorted(self.places), 2):
+            distance_m = self.places[one].distance_m(self.places[other])
+            if distance_m < self.nearest[0]:
+                where = f"{self.places[one].in_words()} and {self.places[other].in_words()}"
+                self.nearest = (distance_m, f"{one} and {other}, {where}")
+        row = [f"{self.now_s():.1f}"]
+        for node in sorted(self.places):
+            row += [f"{value:.2f}" for value in self.places[node]]
+        self._log.write(",".join(row) + "\n")
+
+    def until(self, what: str, holds: Callable[[], bool], within_s: float = 180.0) -> None:
+        end_s, due_s = self.now_s() + within_s, 0.0
+        while True:
+            if self.now_s() >= due_s:
+                if holds():
+                    return
+                due_s = self.now_s() + 1.0
+            assert self.now_s() < end_s, f"{what}; at {self.places}; {self.ask('nodes')}"
+            self.watch()
+
+    def watch_for(self, seconds: float) -> None:
+        end_s = self.now_s() + seconds
+        while self.now_s() < end_s:
+            self.watch()
+
+    def is_at_rest(self, but: int) -> bool:
+        """Whether nobody else moves within ten seconds."""
+        before = dict(self.places)
+        self.watch_for(10.0)
+        return all(self.is_at(node, before[node], 0.5) for node in self._homes if node != but)
+
+    def is_at(self, node: int, goal: Location, within_m: float = 2.5) -> bool:
+        return self.places[node].distance_m(goal) < within_m
+
+    @contextlib.contextmanager
+    def page(self) -> Iterator[Page]:
+        """The console's page of this mesh in a browser; needs chromium."""
+        from playwright.sync_api import sync_playwright
+
+        port = free_port()
+        gateway = f"http://127.0.0.1:{self._http}"
+        options = ("--gateway", gateway, "--port", str(port))
+        console = self._start("console", "console.gateway_command", *options)
+        self.watch_for(5.0 * self._pace)
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"), args=["--headless", "--no-sandbox"]
+            )
+            page = browser.new_page(viewport={"width": 1400, "height": 900})
+            page.set_default_timeout(120e3)  # ms: the machine may be busy
+            page.goto(f"http://127.0.0.1:{port}/")
+            yield page
+            browser.close()
+        console.kill()
+
+    def _start(self, name: str, module: str, *options: str) -> subprocess.Popen[bytes]:
+        slow = f"import time; real = time.monotonic; time.monotonic = lambda: {self._pace} * real()"
+        code = f"import sys; {slow}; from drone_mesh.{module} import main; sys.exit(main())"
+        with (self._folder / f"{name}.log").open("ab") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-c", code, *options],
+                env={**os.environ, "PYTHONPATH": str(SOURCE)},
+                stdout=log,
+                stderr=log,
+            )
+        self._stack.callback(process.wait)
+        self._stack.callback(process.kill)
+        return process
