@@ -117,7 +117,7 @@ class CopterRig:
             self.line = LossyLine(int(address.rpartition(":")[2]), losing, seed=instance)
             address = self.line.address
         self.pilot = PilotSide(self.copter.pilot_address, self.copter.system_id)
-        self._node = (instance + 1, address, ORIGIN, limits, permissions)
+        self._node = (1, address, ORIGIN, limits, permissions)
         self.start_engine()
         if ready:
             self.pilot.make_ready()

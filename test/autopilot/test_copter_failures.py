@@ -148,6 +148,7 @@ def test_gateway_and_page_say_why_a_flight_ended(
     program: tuple[Path, Path], tmp_path: Path, failure: Failure
 ) -> None:
     home, goal = Location(0.0, 0.0, 0.0), Location(50.0, 0.0, 18.0)
+    elsewhere = Location(40.0, 20.0, 18.0)
     with Fleet(program, tmp_path, {NODE: home}, PACE, speed_m_s=1.5) as fleet:
         pilot = fleet.pilots[NODE]
         for name, value in failure.before.items():
@@ -163,7 +164,7 @@ def test_gateway_and_page_say_why_a_flight_ended(
             words = [fleet.outcome(NODE)]
             if failure.ends:
                 assert words[0].startswith("given up: ")
-                fleet.order(NODE, home)
+                fleet.order(NODE, elsewhere)
                 words.append(fleet.outcome(NODE))
             else:
                 assert words[0].startswith("arrived")
