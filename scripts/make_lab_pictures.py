@@ -29,9 +29,9 @@ CHROMIUM_FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-back
 PAGE = {"width": 900, "height": 1250}  # px: the first screens of a report
 REPORTED = (
     "title=Healing of fifty drones", "seeds=8", "base.layout.drones=50",
-    "sweep.repair=[thesis,scout,home]", "sweep.faults.kill=[{share: 0.3}]",
+    "sweep.repair=[thesis,nearest,home]", "sweep.faults.kill=[{share: 0.3}]",
 )  # fmt: skip
-STRATEGIES = ("thesis", "scout", "nearest", "follow", "inward", "field", "home", "oracle")
+STRATEGIES = ("thesis", "nearest", "follow", "inward", "field", "home", "oracle")
 TECHNIQUES = (
     "child_table_tree", "steady_tree", "etx_tree", "babel", "batman", "dsdv", "flooding",
     "shortest_path",

@@ -120,7 +120,7 @@ def alone_among_the_dead(repair):
     return network
 
 
-@pytest.mark.parametrize("repair", ["thesis", "scout", "nearest", "follow"])
+@pytest.mark.parametrize("repair", ["thesis", "nearest", "follow"])
 def test_a_drone_whose_neighbours_all_died_looks_around_early_and_stays_connected(repair):
     network = alone_among_the_dead(repair)
     assert run_until(network, network.all_connected, within_s=70.0, step_s=1.0)
@@ -129,11 +129,10 @@ def test_a_drone_whose_neighbours_all_died_looks_around_early_and_stays_connecte
     assert len(events(network, "FLIGHT_DECIDED")) == 1
 
 
-@pytest.mark.parametrize("repair", ["thesis", "scout"])
 @pytest.mark.parametrize("silence_s", [45.0, 52.0, 120.0, 600.0])
-def test_all_drones_are_back_at_their_places_after_a_silence(repair, silence_s):
+def test_all_drones_are_back_at_their_places_after_a_silence(silence_s):
     """At 45 and 52 s some are on their way, and some listen."""
-    network = fleet(8, 3, repair=repair)
+    network = fleet(8, 3)
     network.run_for(30.0)
     before = {node: network.location(node) for node in network.nodes}
     outage(network, silence_s)
@@ -173,8 +172,8 @@ def test_a_carrier_is_measured_as_power_and_no_drone_moves(radio):
     network.stop()
 
 
-def test_with_scout_an_order_during_a_look_around_is_flown():
-    network = alone_among_the_dead("scout")
+def test_an_order_during_a_look_around_is_flown():
+    network = alone_among_the_dead("thesis")
     assert run_until(network, lambda: flown(network) == {4}, within_s=60.0, step_s=0.5)
     network.nodes[4].component.on_msg(order_from(1, to=4, latitude=40.0), network.clock.now_s)
     network.nodes[4].plan()

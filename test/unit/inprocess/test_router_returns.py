@@ -17,7 +17,7 @@ from drone_mesh.communication.router_states import ConnectionState, RepairState
 from drone_mesh.errors import GoalRefused
 from drone_mesh.inprocess import Network
 
-OTHERS = ["scout", "nearest", "follow"]
+OTHERS = ["nearest", "follow"]
 PERIODS_S = 30.0  # three check periods
 NEIGHBOUR = {1: 0, 3: 2, 4: 2}  # from which each router hears orders and claims
 LATER_S = (0.0, 0.15, 0.45, 2.0)  # after the beginning of a state

@@ -10,6 +10,8 @@ from drone_mesh.drone.location import Location
 class FlightNews:
     """Which drones took off, and where they looked for the gateway."""
 
+    drone_flew = False  # one of the group, since the connection was lost
+
     def __init__(self) -> None:
         self._quiet_until_s = -math.inf
         self._tries: dict[Location, float] = {}  # gateway's place -> when another may fly there
@@ -17,6 +19,7 @@ class FlightNews:
 
     def took_off(self, quiet_until_s: float) -> None:
         """A drone takes off: the others wait for its outcome until `quiet_until_s`."""
+        self.drone_flew = True
         self._quiet_until_s = quiet_until_s
 
     def is_quiet(self, now_s: float) -> bool:
@@ -46,5 +49,6 @@ class FlightNews:
 
     def clear(self) -> None:
         """A gateway answers: places tried without success may be tried again."""
+        self.drone_flew = False
         self._quiet_until_s = -math.inf
         self._tries.clear()

@@ -30,6 +30,7 @@ PLACES_WITHIN_S = 1.0  # docs/protocol.md, "Negotiation": how long to wait for p
 SETTLE_S = 0.5  # our choice: a bid takes some milliseconds per hop; enough for 50 hops
 TAKE_OFF_WITHIN_S = 5.0  # docs/protocol.md, "Negotiation": then the winner is passed over
 ROUNDS_WITHOUT_FLIER = 2  # docs/protocol.md, "Negotiation": then the second choice counts
+LATER_ROUNDS = 1.0 / 3.0  # of the patience, our choice: a step back takes about 5 s
 HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a group to a gateway
 
 IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
@@ -50,6 +51,10 @@ class GroupRepair(LoneRepair):
     @abc.abstractmethod
     def _score(self, step: Step) -> float:
         """The bid to fly `step`: 0 or more, or NO_BID. The highest of the group flies."""
+
+    def patience(self, silent: bool) -> float:
+        """After the first flight of a drone of the group, later rounds come sooner."""
+        return LATER_ROUNDS if self._news.drone_flew and not silent else super().patience(silent)
 
     def on_emergency(self) -> None:
         """With neighbours: start an election. Alone: fly."""
@@ -261,7 +266,7 @@ class GroupRepair(LoneRepair):
         mesh = self.mesh
         if mesh.connected or self._news.is_quiet(mesh.now_s):
             return
-        patience_s = self.patience(silent=False) * mesh.connection_lost_after_s
+        patience_s = LATER_ROUNDS * mesh.connection_lost_after_s
         quiet_s = max(patience_s - mesh.check_period_s, TAKE_OFF_WITHIN_S)
         self._news.took_off(mesh.now_s + quiet_s)
         self._rounds_without_flier = 0

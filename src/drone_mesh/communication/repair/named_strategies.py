@@ -12,7 +12,6 @@ from drone_mesh.communication.repair.strategies.follow import Follow
 from drone_mesh.communication.repair.strategies.home import Home
 from drone_mesh.communication.repair.strategies.inward import Inward
 from drone_mesh.communication.repair.strategies.nearest import Nearest
-from drone_mesh.communication.repair.strategies.scout import Scout
 from drone_mesh.communication.repair.strategies.stay import Stay
 from drone_mesh.communication.repair.strategies.thesis import Thesis
 
@@ -23,7 +22,6 @@ REPAIR_STRATEGIES: dict[str, Callable[[], IRepairStrategy]] = {
     "home": Home,
     "inward": Inward,
     "nearest": Nearest,
-    "scout": Scout,
     "stay": Stay,
 }
 
