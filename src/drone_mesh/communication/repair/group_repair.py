@@ -53,8 +53,9 @@ class GroupRepair(LoneRepair):
         """The bid to fly `step`: 0 or more, or NO_BID. The highest of the group flies."""
 
     def patience(self, silent: bool) -> float:
-        """After the first flight of a drone of the group, later rounds come sooner."""
-        return LATER_ROUNDS if self._news.drone_flew and not silent else super().patience(silent)
+        """After a flight of a drone of the group, later rounds come sooner, until none flies."""
+        may_fly = self._news.drone_flew and self._rounds_without_flier <= ROUNDS_WITHOUT_FLIER
+        return LATER_ROUNDS if may_fly and not silent else super().patience(silent)
 
     def on_emergency(self) -> None:
         """With neighbours: start an election. Alone: fly."""
@@ -132,6 +133,8 @@ class GroupRepair(LoneRepair):
             if mesh.was_at(step):
                 if is_first_choice:
                     reason = f"flew to the place of {step.owner} without success"
+                    if step.owner == NO_ROUTE:
+                        reason = "is where it was connected last, and knows no other place"
                 continue
             occupant = NO_ROUTE if alone else self._occupant(step)
             if occupant != NO_ROUTE:

@@ -61,8 +61,8 @@ class RepairStatus(NamedTuple):
         return f"lands: {self.reason}" if self.reason else f"flies to {self._place()}"
 
     def _place(self) -> str:
-        if self.place_of == NO_ROUTE and self.goal is not None:
-            return self.goal.in_words()
+        if self.place_of == NO_ROUTE:
+            return "where it was connected last" if self.goal is None else self.goal.in_words()
         return f"the place of {self.place_of}"
 
     def _does_not_fly(self) -> str:

@@ -96,17 +96,13 @@ class RepairViews(IRepairActions):
     def steps(self) -> list[Step]:  # noqa: D102
         places, gateway = self._parts.places, self._control.gateway
         candidates = [(places.good, places.good_id), (places.gateway, gateway)]
-        if places.good is None and places.gateway is None and not self._is_where_it_was_connected():
+        if places.good is None and places.gateway is None:
             candidates = [(places.connected_at, NO_ROUTE)]
         return [
             Step(place, owner, home=owner == gateway != NO_ROUTE)
             for place, owner in candidates
             if place is not None and _may_be_flown_to(place)
         ]
-
-    def _is_where_it_was_connected(self) -> bool:
-        here, there = self._parts.pilot.place(), self._parts.places.connected_at
-        return here is not None and there is not None and here.distance_m(there) < self.clearance_m
 
     @property
     def gateway_place(self) -> Location | None:  # noqa: D102
@@ -120,7 +116,9 @@ class RepairViews(IRepairActions):
 
     def was_at(self, step: Step) -> bool:  # noqa: D102
         radius_m = self.clearance_m * (2 * PITCH if step.home else NEAR)
-        return any(step.place.distance_m(place) < radius_m for place in self._tried_goals)
+        here = self._parts.pilot.place() if step.owner == NO_ROUTE else None
+        places = [*self._tried_goals, *filter(None, [here])]
+        return any(step.place.distance_m(place) < radius_m for place in places)
 
     def _view(self, node: int) -> NeighbourView:
         heard, hops = self._parts.neighbours.place_of(node), self._parts.neighbours.hops_of(node)

@@ -76,6 +76,15 @@ def left_able(run: RunRecord) -> float:
     return float(len(run.left_behind.keys() & run.able))
 
 
+@metric("drones", "of left_behind: those that were connected, and know no place", better="less")
+def left_placeless(run: RunRecord) -> float:
+    kind = MeshEventKind.CONNECTED.value
+    connected = {event.node for event in run.events if event.kind == kind}
+    return float(
+        sum(node in connected and "knows no place" in why for node, why in run.left_behind.items())
+    )
+
+
 @metric("", "packets that were dropped at the limit of hops", better="less")
 def endless_packets(run: RunRecord) -> float:
     return float(run.endless_packets)
