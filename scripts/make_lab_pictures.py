@@ -91,7 +91,10 @@ def panels(names: tuple[str, ...], draw: Callable[[Axes, str], str], height_in: 
     """One panel for each name, with the sentence that `draw` returns below it."""
     rows = -(-len(names) // COLUMNS)
     figure = Figure(figsize=(10.0, height_in * rows), layout="constrained")
-    for axes, name in zip(figure.subplots(rows, COLUMNS).ravel(), names):
+    panel = figure.subplots(rows, COLUMNS).ravel()
+    for axes in panel[len(names) :]:
+        axes.set_axis_off()
+    for axes, name in zip(panel, names):
         words = draw(axes, name)
         axes.set_title(name, fontsize=10)
         axes.set_xlabel(words, fontsize=8)

@@ -305,6 +305,7 @@ def test_a_drone_that_lands_on_another_is_a_collision_and_stacked() -> None:
     assert measured["stacked"] == 2
     assert measured["min_distance_m"] < 0.1
     assert measured["displacement_max_m"] == pytest.approx(6)
+    assert measured["displaced"] == 1
 
 
 def test_a_stale_route_is_an_outage_even_before_it_is_noticed() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.lab.experiment import load_experiment
-from drone_mesh.lab.metrics.harm import harm, left_able, resting_close
+from drone_mesh.lab.metrics.harm import harm, left_able, left_placeless, resting_close
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.sequence import SequenceRun, run_sequence
@@ -42,6 +42,7 @@ def test_drones_that_know_where_the_gateway_moved_are_not_left_behind(number):
     record = SequenceRun(Scenario.model_validate(content), Streams(0, number)).run()
     assert {item.action for item in record.happened} == {"gateway_moved"}
     assert left_able(record) == 0
+    assert left_placeless(record) == 0
 
 
 def test_the_same_seed_gives_the_same_run_in_an_experiment():

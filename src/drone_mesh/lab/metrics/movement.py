@@ -10,6 +10,7 @@ from drone_mesh.air.graph import Graph
 from drone_mesh.lab.metrics.registry import NAN, metric
 from drone_mesh.lab.record import RunRecord, Topology
 
+DISPLACED_M = 1.0  # our choice: the clearance
 STACKED_M = 0.3  # two drones closer than this are stacked
 
 
@@ -65,6 +66,11 @@ def displacement_mean_m(run: RunRecord) -> float:
 @metric("m", "the largest of these", better="less")
 def displacement_max_m(run: RunRecord) -> float:
     return max(_displacements(run), default=0.0)
+
+
+@metric("drones", "live drones more than 1 m from where they started", better="less")
+def displaced(run: RunRecord) -> float:
+    return float(sum(metres > DISPLACED_M for metres in _displacements(run)))
 
 
 def _displacements(run: RunRecord) -> list[float]:

@@ -541,6 +541,16 @@ def test_a_drone_that_knows_no_place_flies_to_where_it_was_connected_last():
     assert rig.engine.goals[:1] == [Location(12.0, 0.0, 0.0)]
 
 
+def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_and_says_so():
+    rig = Rig()
+    rig.engine.place = Location(12.0, 0.0, 0.0)
+    rig.connect_through(2)
+    rig.antenna.dead = {2}
+    rig.wait_until(60.0)
+    assert rig.engine.goals == []
+    assert "is where it was connected last, and knows no other place" in rig.repair_in_words()
+
+
 def test_a_next_hop_with_an_impossible_place_does_not_hide_that_of_the_gateway():
     rig = lone_rig()
     rig.hear(UNDERGROUND)
@@ -783,6 +793,20 @@ def test_after_the_first_flight_of_the_group_later_rounds_come_three_times_as_so
     assert rig.kinds().count("NEGOTIATION_STARTED") == 1
     rig.wait_until(BIDS_S + 20.1)
     assert rig.kinds().count("NEGOTIATION_STARTED") == 2
+
+
+def test_after_three_rounds_without_a_flight_rounds_are_as_rare_as_before_the_first_flight():
+    rig = group_rig(3, 4)
+    rig.engine.grounded = "the battery is empty"
+    rig.wait_until(BIDS_S)
+    rig.hear(bid(3, TOOK_OFF))
+    starts_s = []
+    while rig.now_s < EMERGENCY_S + 150.0:
+        known = rig.kinds().count("NEGOTIATION_STARTED")
+        rig.wait(1.0)
+        if rig.kinds().count("NEGOTIATION_STARTED") > known:
+            starts_s.append(rig.now_s - BIDS_S)
+    assert starts_s == pytest.approx([20.0, 40.0, 60.0, 100.0, 140.0])
 
 
 def test_a_late_bid_does_not_start_the_same_negotiation_again():
