@@ -7,7 +7,9 @@ import unittest
 
 import rospy
 import rostest
-from rostest_support import LogWatch, MeshWatch
+from rostest_support import LogWatch, MeshWatch, call
+
+from drone_mesh.srv import PowerSwitch
 
 ROUTERS = range(2, 6)
 FIRST_ROUND_S = 12.0  # one check period, and a little
@@ -32,7 +34,26 @@ class TwoGatewaysTest(unittest.TestCase):
         for gateway in (0, 1):  # at most 5 nodes, a few packets each in four check periods
             self.assertLess(mesh.info(gateway).totalMessages - sent[gateway], 200)
 
-        dead = before[2]
+        offline = before[2]
+        other = 1 - offline
+        self.switch_internet(offline, False)
+        mesh.wait(
+            f"all routers at gateway {other}, gateway {offline} behind them",
+            45,
+            lambda: (
+                mesh.connected(ROUTERS)
+                and set(preferred().values()) == {other}
+                and mesh.info(offline).prefferedGateWay == other
+            ),
+        )
+        self.switch_internet(offline, True)
+        mesh.wait(
+            f"gateway {offline} back",
+            45,
+            lambda: mesh.connected() and mesh.info(offline).prefferedGateWay == offline,
+        )
+
+        dead = mesh.info(2).prefferedGateWay
         other = 1 - dead
         mesh.switch(dead, False)
         mesh.wait(
@@ -41,6 +62,9 @@ class TwoGatewaysTest(unittest.TestCase):
             lambda: mesh.connected(ROUTERS) and set(preferred().values()) == {other},
         )
         self.assertEqual(log.failures(), [])
+
+    def switch_internet(self, gateway: int, works: bool) -> None:
+        call(f"/Nodes/{gateway}/internetSwitch", PowerSwitch, works)
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ class IControlHost(abc.ABC):
 
     @abc.abstractmethod
     def get_connected_to_gateway(self) -> bool:
-        """Whether a gateway is reached; always true for a gateway."""
+        """Whether a gateway is reached; true for a gateway whose internet works."""
 
     @abc.abstractmethod
     def get_hops_from_gateway_away(self) -> int:
@@ -90,6 +90,9 @@ class IControlPlane(abc.ABC):
     def on_registered(self) -> None:
         """The medium has registered the antenna again."""
 
+    def on_internet(self, works: bool) -> None:
+        """A gateway's connection to the outside world works again, or no longer."""
+
     @abc.abstractmethod
     def introduce(self) -> None:
         """Make this node known to all in range, now."""
@@ -125,7 +128,7 @@ class IControlPlane(abc.ABC):
     @property
     @abc.abstractmethod
     def gateway(self) -> int:
-        """The preferred gateway, itself for a gateway; NO_ROUTE: none is known."""
+        """The preferred gateway, a gateway with internet itself; NO_ROUTE: none is known."""
 
     @property
     @abc.abstractmethod

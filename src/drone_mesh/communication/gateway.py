@@ -22,6 +22,7 @@ from drone_mesh.communication.messages import (
     MovementNegotiationMessage,
     type_of,
 )
+from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.communication.order_record import OrderRecord
 from drone_mesh.communication.orders.book import OrderBook
 from drone_mesh.communication.orders.final_places import FinalPlaces
@@ -55,6 +56,7 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         """Like MeshNode; orders arrive through `internet`."""
         super().__init__(node_id, antenna, engine, routing, rng, None, **settings)
         self._internet = internet
+        self._internet_works = True
         self._heartbeats: dict[int, tuple[int, float]] = {}  # by creator: hops, when
         self._reports = ReportBook()
         self._book = OrderBook(self._parts, self._may_find, self.control.search)
@@ -74,17 +76,30 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         if now_s >= self._deadlines.get(Due.ORDERS):
             self._book.on_due()
 
+    def set_internet(self, works: bool, now_s: float) -> None:
+        """Its connection to the outside world works again, or no longer.
+
+        Without one it is a router of another gateway, as far as the connection is concerned; it
+        does not fly for it.
+        """
+        self._deadlines.now_s = now_s
+        if works != self._internet_works:
+            self._internet_works = works
+            self.control.on_internet(works)
+            kind = MeshEventKind.CONNECTED if works else MeshEventKind.DISCONNECTED
+            self._report(kind, self._node_id)
+
     def get_connected_to_gateway(self) -> bool:
-        """Always true: it is a gateway."""
-        return True
+        """True while its internet works; otherwise whether it reaches another gateway."""
+        return self.control.hops != NO_ROUTE
 
     def get_preferred_gateway(self) -> int:
-        """Itself."""
-        return self._node_id
+        """Itself while its internet works, otherwise another gateway."""
+        return self.control.gateway
 
     def get_hops_from_gateway_away(self) -> int:
-        """Always 0: it is a gateway."""
-        return 0
+        """0 while its internet works, otherwise as for a router."""
+        return self.control.hops
 
     def send_goal_request_to_drone(
         self,
@@ -183,7 +198,11 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
         """Ignored: a gateway does not fly for the mesh."""
 
     def _on_location(self, node: int, location: Location, gateway: GatewayPlace | None) -> None:
-        self._neighbours.set_place(node, location, self._deadlines.now_s)
+        now_s = self._deadlines.now_s
+        self._neighbours.set_place(node, location, now_s)
+        if node == self.control.gateway:
+            self.places.update_gateway(location, now_s)
+            self.control.gateway_sent_place()
 
     def _took_off(self) -> None:
         """Nothing changes: a gateway is connected wherever it is."""

@@ -70,7 +70,7 @@ class IMeshDebugInfo(abc.ABC):
 
     @abc.abstractmethod
     def get_hops_from_gateway_away(self) -> int:
-        """Hops to the preferred gateway; 0 for a gateway, 255 while unknown."""
+        """Hops to the preferred gateway; 0 for a gateway with internet, 255 while unknown."""
 
     @abc.abstractmethod
     def get_last_good_known_location_id(self) -> int:
@@ -119,6 +119,10 @@ class IGatewayCommands(abc.ABC):
     @abc.abstractmethod
     def get_known_nodes(self) -> list[KnownNode]:
         """All other nodes that it has a route to or has heard, by id."""
+
+    @abc.abstractmethod
+    def set_internet(self, works: bool, now_s: float) -> None:
+        """Tell the gateway whether its connection to the outside world works."""
 
     def get_orders(self) -> Sequence[OrderRecord]:
         """The orders that it remembers, oldest first, with their outcomes."""

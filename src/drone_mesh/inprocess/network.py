@@ -250,6 +250,10 @@ class Network:
         if antenna.powered != on:
             antenna.switch_power(on)
 
+    def internet(self, gateway: int, works: bool) -> None:
+        """Give a gateway its connection to the outside world, or take it."""
+        self.nodes[gateway].submit(functools.partial(self._gateway(gateway).set_internet, works))
+
     def order(
         self,
         node_id: int,
@@ -263,14 +267,17 @@ class Network:
 
         Raises ValueError if `gateway` is not a gateway, and GoalRefused like IGatewayCommands.
         """
-        node = self.nodes[gateway]
-        if not isinstance(node.component, MeshnetworkGateway):
-            raise ValueError(f"node {gateway} is a router; orders go through a gateway")
-        taken = node.component.send_goal_request_to_drone(
+        taken = self._gateway(gateway).send_goal_request_to_drone(
             node_id, y, x, height, self.clock.now_s, allow_shared_place
         )
-        node.plan()
+        self.nodes[gateway].plan()
         return taken
+
+    def _gateway(self, node_id: int) -> MeshnetworkGateway:
+        component = self.nodes[node_id].component
+        if not isinstance(component, MeshnetworkGateway):
+            raise ValueError(f"node {node_id} is a router; orders go through a gateway")
+        return component
 
     def send(
         self, node_id: int, to: int, payload: bytes, port: int = 0, reliable: bool = True

@@ -72,11 +72,13 @@ class MqttInternet(IInternetConnection):
         broker: Broker,
         ca_file: Path | None = None,
         sends: bool = True,
+        is_internet: bool = False,
     ) -> None:
         """`submit` runs a function on the node's thread; `sends`: send messages published on tx.
 
-        If several gateways use one broker, only one of them should send these. Raises
-        ConfigurationError for a file that cannot be read.
+        `is_internet`: without the broker, the gateway says that it has no internet. If several
+        gateways use one broker, only one of them should send these. Raises ConfigurationError for a
+        file that cannot be read.
         """
         self._submit = submit
         self._users = users
@@ -84,6 +86,8 @@ class MqttInternet(IInternetConnection):
         self._topics = Topics(broker.mesh)
         self._node = users.node_id
         self._sends = sends
+        self._is_internet = is_internet
+        self._commands: IGatewayCommands | None = None
         self._stopped = threading.Event()
         self._end_subscription: Callable[[], None] = lambda: None
         self._states: dict[int, str] = {}  # as published; for the thread of the states
@@ -120,6 +124,7 @@ class MqttInternet(IInternetConnection):
 
     def connect(self, commands: IGatewayCommands) -> None:
         """Connect as soon as the broker answers; returns at once."""
+        self._commands = commands
         self._client.connect_async(self._broker.host, self._broker.port, KEEP_ALIVE_S)
         self._client.loop_start()
         self._end_subscription = self._users.subscribe(self._received)
@@ -253,6 +258,7 @@ class MqttInternet(IInternetConnection):
             self._complain(f"refuses the connection: {reason}")
             return
         self._complained = False
+        self._internet_works(True)
         _log.info("MQTT: connected to %s, mesh %s", self._broker.url, self._broker.mesh)
         if self._sends:
             client.subscribe([(topic, QOS) for topic in self._topics.all_tx])
@@ -280,9 +286,15 @@ class MqttInternet(IInternetConnection):
         """Log one line per outage."""
         if not self._complained:
             self._complained = True
+            self._internet_works(False)
             _log.warning(
                 "MQTT: the broker %s %s; trying again, messages wait", self._broker.url, what
             )
+
+    def _internet_works(self, works: bool) -> None:
+        commands = self._commands
+        if self._is_internet and commands is not None:
+            self._submit(lambda now_s: commands.set_internet(works, now_s))
 
 
 def _offline(node: int) -> str:

@@ -18,6 +18,7 @@ class MqttOptions:
 
     broker: Broker
     ca_file: Path | None  # None: the authorities that this machine trusts
+    is_internet: bool = False  # without the broker, the gateway says that it has no internet
 
 
 def add_mqtt_options(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +43,14 @@ def add_mqtt_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="certificate (PEM) of the private authority that signed the broker's certificate",
     )
+    group.add_argument(
+        "--internet",
+        choices=("none", "mqtt"),
+        default="none",
+        help="what tells whether this gateway has internet: mqtt: while the broker does not answer "
+        "it says that it has none, and its routers move to another gateway (default: none, it "
+        "always says that it has internet)",
+    )
 
 
 def mqtt_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> MqttOptions | None:
@@ -49,9 +58,12 @@ def mqtt_options(parsed: argparse.Namespace, environment: Mapping[str, str]) -> 
     if parsed.mqtt is None:
         if parsed.mqtt_password_file is not None or parsed.mqtt_ca is not None:
             raise ConfigurationError("--mqtt-password-file and --mqtt-ca need --mqtt")
+        if parsed.internet == "mqtt":
+            raise ConfigurationError("--internet mqtt needs --mqtt")
         return None
     password = environment.get(PASSWORD_VARIABLE, "")
     if parsed.mqtt_password_file is not None:
         with naming_argument("--mqtt-password-file ", parsed.mqtt_password_file):
             password = read_secret(parsed.mqtt_password_file, "password")
-    return MqttOptions(parse_broker(parsed.mqtt, password), parsed.mqtt_ca)
+    broker = parse_broker(parsed.mqtt, password)
+    return MqttOptions(broker, parsed.mqtt_ca, is_internet=parsed.internet == "mqtt")

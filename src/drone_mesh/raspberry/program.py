@@ -213,7 +213,13 @@ def _internet(options: Options) -> MakeInternet:
     def make(node: RadioNode) -> IInternetConnection:
         connections: list[IInternetConnection] = []
         if mqtt is not None:
-            to_broker = mqtt_internet(node.submit, node.users, mqtt.broker, ca_file=mqtt.ca_file)
+            to_broker = mqtt_internet(
+                node.submit,
+                node.users,
+                mqtt.broker,
+                ca_file=mqtt.ca_file,
+                is_internet=mqtt.is_internet,
+            )
             node.events.others.add(to_broker.observe)
             connections.append(to_broker)
         if http is not None:

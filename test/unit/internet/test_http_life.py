@@ -37,6 +37,9 @@ class SlowGateway(IGatewayCommands):
     def get_node_id(self):
         return 7
 
+    def set_internet(self, works, now_s):
+        raise AssertionError("HTTP does not tell whether there is internet")
+
     def get_known_nodes(self):
         raise RuntimeError("a bug in the routing technique")
 

@@ -115,7 +115,7 @@ class Client:
 class Gateway:
     """Gateway 0 and router 1; what is handed in is followed by a second of the mesh."""
 
-    def __init__(self, broker, ca_file=None):
+    def __init__(self, broker, ca_file=None, is_internet=False):
         self.network = Network(seed=1)
         self.network.add_gateway(0, 0.0, 0.0)
         self.network.add_router(1, 6.0, 0.0)
@@ -125,7 +125,9 @@ class Gateway:
         self.executor = MeshExecutor(lambda: self.network.clock.now_s, clock_notifies=True)
         self.users = UsersDesk(0, self.submit)
         self.users.open(gateway.data)
-        self.internet = MqttInternet(self.submit, self.users, broker, ca_file)
+        self.internet = MqttInternet(
+            self.submit, self.users, broker, ca_file, is_internet=is_internet
+        )
         self.subscribed = threading.Event()  # what is published before that is not for it
         self.internet._client.on_subscribe = lambda *_: self.subscribed.set()
         self.executor.start()
@@ -344,3 +346,17 @@ def test_nothing_is_lost_while_the_broker_is_away(broker, gateway, client, caplo
     gateway.wait_for_all_at_node_1({b"down %d" % number for number in range(20)})
     lines = [record.message for record in caplog.records if "the broker" in record.message]
     assert len(lines) == 1, lines
+
+
+def test_a_gateway_whose_internet_is_the_broker_has_none_while_it_is_away(broker):
+    gateway = Gateway(Broker("127.0.0.1", broker.port, False, "field"), is_internet=True)
+    component = gateway.network.nodes[0].component
+    try:
+        assert gateway.subscribed.wait(PATIENCE_S)
+        assert component.get_connected_to_gateway()
+        broker.stop()
+        gateway.wait_for("no internet", lambda: not component.get_connected_to_gateway())
+        broker.start()
+        gateway.wait_for("internet again", component.get_connected_to_gateway)
+    finally:
+        gateway.close()

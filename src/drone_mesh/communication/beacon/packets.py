@@ -20,6 +20,7 @@ _FASTEST_M_S = 50.0  # a velocity is coded by its square root, so slow ones are 
 
 _END = b"\xff"  # of the new nodes below and of the neighbours, if they do not fill the packet
 _COUNT, _HAS_PLACE, _HAS_DIGEST, _HAS_GATEWAY_PLACE, _LOOKS = 0x0F, 0x10, 0x20, 0x40, 0x80
+_LONGEST, _OFFLINE = 0x7F, 0x80  # in the byte of the interval
 _PLACE = struct.Struct("<3H3b")
 _GATEWAY_PLACE = struct.Struct("<3H")
 _DIGEST = struct.Struct("<H")
@@ -83,6 +84,7 @@ class Beacon(NamedTuple):
     looks: bool = False  # asks for the beacons of its neighbours
     below: Below = NONE_BELOW
     near: tuple[int, ...] = ()  # some of its neighbours
+    offline: bool = False  # the gateway has no internet
 
     def to_body(self, room: int) -> bytes:
         """Its `room` bytes. It has to fit: see `room_below`."""
@@ -97,10 +99,10 @@ class Beacon(NamedTuple):
         if self.gateway_place is not None:
             flags |= _HAS_GATEWAY_PLACE
             body += _GATEWAY_PLACE.pack(*_units(self.gateway_place))
-        interval = max(1, min(255, math.ceil(self.interval_s / _INTERVAL_S)))
+        interval = max(1, min(_LONGEST, math.ceil(self.interval_s / _INTERVAL_S)))
         head = _HEAD.pack(
             flags | len(self.below.listed),
-            interval,
+            interval | _OFFLINE if self.offline else interval,
             self.gateway,
             self.number,
             self.hops,
@@ -160,13 +162,14 @@ class Beacon(NamedTuple):
             hops,
             parent,
             tuple(ancestors),
-            max(1, interval) * _INTERVAL_S,
+            max(1, interval & _LONGEST) * _INTERVAL_S,
             motion,
             gateway_place,
             digest,
             bool(flags & _LOOKS),
             Below(body[after], tuple(body[after + 1 : end]), tuple(new)),
             tuple(near),
+            bool(interval & _OFFLINE),
         )
 
 

@@ -111,6 +111,13 @@ class BeaconPlane(IControlPlane):
         if self._antenna.on():
             self.on_power(True)
 
+    def on_internet(self, works: bool) -> None:
+        """The next beacon says so, soon."""
+        self._set_time()
+        self._routes.set_internet(works)
+        self._trickle.hurry(self._routes.now_s)
+        self._plan()
+
     def introduce(self) -> None:
         """Send a beacon soon."""
         self._set_time()
@@ -158,16 +165,18 @@ class BeaconPlane(IControlPlane):
         """Whether a lost connection counts: not in flight, whoever flies the drone."""
         if states.repair is RepairState.FLYING or not self._motion.stands(now_s):
             return False
+        if self._routes.parent != NO_ROUTE:
+            return False  # its gateway is in reach and has no internet: a flight repairs nothing
         return self._antenna.on() and self._host.may_connect(NO_ROUTE, False)
 
     def _choose(self) -> None:
-        before = self._routes.gateway, self._routes.hops
+        before = self._routes.gateway, self._routes.hops, self._routes.offline
         if not self._routes.choose():
             if not self._told and self._was_connected:
                 self._tell()
             return
         now_s, gateway = self._routes.now_s, self._routes.gateway
-        if (gateway, self._routes.hops) != before:
+        if (gateway, self._routes.hops, self._routes.offline) != before:
             self._trickle.hurry(now_s)
         else:
             self._trickle.reset(now_s)
@@ -179,10 +188,10 @@ class BeaconPlane(IControlPlane):
     def _show(self) -> None:
         """Tell the node whether a gateway is reached."""
         states, parent = self._states, self._routes.parent
-        connected = parent != NO_ROUTE
+        connected = parent != NO_ROUTE and not self._routes.offline
         if states is None:
             return
-        if connected:
+        if parent != NO_ROUTE:
             neighbour = self._routes.neighbours[parent]
             if neighbour.motion is not None:
                 place, seen_s = neighbour.motion.place, neighbour.reported_s
@@ -242,8 +251,8 @@ class BeaconPlane(IControlPlane):
         self._trickle.sent(now_s)
         self._sent += 1
         self._turn = basics.rng.random()
-        if self._states is None:
-            routes.number = (routes.number + 1) % 256
+        if routes.is_root:
+            routes.next_number()
         beacon = Beacon(
             routes.gateway if routes.hops != NO_ROUTE else NO_ROUTE,
             routes.number,
@@ -254,7 +263,8 @@ class BeaconPlane(IControlPlane):
             routes.motion,
             self._gateway_place(),
             basics.frame.digest if self._asks or self._sent % DIGEST_EVERY == 0 else 0,
-            self._asks or (self._states is not None and routes.hops == NO_ROUTE),
+            self._asks or routes.hops == NO_ROUTE,
+            offline=routes.offline,
         )
         self._asks = False
         if beacon.room_below(self._room) < 0:  # a seal leaves room for one of the two
@@ -271,7 +281,7 @@ class BeaconPlane(IControlPlane):
 
     def _gateway_place(self) -> Location | None:
         """The gateway's place, if it is this beacon's turn to spread it."""
-        if self._states is None or self._sent % GATEWAY_PLACE_EVERY:
+        if self._routes.is_root or self._sent % GATEWAY_PLACE_EVERY:
             return None
         return self._basics.places.gateway
 
@@ -300,7 +310,7 @@ class BeaconPlane(IControlPlane):
             beacon = beacon._replace(motion=None, gateway_place=None)
         if routes.heard(creator, beacon):
             self._trickle.reset(now_s)
-        if routes.has_news and not routes.is_gateway:
+        if routes.has_news and not routes.is_root:
             self._trickle.hurry(now_s)
         self._take_places(creator, beacon)
         self._choose()
@@ -438,8 +448,8 @@ class BeaconPlane(IControlPlane):
 
     @property
     def hops(self) -> int:
-        """Hops to it."""
-        return self._routes.hops
+        """Hops to it; NO_ROUTE also if it has no internet."""
+        return NO_ROUTE if self._routes.offline else self._routes.hops
 
     def next_hop(self) -> int:
         """The parent."""
@@ -454,7 +464,8 @@ class BeaconPlane(IControlPlane):
         if self._states is None:
             return
         self._states.happened(event)
-        if self._routes.parent != NO_ROUTE and event is not RouterEvent.ANTENNA_OFF:
+        reached = self._routes.parent != NO_ROUTE and not self._routes.offline
+        if reached and event is not RouterEvent.ANTENNA_OFF:
             self._states.happened(RouterEvent.GATEWAY_ANSWERED)
 
     def give_up_routes(self) -> None:

@@ -27,6 +27,7 @@ REACH = 0.97  # of the range: two nodes further apart are expected to lose each 
 WRONG = 1.15  # of the range: a neighbour heard from further away, or this node, errs in its place
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
 ANOTHER_GATEWAY = 1.5  # hops that another gateway must be nearer
+OFFLINE = 256.0  # hops: any gateway with internet is nearer than one without
 LINGERS = 4.0  # intervals: a node that has left is still announced for so long
 SEEN_S = 10.0  # our choice: an older place of a node does not tell the way to it
 NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
@@ -97,7 +98,8 @@ class BeaconRoutes(IRoutes):
     ) -> None:
         """`place_of`: where a node was seen last."""
         self._node_id = node_id
-        self.is_gateway = is_gateway
+        self._is_gateway = is_gateway
+        self._has_internet = is_gateway
         self._range_m = range_m
         self.neighbours: dict[int, Neighbour] = {}
         self.gateway = node_id if is_gateway else NO_ROUTE
@@ -105,9 +107,12 @@ class BeaconRoutes(IRoutes):
         self.parent = NO_ROUTE
         self.ancestors = NO_ANCESTORS
         self.number = 0
+        self.offline = False  # the preferred gateway has no internet
+        self._own_number = 0  # of the latest beacon as a gateway
         self.motion: Motion | None = None  # this node's own
         self.now_s = 0.0
-        self._newest: dict[int, tuple[int, float]] = {}  # by gateway: number, when it came
+        # By gateway: number, when it came, whether the gateway had no internet then.
+        self._newest: dict[int, tuple[int, float, bool]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._announced: set[int] = set()  # of the nodes below
         self._new: set[int] = set()  # below, since this node has announced it last
@@ -130,10 +135,10 @@ class BeaconRoutes(IRoutes):
         neighbour.heard(beacon, self.motion, self.now_s)
         gateway = beacon.gateway
         if gateway not in (NO_ROUTE, self._node_id):
-            number, _at_s = self._newest.get(gateway, (beacon.number - 1, 0.0))
+            number = self._newest.get(gateway, (beacon.number - 1, 0.0, False))[0]
             by = newer(beacon.number, number)
             if by > 0 or (by < -BACK and self._is_stale(gateway)):  # it may have been restarted
-                self._newest[gateway] = beacon.number, self.now_s
+                self._newest[gateway] = beacon.number, self.now_s, beacon.offline
         return is_new
 
     def alive(self, node: int) -> None:
@@ -168,21 +173,49 @@ class BeaconRoutes(IRoutes):
     # The way up --------------------------------------------------------------------------------
 
     def choose(self) -> bool:
-        """Choose the parent; returns whether parent, gateway or hops have changed."""
-        if self.is_gateway:
+        """Choose the parent; returns whether anything has changed."""
+        if self._has_internet:
             return False
-        before = self.gateway, self.parent, self.hops
+        before = self.gateway, self.parent, self.hops, self.offline
         best = min(map(self._rank, self._candidates()), default=None)
-        if best is None:
+        if self._is_gateway and (best is None or best[0] >= OFFLINE):
+            self._be_root()
+        elif best is None:
             self.parent = self.hops = NO_ROUTE
             self.ancestors = NO_ANCESTORS
+            self.offline = False
         else:
             parent = self.neighbours[best[-1]]
             beacon = parent.beacon
             self.parent, self.gateway = parent.node, beacon.gateway
             self.hops, self.number = beacon.hops + 1, beacon.number
             self.ancestors = (beacon.parent, *beacon.ancestors)[:ANCESTORS]
-        return before != (self.gateway, self.parent, self.hops)
+            self.offline = self._newest[beacon.gateway][2]
+        return before != (self.gateway, self.parent, self.hops, self.offline)
+
+    def set_internet(self, works: bool) -> None:
+        """At a gateway: whether it has internet. Without, it stays the root of those who have no
+        other, and relays for the others.
+        """
+        self._has_internet = works
+        if works:
+            self._be_root()
+        else:
+            self.choose()
+
+    @property
+    def is_root(self) -> bool:
+        """Whether the way to a gateway ends here."""
+        return self.gateway == self._node_id
+
+    def next_number(self) -> None:
+        """A root counts its beacons."""
+        self.number = self._own_number = (self._own_number + 1) % 256
+
+    def _be_root(self) -> None:
+        self.gateway, self.hops = self._node_id, 0
+        self.parent, self.ancestors = NO_ROUTE, NO_ANCESTORS
+        self.number, self.offline = self._own_number, not self._has_internet
 
     def _candidates(self) -> Iterator[Neighbour]:
         """The neighbours that lead to a gateway without leading through this node."""
@@ -207,6 +240,8 @@ class BeaconRoutes(IRoutes):
         beacon, node = neighbour.beacon, neighbour.node
         other = self.gateway not in (NO_ROUTE, beacon.gateway)
         cost = beacon.hops + self.risk(neighbour) + (ANOTHER_GATEWAY if other else 0.0)
+        if self._newest[beacon.gateway][2]:
+            cost += OFFLINE
         return cost, node != self.parent, -neighbour.heard_s, node
 
     def risk(self, neighbour: Neighbour) -> float:
@@ -226,7 +261,7 @@ class BeaconRoutes(IRoutes):
 
     def next_hops(self, node: int, came_from: int) -> list[Way]:
         """The neighbours to try for a packet to `node`, the best first."""
-        if node == self.gateway and not self.is_gateway:
+        if node == self.gateway and not self.is_root:
             ranks = sorted(map(self._rank, self._candidates()))
             return [Way(rank[-1], self.neighbours[rank[-1]].heard_s) for rank in ranks]
         found: dict[int, Way] = {}  # in order

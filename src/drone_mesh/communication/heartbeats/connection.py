@@ -18,6 +18,7 @@ from drone_mesh.communication.place_requests import ask_for_place
 from drone_mesh.communication.router_states import ConnectionState, RouterEvent, RouterStates
 
 _HOPS_UNTIL_KNOWN = 10  # our choice: the number of hops for which to wait for the first answer
+RESIGNED_PERIODS = 2.5  # our choice: a gateway without internet that is silent for longer is lost
 MAX_AGE_PERIODS = 3  # docs/protocol.md, "Places to step back to": of the gateway's place
 
 
@@ -53,6 +54,7 @@ class GatewayConnection:
         self._unanswered = 0  # heartbeats in a row
         self._asked_neighbour_s = -math.inf  # for its gateway
         self._moved = False  # since the gateway was last asked for its place
+        self._resigned_s = -math.inf  # when the preferred gateway said that it is none now
 
     def next_hop(self) -> int:
         """The next hop to the preferred gateway, or NO_ROUTE."""
@@ -195,6 +197,7 @@ class GatewayConnection:
         self._states.happened(RouterEvent.GATEWAY_ANSWERED)
         self.hops = min(hops, NO_ROUTE)
         self._answered_s = now_s
+        self._resigned_s = -math.inf
         self._unanswered = 0
         self._tried = NO_ROUTE
         self._show()
@@ -207,11 +210,32 @@ class GatewayConnection:
         """Try the gateway of a neighbour; other routes to it have failed."""
         if gateway > MAX_NODE_ID or gateway == self._parts.node_id:
             return
+        if gateway == self.gateway and self._has_resigned(periods=1.0):
+            return  # the neighbour has not heard of it yet
         if self._detours.passes_by(neighbour, self._parts.now_s):
             return
         self._prefer(gateway)
         self._parts.delivery.gateway_taken(neighbour, gateway)
         self.send_heartbeat()
+
+    def gateway_resigned(self) -> None:
+        """The preferred gateway says that it is none now: look for another one."""
+        self._resigned_s = self._parts.now_s
+        was_connected = self._states.connected
+        self.end(RouterEvent.ROUTE_LOST)
+        if was_connected:
+            self._introduce()
+
+    def asks_gateway_that_resigned(self) -> bool:
+        """Whether the gateway is in reach and only without internet; asks it again if so."""
+        if not self._has_resigned(RESIGNED_PERIODS):
+            return False
+        self.send_heartbeat()
+        return True
+
+    def _has_resigned(self, periods: float) -> bool:
+        """Whether the preferred gateway said so within so many check periods."""
+        return self._parts.now_s - self._resigned_s <= periods * self._parts.timing.check_period_s
 
     def proven(self, patience: float) -> bool:
         """Whether the gateway answered within the last `patience` check periods."""
@@ -285,6 +309,7 @@ class GatewayConnection:
             if self.gateway != NO_ROUTE:
                 self._parts.report(MeshEventKind.GATEWAY_CHANGED, gateway)
             self.gateway = gateway
+            self._resigned_s = -math.inf
             self._parts.places.forget_gateway()
             self._relay_check.gateway_changed()
 

@@ -2,54 +2,100 @@
 
 from __future__ import annotations
 
+from typing import Sequence
+
 from drone_mesh.communication import messages
+from drone_mesh.communication.control_plane import IControlHost
 from drone_mesh.communication.heartbeats.plane import HeartbeatPlane
-from drone_mesh.communication.router_states import RouterEvent
+from drone_mesh.communication.heartbeats.router_plane import RouterHeartbeats
+from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.parts import NodeBasics
+from drone_mesh.communication.router_states import RouterEvent, RouterStates
+from drone_mesh.communication.routing.interfaces import IRoutingTechnique
 
 
-class GatewayHeartbeats(HeartbeatPlane):
-    """Answers heartbeats. Its own connection is constant: it is the gateway."""
+class GatewayHeartbeats(RouterHeartbeats):
+    """Answers heartbeats. While its internet does not work, it is a router instead."""
 
-    hops = 0
+    def __init__(
+        self, basics: NodeBasics, technique: IRoutingTechnique, host: IControlHost
+    ) -> None:
+        super().__init__(basics, technique, host, RouterStates())
+        self._has_internet = True
 
     @property
     def gateway(self) -> int:
-        """Itself."""
-        return self._parts.node_id
+        """Itself; without internet the one that it prefers."""
+        return self._parts.node_id if self._has_internet else super().gateway
+
+    @property
+    def hops(self) -> int:
+        """To that gateway."""
+        if self._has_internet:
+            return 0
+        return super().hops if self._states.connected else NO_ROUTE
+
+    def on_internet(self, works: bool) -> None:
+        """Be a gateway, or a router that says so to all who take it for one."""
+        self._connection.end(RouterEvent.ROUTE_LOST)
+        self._has_internet = works
+        self.introduce()
 
     def check(self, due_s: float) -> None:
         """Check neighbours and routes."""
-        self._technique.maintain_routing()
+        if self._has_internet:
+            self._technique.maintain_routing()
+        else:
+            super().check(due_s)
+
+    def send_heartbeat(self, other: int) -> bool:
+        """Send a heartbeat to `other`; a gateway with internet expects no answer."""
+        if self._has_internet:
+            return HeartbeatPlane.send_heartbeat(self, other)
+        return super().send_heartbeat(other)
+
+    def send_heartbeats(self, others: Sequence[int]) -> None:
+        """Send a heartbeat to each of these."""
+        if self._has_internet:
+            HeartbeatPlane.send_heartbeats(self, others)
+        else:
+            super().send_heartbeats(others)
 
     def next_hop(self) -> int:
-        """Itself."""
-        return self.gateway
+        """Itself, or the next hop to another gateway."""
+        return self.gateway if self._has_internet else super().next_hop()
 
     def may_use(self, gateway: int) -> bool:
-        """Whether that is this node."""
-        return gateway == self.gateway
-
-    def end(self, event: RouterEvent) -> None:
-        """Nothing changes: without an antenna it is still a gateway."""
-
-    def give_up_routes(self) -> None:
-        """It needs none."""
-
-    def gateway_sent_place(self) -> None:
-        """It knows its own place."""
+        """Whether that is the preferred one."""
+        return gateway == self.gateway if self._has_internet else super().may_use(gateway)
 
     def receive_present(self, payload: bytes, creator: int, _from: int) -> None:
         """A neighbour introduces itself."""
+        if not self._has_internet:
+            super().receive_present(payload, creator, _from)
+            return
         _hops, know_gateway = messages.present_body(payload)
         if not know_gateway:
             self._introduction.answer_search(creator)
 
-    def receive_heartbeat(self, payload: bytes, creator: int, _from: int) -> None:
+    def receive_heartbeat(self, payload: bytes, creator: int, from_: int) -> None:
         """A heartbeat for this node."""
         _know_gateway, preferred_gateway, hops = messages.heartbeat_body(payload)
         self._host.on_node_heard(creator, hops + 1)
-        if creator != preferred_gateway:  # gateways do not answer each other
+        if not self._has_internet and preferred_gateway != self._parts.node_id:
+            super().receive_heartbeat(payload, creator, from_)
+        elif creator != preferred_gateway:  # gateways do not answer each other
             self.send_heartbeat(creator)
 
+    def _forward_and_learn(
+        self, payload: bytes, creator: int, from_: int, kind: int, forward: int, now_s: float
+    ) -> None:
+        """Another gateway's answer to a router behind it proves nothing to a gateway."""
+        if self._has_internet:
+            self._forwarding.forward(payload, creator, from_, kind, forward, now_s)
+        else:
+            super()._forward_and_learn(payload, creator, from_, kind, forward, now_s)
+
     def _after_missing(self, missing: int) -> None:
+        super()._after_missing(missing)
         self._host.on_node_missing(missing)

@@ -65,7 +65,11 @@ class RouterHeartbeats(HeartbeatPlane):
         self._technique.maintain_routing()
         if was_connected:
             self._connection.check(self._antenna.patience())
-        elif before is ConnectionState.SEARCHING and self._states.repair is not RepairState.FLYING:
+        elif before is not ConnectionState.SEARCHING:
+            pass  # a heartbeat is under way
+        elif self._connection.asks_gateway_that_resigned():
+            pass  # it is in reach: a flight would repair nothing
+        elif self._states.repair is not RepairState.FLYING:
             self._host.on_unconnected_check(due_s)
 
     def send_heartbeat(self, other: int) -> bool:
@@ -109,8 +113,12 @@ class RouterHeartbeats(HeartbeatPlane):
         """A neighbour introduces itself."""
         hops, know_gateway = messages.present_body(payload)
         self._neighbours.set_hops(creator, hops)
+        if know_gateway and hops == 0:
+            self._neighbours.set_gateway(creator, creator)
         if not self._host.may_connect(creator, know_gateway):
             return
+        if creator == self._connection.gateway and hops != 0:
+            self._connection.gateway_resigned()
         if know_gateway and hops <= self._connection.hops:
             self._introduction.search_is_answered()
         if self._connection.on_present(creator, hops, know_gateway):
@@ -128,6 +136,8 @@ class RouterHeartbeats(HeartbeatPlane):
             self._neighbours.set_gateway(creator, preferred_gateway)
         if not self._host.may_connect(from_, know_gateway):
             return
+        if creator == self._connection.gateway != preferred_gateway:
+            self._connection.gateway_resigned()
         if creator == preferred_gateway:
             if self._connection.on_gateway_heartbeat(creator, hops + 1):
                 self._host.on_connected()

@@ -83,6 +83,11 @@ def power_switch(node_id: int) -> str:
     return f"Nodes/{node_id}/powerSwitch"
 
 
+def internet_switch(node_id: int) -> str:
+    """PowerSwitch, offered by a gateway: whether its internet works."""
+    return f"Nodes/{node_id}/internetSwitch"
+
+
 def send_service(node_id: int) -> str:
     """SendData: users -> node."""
     return f"Nodes/{node_id}/send"

@@ -14,6 +14,7 @@ from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.conversions import location_of
 from drone_mesh.ros.graph.logs import ThrottledLog
+from drone_mesh.srv import PowerSwitch, PowerSwitchRequest, PowerSwitchResponse
 from drone_mesh.web.allowance import Allowance
 
 _QUEUE = 512  # answers that may wait for a slow DroneManager: two whole fleets
@@ -30,6 +31,7 @@ class RosInternetMock(IInternetConnection):
     Subscribes: /gateway (RequestGatewayDroneFlight), and /gateway/shared_place (the same type) for
     orders that may lead to the place of another drone.
     Publishes /gateway/answers (FlightOrderAnswer): the outcome of each order.
+    Service: /Nodes/<id>/internetSwitch (PowerSwitch): whether its internet works.
 
     `connect` and `disconnect` are for the executor's worker, to which orders are submitted.
     """
@@ -40,6 +42,7 @@ class RosInternetMock(IInternetConnection):
         self._slot = slot
         self._subscribers: list[rospy.Subscriber] = []
         self._answers: rospy.Publisher | None = None
+        self._switch: rospy.Service | None = None
         self._limit = Allowance(MOST_ORDERS_AT_ONCE, ORDER_PERIOD_S)
         self._throttled_log = ThrottledLog(_log)
 
@@ -55,7 +58,12 @@ class RosInternetMock(IInternetConnection):
                 lambda now_s: self._order(commands, request, allow_shared_place, now_s)
             )
 
+        def switch(request: PowerSwitchRequest) -> PowerSwitchResponse:
+            self._slot.submit(lambda now_s: commands.set_internet(request.power, now_s))
+            return PowerSwitchResponse()
+
         self.disconnect()
+        self._switch = rospy.Service(names.internet_switch(self._node_id), PowerSwitch, switch)
         self._answers = rospy.Publisher(
             names.GATEWAY_ANSWERS_TOPIC, FlightOrderAnswer, tcp_nodelay=True, queue_size=_QUEUE
         )
@@ -68,6 +76,9 @@ class RosInternetMock(IInternetConnection):
 
     def disconnect(self) -> None:
         """Leave the topics. A second call changes nothing."""
+        if self._switch is not None:
+            self._switch.shutdown()
+            self._switch = None
         for subscriber in self._subscribers:
             subscriber.unregister()
         if self._answers is not None:
