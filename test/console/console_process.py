@@ -17,6 +17,7 @@ from drone_mesh.console.history import History
 from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ALL_ACTIONS, FRAME_PERIOD_S, ConsoleServer
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.layouts import Layouts
 from drone_mesh.web.access import access_for
 
@@ -73,13 +74,15 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--recorded", type=float, default=0.0, help="simulated seconds of a recording; 2 a second"
     )
+    parser.add_argument("--origin", default="", metavar="LAT,LON,ALT")
     parser.add_argument("--real", action="store_true", help="offer what a real gateway can do")
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.INFO)
     mesh = InProcessMesh(options.routers, options.gridsize, options.spacing)
     whole = recorded(options) if options.recorded else None
     mesh.skip(options.skip)
-    store = FrameStore(History() if whole is None else None)
+    origin = Origin.parse(options.origin) if options.origin else None
+    store = FrameStore(History() if whole is None else None, origin)
     access = access_for(options.address, options.token)
     server = ConsoleServer(
         store,

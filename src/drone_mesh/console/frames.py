@@ -15,10 +15,11 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from typing import Any, Iterable, Mapping, Sequence
 
 from drone_mesh.console.history import History
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.state.alarms import AlarmBook
 from drone_mesh.state.condition import condition_of
 from drone_mesh.state.links import LinkForecast, LostLinks, known_links, links_by_use
@@ -49,10 +50,14 @@ NOTHING_MORE: Mapping[int, Mapping[str, Any]] = {}
 class FrameStore:
     """Belongs to one thread, the server's event loop. Version 0: a page that has nothing yet."""
 
-    def __init__(self, history: History | None = None) -> None:
-        """`history` keeps the states given to the store, for pages that look back."""
+    def __init__(self, history: History | None = None, origin: Origin | None = None) -> None:
+        """`history` keeps the states given to the store, for pages that look back.
+
+        `origin`: where the mesh is on the earth, if that is known.
+        """
         self.version = 0
         self.history = history
+        self.origin = origin
         self._mesh: MeshStatus | None = None
         self._link = "waiting for the first state of a mesh"
         self._clock: dict[str, Any] = {}
@@ -103,6 +108,7 @@ class FrameStore:
             "repair": mesh.repair_strategy,
             "layouts": list(mesh.layouts),
             "shape": shape_named(mesh.shape).value,
+            "origin": astuple(self.origin) if self.origin else None,
         }
         for gone in self._nodes.keys() - {node.id for node in mesh.nodes}:
             del self._nodes[gone]

@@ -17,10 +17,10 @@ from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
 from drone_mesh.console.history import History
 from drone_mesh.console.page_token import PageToken
-from drone_mesh.console.real_mesh import events_of, real_mesh
+from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
-from drone_mesh.errors import MeshError
+from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.stopping import StopRequest
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.listening import MAX_PORT
@@ -45,12 +45,13 @@ class GatewayFeed:
         try:
             answer = self._client.mesh(self._seen)
             mesh, more = real_mesh(answer)
+            origin = origin_of(answer)
             events = events_of(answer)
             last = max((int(event["number"]) for event in answer["events"]), default=self._seen)
         except GatewayGone as error:
             self._runner.in_loop(partial(self._store.set_link, str(error)))
             return
-        except (KeyError, TypeError, ValueError) as error:
+        except (ConfigurationError, KeyError, TypeError, ValueError) as error:
             text = f"{self._client.url}: invalid answer: {error!r}"
             self._runner.in_loop(partial(self._store.set_link, text))
             return
@@ -59,6 +60,7 @@ class GatewayFeed:
         self._seen, self._uptime_s = last, mesh.stamp_s
 
         def take() -> None:
+            self._store.origin = origin
             self._store.update_mesh(mesh, time.monotonic(), more)
             if events:
                 self._store.add_events(events)

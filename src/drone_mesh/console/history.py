@@ -27,6 +27,14 @@ _MARKED = {
 }
 
 
+def unpacked(state: bytes) -> MeshStatus:
+    """A state that a History keeps. Any thread."""
+    mesh: MeshStatus
+    mesh, rows = pickle.loads(zlib.decompress(state))
+    nodes = [NodeStatus(**dict(zip(_NODE_FIELDS, row))) for row in rows]
+    return replace(mesh, nodes=nodes)
+
+
 class History:
     """States are kept compressed. Belongs to one thread. Times are simulated seconds."""
 
@@ -108,10 +116,12 @@ class History:
 
     def state(self, index: int) -> MeshStatus:
         """The state at this index."""
-        mesh: MeshStatus
-        mesh, rows = pickle.loads(zlib.decompress(self._states[index]))
-        nodes = [NodeStatus(**dict(zip(_NODE_FIELDS, row))) for row in rows]
-        return replace(mesh, nodes=nodes)
+        return unpacked(self._states[index])
+
+    def spread(self, most: int) -> list[bytes]:
+        """At most so many states, evenly over the time, for `unpacked`; the last is one of them."""
+        step = max(1, math.ceil(len(self._states) / most))
+        return self._states[::-1][::step][::-1]
 
     def events_until(self, at_s: float) -> Sequence[EventRecord]:
         """All events up to this time, oldest first."""

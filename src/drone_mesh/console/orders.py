@@ -12,12 +12,15 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.configuration import MAX_REAL_TIME_FACTOR
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.drone.flight_path import Vector
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
+from drone_mesh.earth_files import MAX_CHARACTERS, Placemarks, is_earth_file, read_placemarks
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.layouts import MAX_CASE, Order, read_layout
 from drone_mesh.missions import MAX_SPEED_M_S, MOST_WAYPOINTS, Mission
 
-MAX_FILE_CHARACTERS = 30_000  # of a layout: three times what 254 drones need
+MAX_LAYOUT_CHARACTERS = 30_000  # three times what 254 drones need
 MAX_ORDER_NUMBER = 2**53  # JavaScript integers are exact up to here
 LIMITS = {  # for the page's forms; metres, and the largest id
     "coordinate": MAX_COORDINATE_M,
@@ -41,6 +44,9 @@ FactorOrNone = Optional[Annotated[float, Field(gt=0, le=MAX_REAL_TIME_FACTOR, al
 Place = Tuple[int, float, float, float]
 """A drone, and x, y and z in metres."""
 
+AnyPlace = Tuple[NodeOrNone, float, float, float]
+"""The same in a file; None: any drone."""
+
 
 class LayoutOffer(NamedTuple):
     """A layout that the page can send drones to."""
@@ -53,6 +59,13 @@ class LayoutOffer(NamedTuple):
 def places_of(orders: Iterable[Order]) -> list[Place]:
     """The positions to which a layout sends its drones."""
     return [(drone, goal.longitude, goal.latitude, goal.height) for drone, goal in orders]
+
+
+class FileContent(NamedTuple):
+    """What the page may fly: places of drones, and ways over x, y, z in metres."""
+
+    places: Sequence[AnyPlace]
+    ways: Sequence[Sequence[Vector]]
 
 
 class _Request(BaseModel):
@@ -165,18 +178,30 @@ class _Pilots(PageOrder):
 
 
 class ReadPlaces(_Request):
-    """The page sends a layout file and asks for the positions of its drones."""
+    """The page sends a file and asks for the positions of its drones."""
 
     do: Literal["places"]
     number: int = Field(ge=0, le=MAX_ORDER_NUMBER)
-    text: str = Field(max_length=MAX_FILE_CHARACTERS)
+    name: str = Field("the file", max_length=300)
+    text: str = Field(max_length=MAX_CHARACTERS)
 
-    def places(self) -> list[Place]:
-        """Parse the file. Raises OrderRefused, which names the invalid line."""
+    def content(self, origin: Origin | None) -> FileContent:
+        """Parse the file. Raises OrderRefused, which says what is wrong where."""
         try:
-            return places_of(read_layout(self.text))
+            if is_earth_file(self.name):
+                return _content_of(read_placemarks(self.text, self.name, origin))
+            if len(self.text) > MAX_LAYOUT_CHARACTERS:
+                raise OrderRefused(f"{self.name}: longer than {MAX_LAYOUT_CHARACTERS} characters")
+            return FileContent(places_of(read_layout(self.text, self.name)), [])
         except ConfigurationError as error:
             raise OrderRefused(str(error)) from error
+
+
+def _content_of(found: Placemarks) -> FileContent:
+    return FileContent(
+        [(point.drone, *point.place.to_vector()) for point in found.points],
+        [[place.to_vector() for place in path.places] for path in found.paths],
+    )
 
 
 class PreviewLayout(_Request):

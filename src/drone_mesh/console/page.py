@@ -27,7 +27,7 @@ class Page:
         self.packets = PacketDots()
         self.orders: set[asyncio.Task[None]] = set()
         self._live, self._history, self._is_live = live, history, is_live
-        self._player = None if is_live else Player(history, history.times[0])
+        self._player = None if is_live else Player(history, history.times[0], live.origin)
         self._version = 0  # of what the page has
         self._time_line: dict[str, Any] = {}
         self._marks: list[dict[str, Any]] = []
@@ -73,7 +73,7 @@ class Page:
         if not self._history.times:
             return
         if self._player is None:
-            self._look_at(Player(self._history, self._present_s()))
+            self._look_at(Player(self._history, self._present_s(), self._live.origin))
         player = self._player
         assert player is not None
         if request.factor is not None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History
+from drone_mesh.drone.geodesy import Origin
 
 _AHEAD = 60.0  # our choice: a longer jump, in simulated seconds, shows no single events
 
@@ -14,10 +15,10 @@ _AHEAD = 60.0  # our choice: a longer jump, in simulated seconds, shows no singl
 class Player:
     """Fills its own store with states of the history. Belongs to the server's event loop."""
 
-    def __init__(self, history: History, at_s: float) -> None:
+    def __init__(self, history: History, at_s: float, origin: Origin | None = None) -> None:
         """`history` must have at least one state."""
         self._history = history
-        self.store = FrameStore()
+        self.store = FrameStore(origin=origin)
         self.paused, self.factor = False, 1.0
         self.now_s = at_s
         self._shown_s: float | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Dict, Mapping
 
 from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.model import UNKNOWN_POSITION, EventRecord, MeshStatus, NodeStatus
 from drone_mesh.state.routes import route_to_gateway
@@ -29,6 +30,15 @@ def real_mesh(answer: Mapping[str, Any]) -> tuple[MeshStatus, More]:
         float(answer["uptime_s"]), nodes, max_distance=0.0, achieved_real_time_factor=1.0
     )
     return mesh, {int(entry["id"]): _more(entry) for entry in answer["nodes"]}
+
+
+def origin_of(answer: Mapping[str, Any]) -> Origin | None:
+    """Where the mesh is on the earth; None: its gateway does not know, or is older.
+
+    Raises TypeError or ConfigurationError if the answer is invalid.
+    """
+    place = answer.get("origin")
+    return None if place is None else Origin(*place)
 
 
 def events_of(answer: Mapping[str, Any]) -> list[EventRecord]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.web.server_thread import ServerThread
 
-LARGEST_REQUEST_BYTES = 65_536  # a layout file with escaped line ends
+LARGEST_REQUEST_BYTES = 1_000_000  # a file of places with escaped characters
 PING_PERIOD_S = 10.0  # a page that disappeared silently is noticed after two of these
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import dataclasses
+import functools
 import json
 import logging
 import math
@@ -33,6 +34,7 @@ from drone_mesh.communication.packet_types import PacketKind
 from drone_mesh.communication.throttle import Throttle
 from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.console.dots import Dot
+from drone_mesh.console.earth import EarthFiles
 from drone_mesh.console.frames import EVENTS_KEPT, SAMPLES_KEPT, FrameStore
 from drone_mesh.console.history import History
 from drone_mesh.console.orders import (
@@ -169,6 +171,7 @@ class ConsoleServer:
             routes=[
                 Route("/", self._index),
                 Route("/palette.css", self._palette),
+                EarthFiles(store, self._history, self._workers).route,
                 Mount("/static", StaticFiles(directory=STATIC)),
                 WebSocketRoute("/ws", self._websocket),
             ],
@@ -329,11 +332,12 @@ class ConsoleServer:
     async def _read_places(self, page: Page, request: ReadPlaces) -> None:
         loop = asyncio.get_running_loop()
         try:
-            places = await loop.run_in_executor(self._workers, request.places)
+            read = functools.partial(request.content, self._store.origin)
+            content = await loop.run_in_executor(self._workers, read)
         except OrderRefused as error:
             await self._answer(page, request.number, False, str(error))
         else:
-            await self._answer(page, request.number, True, "a layout", {"places": places})
+            await self._answer(page, request.number, True, "a layout", content._asdict())
 
     async def _preview(self, page: Page, request: PreviewLayout) -> None:
         loop = asyncio.get_running_loop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any
 
@@ -26,6 +27,7 @@ def mesh_report(
     reported = {node.node_id: node for node in gateway.get_node_reports()}
     return {
         "gateway": gateway.get_node_id(),
+        "origin": None if origin is None else dataclasses.astuple(origin),
         "nodes": [
             _gateway(gateway, engine, on, origin),
             *(

@@ -15,6 +15,9 @@ from drone_mesh.console.controls import OrderRefused
 from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.gateway_client import GatewayClient, GatewayControls, GatewayGone
 from drone_mesh.console.gateway_command import GatewayFeed, main
+from drone_mesh.console.real_mesh import origin_of
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.errors import ConfigurationError
 
 NODE = {
     "id": 0,
@@ -216,3 +219,11 @@ def test_a_package_that_is_missing_is_named_in_one_line():
     assert done.stderr == (
         "drone_mesh_console needs the Python package uvicorn: pip install 'drone_mesh[console]'\n"
     )
+
+
+def test_the_origin_is_the_gateways():
+    assert origin_of({**MESH, "origin": [52.0907, 5.1214, 3.0]}) == Origin(52.0907, 5.1214, 3.0)
+    assert origin_of({**MESH, "origin": None}) is None
+    assert origin_of(MESH) is None  # an older gateway
+    with pytest.raises(ConfigurationError):
+        origin_of({**MESH, "origin": [152, 5, 3]})

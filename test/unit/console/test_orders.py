@@ -169,7 +169,7 @@ def test_a_refusal_goes_back_under_the_number_of_the_request(text, number):
 def places_in(text: str) -> list[tuple[int, float, float, float]]:
     request = parse_request(json.dumps({"do": "places", "number": 1, "text": text}))
     assert isinstance(request, ReadPlaces)
-    return request.places()
+    return request.content(None).places
 
 
 def test_a_layout_file_says_where_its_drones_would_fly_and_orders_nothing():

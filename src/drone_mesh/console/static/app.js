@@ -5,7 +5,7 @@ import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { chartsCsv, chartsPicture, nodesCsv, nodesPicture, placesYaml, save } from "./files.js";
 import { Fleet } from "./fleet.js";
-import { Formations } from "./formations.js";
+import { assigned, Formations, outOfReach } from "./formations.js";
 import { Groups } from "./groups.js";
 import { Flights, names } from "./flights.js";
 import { EventLog } from "./log.js";
@@ -23,6 +23,7 @@ const TOAST_MS = 5000;
 const FAILURE_MS = 9000;
 const MOST_TOASTS = 2;
 const THEME_KEY = "drone-mesh-theme";
+const DEGREES_KEY = "drone-mesh-degrees";
 
 const byId = (id) => document.getElementById(id);
 const mesh = new Mesh();
@@ -140,6 +141,7 @@ function setText(id, text) {
 }
 
 function showHead() {
+  document.body.toggleAttribute("data-on-earth", Boolean(mesh.origin));
   const { t, achieved, factor, paused, summary, severity, routing, repair, layouts } = mesh.clock;
   if (t === undefined) return;
   setText(
@@ -253,14 +255,39 @@ byId("load-places").addEventListener("change", async (event) => {
   if (!file) return;
   byId("files").close();
   try {
-    const { places } = await connection.request({ do: "places", text: await file.text() });
-    const moves = movesTo(places);
-    if (moves.length) flights.hold(moves, namesIn(file.name, moves, places));
-    else toast(`none of the drones in ${file.name} is in this fleet`, true);
+    const request = { do: "places", name: file.name, text: await file.text() };
+    const { places, ways } = await connection.request(request);
+    if (places.length) flyTo(file.name, places);
+    else flyAlong(file.name, ways);
   } catch (error) {
     toast(error.message, true);
   }
 });
+
+/** Orders these places [[id, x, y, z]]; those without an id go to the nearest drones of the group, or of all. */
+async function flyTo(name, places) {
+  const moves = movesTo(places);
+  const numbered = new Set(places.map(([id]) => id));
+  const free = places.filter(([id]) => id === null).map(([, ...place]) => place);
+  const candidates = mesh.group.size ? [...mesh.group] : [...mesh.nodes.keys()];
+  const drones = candidates
+    .map((id) => mesh.nodes.get(id))
+    .filter((node) => node.role === 0 && !numbered.has(node.id));
+  moves.push(...assigned(drones, free).map((move) => ({ ...move, z: Math.round(move.z) })));
+  if (!moves.length) return toast(`none of the drones in ${name} is in this fleet`, true);
+  await flights.hold(moves, namesIn(name, moves, places));
+  const lost = outOfReach(mesh, moves);
+  if (lost.length) flights.foresee(`${lost.length} would have no route: ${lost.join(", ")}`, lost);
+}
+
+/** Offers the only one of these ways [[x, y, z]] as a mission. */
+function flyAlong(name, ways) {
+  if (ways.length > 1) return toast(`${name} has ${ways.length} lines: keep the one to fly`, true);
+  if (!mesh.actions.includes("mission")) return toast(`${name} has no points to fly to`, true);
+  fleet.close();
+  missions.open(ways[0].map(([x, y]) => [x, y]));
+  byId("mission-height").value = String(Math.round(Math.max(...ways[0].map((place) => place[2]))));
+}
 
 // Several drones
 
@@ -319,6 +346,16 @@ byId("save-places").addEventListener("click", () =>
   save("places.yaml", placesYaml(mesh, PLACES_CASE), "application/yaml"),
 );
 
+for (const button of document.querySelectorAll("[data-save]"))
+  button.addEventListener("click", () => {
+    const { live, now } = mesh.timeline;
+    const moment = live === false ? `?t=${now}` : "";
+    const link = document.createElement("a");
+    link.href = `/earth/${button.dataset.save}${moment}`;
+    link.download = button.dataset.save;
+    link.click();
+  });
+
 // The view
 
 byId("zoom-in").addEventListener("click", () => map.zoom(1.3));
@@ -332,6 +369,10 @@ byId("show-ranges").addEventListener("change", (event) =>
 );
 byId("show-trails").addEventListener("change", (event) =>
   map.setOption("trails", event.target.checked),
+);
+byId("degrees").checked = localStorage.getItem(DEGREES_KEY) === "yes";
+byId("degrees").addEventListener("change", (event) =>
+  localStorage.setItem(DEGREES_KEY, event.target.checked ? "yes" : "no"),
 );
 byId("show-legend").checked = matchMedia("(min-width: 761px)").matches; // a phone has little room
 byId("find-form").addEventListener("submit", (event) => {

@@ -39,7 +39,7 @@ export function placesOf(shape, count, spacing, [x, y], heading) {
   });
 }
 
-/** Gives each drone {id, position} a place, the shortest ways first. */
+/** Gives each drone {id, position} a place [x, y, z], the shortest ways first. */
 export function assigned(drones, places) {
   const pairs = drones.flatMap(({ id, position }) =>
     places.map(([x, y], at) => ({
@@ -55,7 +55,7 @@ export function assigned(drones, places) {
     goals.set(id, places[at]);
     taken.add(at);
   }
-  return [...goals].map(([id, [x, y]]) => ({ id, x, y }));
+  return [...goals].map(([id, [x, y, z]]) => ({ id, x, y, z }));
 }
 
 /** The drones among these moves [{id, x, y, z}] that no chain of links would connect with a gateway. */

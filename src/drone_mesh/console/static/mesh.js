@@ -103,6 +103,11 @@ export class Mesh extends EventTarget {
     this.#notify("detail");
   }
 
+  /** The origin on the earth, [latitude, longitude, altitude]; null: there is none. */
+  get origin() {
+    return this.clock.origin ?? null;
+  }
+
   /** Whether the page shows a mesh that takes orders. */
   get canOrder() {
     return !this.recording && this.timeline.live !== false;

@@ -30,13 +30,13 @@ export class Missions {
     return !this.form.hidden;
   }
 
-  /** Opens the form for the selected drones; each click on the map adds a waypoint. */
-  open() {
+  /** Opens the form for the selected drones; each click on the map adds a waypoint to these [x, y]. */
+  open(waypoints = []) {
     const { mesh } = this;
     if (!mesh.canOrder || !mesh.actions.includes("mission")) return;
     this.drones = mesh.group.size ? [...mesh.group] : [mesh.selected].filter((id) => id !== null);
     this.#setOpen(true);
-    this.#set([]);
+    this.#set(waypoints);
   }
 
   /** Closes the form; returns whether it was open. */

@@ -1,6 +1,7 @@
 // The selected node: its facts, its power switch, and where to send its drone.
 
 import { arrowKeys } from "./arrows.js";
+import { inDegrees, toEarth, toFrame } from "./earth.js";
 import { orDash, UNKNOWN } from "./mesh.js";
 import { typedNumber } from "./numbers.js";
 
@@ -16,6 +17,15 @@ export class NodePanel {
     byId("power").addEventListener("click", () => this.switchPower());
     byId("node-close").addEventListener("click", () => mesh.select(null));
     byId("fly-form").addEventListener("submit", (event) => this.#send(event));
+    byId("degrees").addEventListener("change", () => {
+      this.#show();
+      this.#fillGoal();
+    });
+  }
+
+  /** The origin, if the user wants degrees and there is one. */
+  get #origin() {
+    return byId("degrees").checked ? this.mesh.origin : null;
   }
 
   switchPower() {
@@ -42,6 +52,7 @@ export class NodePanel {
 
   #facts(node) {
     const neighbours = this.#neighbours(node);
+    const earth = this.#earth(node);
     const facts = [
       ...(node.repair ? [["Repair", node.repair, { wide: true }]] : []),
       ...(node.order ? [["Latest order", node.order, { wide: true }]] : []),
@@ -60,7 +71,7 @@ export class NodePanel {
       ["Position", node.position ? node.position.map((m) => m.toFixed(2)).join(", ") : "–"],
       ...(node.channel ? [["Radio channel", node.channel, { wide: true }]] : []),
       ...(node.data ? [["Users’ data", node.data, { wide: true }]] : []),
-      ...(node.earth ? [["Latitude, longitude, altitude", this.#earth(node), { wide: true }]] : []),
+      ...(earth ? [["Latitude, longitude, altitude", earth, { wide: true }]] : []),
       ...(node.drone ? [["Drone", node.drone, { wide: true }]] : []),
       ["Route", node.route.length ? node.route : "–", { glue: " › ", wide: true }],
       [
@@ -103,7 +114,9 @@ export class NodePanel {
     return id === node.id && (age ?? null) !== null ? `, reported ${age} s ago` : "";
   }
 
-  #earth({ earth: [latitude, longitude, altitude] }) {
+  #earth({ earth, position }) {
+    if (!earth) return position && this.#origin ? inDegrees(this.#origin, position) : "";
+    const [latitude, longitude, altitude] = earth; // as its autopilot says
     return `${latitude.toFixed(6)}°, ${longitude.toFixed(6)}°, ${altitude.toFixed(1)} m`;
   }
 
@@ -134,26 +147,41 @@ export class NodePanel {
     const node = this.mesh.nodes.get(this.mesh.selected);
     const goal = node?.path.length ? node.path.slice(-3) : node?.position;
     setText(byId("fly-error"), "");
+    const origin = this.#origin;
+    byId("fly-form").toggleAttribute("data-degrees", Boolean(origin));
+    const names = origin ? ["latitude", "longitude"] : ["x", "y"];
+    names.forEach((name, index) =>
+      setText(byId(`fly-${"xy"[index]}`).previousElementSibling, name),
+    );
+    const texts = origin
+      ? toEarth(origin, ...(goal ?? [0, 0])).map((angle) => angle.toFixed(6))
+      : goal?.slice(0, 2).map((value) => String(Number(value.toFixed(1))));
     ["x", "y", "z"].forEach((axis, index) => {
       byId(`fly-${axis}`).removeAttribute("aria-invalid");
-      byId(`fly-${axis}`).value = goal
-        ? String(index < 2 ? Number(goal[index].toFixed(1)) : Math.round(goal[index]))
-        : "";
+      byId(`fly-${axis}`).value = goal ? (texts[index] ?? String(Math.round(goal[index]))) : "";
     });
   }
 
   #send(event) {
     event.preventDefault();
     const { coordinate, height } = this.mesh.limits;
+    const origin = this.#origin;
+    const [x, y] = [byId("fly-x"), byId("fly-y")];
     const goal = [
-      typedNumber(byId("fly-x"), "x", -coordinate, coordinate),
-      typedNumber(byId("fly-y"), "y", -coordinate, coordinate),
+      origin ? typedNumber(x, "latitude", -90, 90) : typedNumber(x, "x", -coordinate, coordinate),
+      origin
+        ? typedNumber(y, "longitude", -180, 180)
+        : typedNumber(y, "y", -coordinate, coordinate),
       typedNumber(byId("fly-z"), "z", 0, height, true),
     ];
     const wrong = goal.find((entry) => entry.error);
-    setText(byId("fly-error"), wrong?.error ?? "");
-    if (wrong) wrong.input.select();
-    else this.fly(this.mesh.selected, ...goal.map((entry) => entry.value));
+    const [first, second, z] = goal.map((entry) => entry.value);
+    const place = origin && !wrong ? toFrame(origin, first, second) : [first, second];
+    const far = !wrong && place.some((value) => Math.abs(value) > coordinate);
+    const farText = `more than ${coordinate} m east or north of the origin, west or south of it`;
+    setText(byId("fly-error"), wrong?.error ?? (far ? farText : ""));
+    if (wrong || far) (wrong?.input ?? x).select();
+    else this.fly(this.mesh.selected, ...place, z);
   }
 }
 

@@ -21,6 +21,8 @@ from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
@@ -143,7 +145,8 @@ def main() -> None:
     (str): path of a file with the password of the console, which only its owner can access;
     without it, a random one is made and printed if other machines can reach the address; ~demo
     (str): "repair" shows a repair as soon as a page is open; ~recording (str): path of the bag that
-    is played; its page takes no orders.
+    is played; its page takes no orders; ~origin (str): LAT,LON,ALT, where the world's origin
+    is on the earth, in degrees and metres above sea level.
     /DroneManager/casus (str): the file of the layouts.
     """
     start_node(main.__doc__, "mesh_console")
@@ -159,8 +162,9 @@ def _run() -> int:
     if demo not in ("", REPAIR_DEMO):
         raise ConfigurationError(f"invalid demo {demo!r}: must be {REPAIR_DEMO} or empty")
     recording = str(rospy.get_param("~recording", ""))
+    origin = _origin(str(rospy.get_param("~origin", "")))
     whole = History(math.inf, math.inf) if recording else None
-    store = FrameStore(History() if whole is None else None)
+    store = FrameStore(History() if whole is None else None, origin)
     layouts = layout_offers(manager_layouts())
     access = token.access(address)
     controls: MeshControls = RecordingControls() if recording else RosControls()
@@ -203,6 +207,20 @@ def _token(address: str) -> PageToken:
     with naming_argument("token_file:=", path):
         given = read_secret(Path(path), "token") if path else ""
     return PageToken.needed(address, given, path)
+
+
+def _origin(given: str) -> Origin | None:
+    if not given:
+        return None
+    with naming_argument("origin:=", "origin"):
+        origin = Origin.parse(given)
+    try:
+        origin.to_earth(Location(0.0, 0.0, 0.0))
+    except ImportError as error:
+        raise ConfigurationError(
+            f"origin:= needs the Python package {error.name}: pip install {error.name}"
+        ) from error
+    return origin
 
 
 def _port(value: object) -> int:

@@ -1,0 +1,91 @@
+"""What a file contains: points and lines, and the drones that they are for."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from typing import NamedTuple, Sequence
+
+from drone_mesh.drone.fleet import MAX_DRONES
+from drone_mesh.drone.geodesy import EarthPlace, Origin
+from drone_mesh.drone.goal import check_goal
+from drone_mesh.drone.location import Location
+from drone_mesh.errors import ConfigurationError, GoalRefused
+
+_NAMED = re.compile(r"(?:(?:drone|node|router)\s*)?(\d{1,3})", re.IGNORECASE)
+
+
+class Point(NamedTuple):
+    """A place, and the drone that it is for; None: any."""
+
+    drone: int | None
+    place: Location
+
+
+class Path(NamedTuple):
+    """The way of a drone; None: any. `times_s`: when it was at each place, if that is known."""
+
+    drone: int | None
+    places: Sequence[Location]
+    times_s: Sequence[float] = ()
+
+
+@dataclass
+class Placemarks:
+    """The content of a file, in metres of the common frame."""
+
+    points: list[Point] = field(default_factory=list)
+    paths: list[Path] = field(default_factory=list)
+
+    def add_point(self, drone: int | None, place: Location) -> None:
+        """Raises ConfigurationError for a drone that has a place already."""
+        if drone is not None and any(point.drone == drone for point in self.points):
+            raise ConfigurationError(f"drone {drone} has two places")
+        self.points.append(Point(drone, place))
+
+
+def drone_named(name: str | None) -> int | None:
+    """The drone in a name such as "3", "drone 3" or "Router 3"; None: it names none.
+
+    Raises ConfigurationError for an id that no drone can have.
+    """
+    match = _NAMED.fullmatch((name or "").strip())
+    if match is None:
+        return None
+    if int(match[1]) >= MAX_DRONES:
+        raise ConfigurationError(f"drone {match[1]}: the largest id is {MAX_DRONES - 1}")
+    return int(match[1])
+
+
+def place_on(
+    origin: Origin, latitude_deg: float, longitude_deg: float, height_m: float
+) -> Location:
+    """A place of the common frame, `height_m` above the origin.
+
+    Raises ConfigurationError if it is no place on the earth, or not one for a drone.
+    """
+    if not (abs(latitude_deg) <= 90 and abs(longitude_deg) <= 180 and math.isfinite(height_m)):
+        raise ConfigurationError(
+            f"{longitude_deg:.9g}, {latitude_deg:.9g} is not a longitude and a latitude in degrees"
+        )
+    altitude_m = origin.altitude_m + height_m
+    place = origin.to_frame(EarthPlace(latitude_deg, longitude_deg, altitude_m))
+    metres = (round(value, 2) + 0.0 for value in (place.latitude, place.longitude, height_m))
+    place = Location(*metres)
+    try:
+        check_goal(*place)
+    except GoalRefused as error:
+        where = f"{latitude_deg:.6f}, {longitude_deg:.6f}"
+        raise ConfigurationError(f"{where}, in metres from the origin: {error}") from error
+    return place
+
+
+def on_earth(origin: Origin, place: Location) -> tuple[float, float, float]:
+    """Longitude and latitude to a centimetre, and metres above sea level."""
+    earth = origin.to_earth(place)
+    return (
+        round(earth.longitude_deg, 7),
+        round(earth.latitude_deg, 7),
+        round(earth.altitude_m, 3),
+    )

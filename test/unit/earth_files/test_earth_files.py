@@ -1,0 +1,131 @@
+"""Places and lines of other programs become metres of the common frame, and back."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.location import Location
+from drone_mesh.earth_files import WRITERS, Path, Placemarks, Point, read_placemarks
+from drone_mesh.errors import ConfigurationError
+
+ORIGIN = Origin(52.0907, 5.1214, 3.0)
+
+
+def features(*these: dict[str, Any]) -> str:
+    return json.dumps({"type": "FeatureCollection", "features": these})
+
+
+def feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+    geometry = {"type": kind, "coordinates": coordinates}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def kml(*marks: str) -> str:
+    inside = "".join(f"<Placemark>{mark}</Placemark>" for mark in marks)
+    return f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{inside}</Document></kml>'
+
+
+def refusal(text: str, name: str, origin: Origin | None = ORIGIN) -> str:
+    with pytest.raises(ConfigurationError) as caught:
+        read_placemarks(text, name, origin)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_what_is_written_is_read_again_to_the_centimetre(ending):
+    points = [Point(3, Location(120.5, -80.25, 12.0)), Point(4, Location(-999.0, 4000.0, 0.0))]
+    paths = [Path(7, [Location(0.0, 0.0, 0.0), Location(55.5, 66.6, 7.0)], [1.0, 20.5])]
+    origin = Origin(-33.9, 151.2, 3.2746)
+    found = read_placemarks(
+        WRITERS[ending](Placemarks(points, paths), origin), f"a.{ending}", origin
+    )
+    for read, written in zip(found.points, points):
+        assert read.drone == written.drone
+        assert tuple(read.place) == pytest.approx(tuple(written.place), abs=0.015)
+    (path,) = found.paths
+    assert path.drone == 7
+    assert tuple(path.places[1]) == pytest.approx((55.5, 66.6, 7.0), abs=0.015)
+
+
+def test_points_of_geojson_are_for_the_drones_that_they_name():
+    text = features(
+        feature("Point", [5.1214, 52.0907], drone=3),
+        feature("Point", [5.1214, 52.0907, 5.5], name="Router 4"),
+        feature("MultiPoint", [[5.1214, 52.0907, 99]], name="the old oak", height=12),
+        feature("Polygon", [[[5.1, 52.0], [5.2, 52.0], [5.2, 52.1], [5.1, 52.0]]]),
+        {"type": "Feature", "properties": None, "geometry": None},
+    )
+    points = read_placemarks(text, "field.GeoJSON", ORIGIN).points
+    assert [(point.drone, point.place.height) for point in points] == [(3, 0), (4, 2.5), (None, 12)]
+
+
+def test_heights_of_kml_are_as_their_mode_says():
+    def mark(mode: str) -> str:
+        return f"<Point>{mode}<coordinates>5.1214,52.0907,30</coordinates></Point>"
+
+    text = kml(
+        mark(""),
+        mark("<altitudeMode>relativeToGround</altitudeMode>"),
+        mark("<altitudeMode>absolute</altitudeMode>"),
+    )
+    points = read_placemarks(text, "field.kml", ORIGIN).points
+    assert [point.place.height for point in points] == [0, 30, 27]
+    assert {point.drone for point in points} == {None}
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("{", "a.json: not JSON: "),
+        ("[" * 100_000, "a.json: nested too deeply"),
+        ("[]", "a.json: not GeoJSON: expected a FeatureCollection"),
+        (features(), "a.json: has neither points nor lines"),
+        ('{"type": "FeatureCollection", "features": [7]}', "feature 1: not a feature: 7"),
+        (features(feature("Point", [5.1])), "feature 1: [5.1] is not [longitude, latitude]"),
+        (features(feature("Point", [155000.0, 463000.0])), "is not a longitude and a latitude"),
+        (features(feature("Point", [float("nan"), 52])), "is not [longitude, latitude]"),
+        (features(feature("Point", [5.1214, 52.0907, 0])), "height -3 m is outside 0..500 m"),
+        (features(feature("Point", [6, 52])), "in metres from the origin: latitude"),
+        (features(feature("Point", [5.1, 52.1], drone="x")), "the property drone is 'x', not"),
+        (features(feature("Point", [5.1, 52.1], drone=254)), "drone 254: the largest id is 253"),
+        (features(feature("Point", [5.1, 52.1], height="x")), "the property height is 'x', not"),
+        (features(feature("LineString", 5)), "feature 1: coordinates 5 are not a list"),
+        (features(*[feature("Point", [5.12, 52.09], drone=1)] * 2), "feature 2: drone 1 has two"),
+        (" " * 300_001, "a.json: longer than 300000 characters"),
+    ],
+)
+def test_bad_geojson_is_refused_in_one_line(text, why):
+    assert why in refusal(text, "a.json")
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("<kml>", "a.kml: not XML: no element found"),
+        ("<html/>", "a.kml: not KML: its first element is 'html'"),
+        (kml(), "a.kml: has neither points nor lines"),
+        (
+            '<!DOCTYPE k [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><kml>&b;</kml>',
+            "a.kml: declares a document type or entities",
+        ),
+        (
+            kml("<name>Oak</name><Point><coordinates>here</coordinates></Point>"),
+            "a.kml: placemark 'Oak': 'here' is not longitude,latitude,height",
+        ),
+        ("<kml>\ud800</kml>", "a.kml: not XML: "),
+    ],
+)
+def test_bad_kml_is_refused_in_one_line(text, why):
+    assert why in refusal(text, "a.kml")
+
+
+def test_what_is_missing_is_said():
+    assert refusal("{}", "a.json", None) == (
+        "a.json: its places are in degrees: that needs an origin"
+    )
+    assert refusal("PK", "a.kmz") == "a.kmz: a compressed file: unzip it, and give the KML in it"
