@@ -13,7 +13,7 @@ from typing import Sequence
 
 from drone_mesh.arguments import whole
 from drone_mesh.drone.geodesy import Origin
-from drone_mesh.errors import MeshError
+from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.nrf24.settings import DataRate
 from drone_mesh.raspberry.arducopter import ArduCopter, program_from_environment
 from drone_mesh.raspberry.emulated_air import column_place
@@ -62,24 +62,22 @@ def _run(copters: int, origin: Origin, speedup: float) -> None:
             copter = ArduCopter(program, own, node_id - 1, Origin(*place), speedup)
             stack.callback(copter.close)
             fleet.append(copter)
-        pilots = []
         for copter in fleet:
-            pilot = PilotSide(copter.pilot_address, copter.system_id)
-            stack.callback(pilot.close)
-            pilots.append(pilot)
-        for copter, pilot in zip(fleet, pilots):
-            pilot.make_ready()
+            # A port has one user: from here on the pilot's own ground station.
+            with contextlib.closing(PilotSide(copter.pilot_address, copter.system_id)) as pilot:
+                pilot.make_ready()
             print(
                 f"raspberry_router --id {copter.system_id} --emulated-air 9100 "
                 f"--drone mavlink:{copter.address} --origin {as_text} "
                 "--may-arm --may-take-off --may-change-mode",
                 flush=True,
             )
-        print(f"{copters} copters are ready; their pilots' ports stay open", flush=True)
+        print(f"{copters} copters are ready; Ctrl-C ends them", flush=True)
         while True:
             time.sleep(POLL_S)
-            for pilot in pilots:
-                pilot.read(0.0)
+            for copter in fleet:
+                if not copter.is_running:
+                    raise ConfigurationError(f"copter {copter.system_id} has ended by itself")
 
 
 if __name__ == "__main__":
