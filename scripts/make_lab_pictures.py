@@ -49,7 +49,7 @@ def main() -> None:
     """Write both pictures."""
     with quiet_nodes(), in_style():
         for name, names, draw, height_in in (
-            ("strategies", STRATEGIES, draw_repair, 1.5),
+            ("strategies", STRATEGIES, draw_repair, 1.7),
             ("techniques", TECHNIQUES, draw_routes, 2.6),
         ):
             out = PICTURES / f"{name}.svg"
@@ -99,7 +99,7 @@ def panels(names: tuple[str, ...], draw: Callable[[Axes, str], str], height_in: 
         axes.set_title(name, fontsize=10)
         axes.set_xlabel(words, fontsize=8)
         axes.set_aspect("equal")
-        axes.margins(0.08)
+        axes.margins(0.08, 0.2)  # no circle is cut off
         axes.set_xticks([])
         axes.set_yticks([])
         axes.spines[:].set_visible(False)
@@ -134,7 +134,8 @@ def draw_repair(axes: Axes, repair: str) -> str:
     draw_nodes(axes, network)
     flown_m = sum(member.drone.flown_m for member in network.nodes.values())
     flew = len({node for node, _path in legs})
-    return f"{flew} of 5 fly, {flown_m:.0f} m in all; healed after {took_s:.0f} s"
+    lost = "" if network.all_connected() else ", then lost again"
+    return f"{flew} of 5 fly, {flown_m:.0f} m in all;\nhealed after {took_s:.0f} s{lost}"
 
 
 def draw_routes(axes: Axes, routing: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import os
 import shlex
 import sys
@@ -18,9 +17,7 @@ from drone_mesh.lab.experiment import load_experiment
 from drone_mesh.lab.merge import merge
 from drone_mesh.lab.plan import Plan
 from drone_mesh.lab.progress import as_duration
-from drone_mesh.lab.proofs.attacks import ATTACKS
-from drone_mesh.lab.proofs.damage import KEY, TABLE_HEAD, damage_row, keys_of, with_row
-from drone_mesh.lab.proofs.fuzz import NODES, crowd, fuzz
+from drone_mesh.lab.proofs.command import add_proofs
 from drone_mesh.lab.status import describe_folder
 from drone_mesh.lab.template import write_template
 from drone_mesh.stopping import quiet_on_closed_pipe
@@ -150,38 +147,7 @@ def _add_analysis(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     )
     compare.set_defaults(run=_compare)
 
-    attack = commands.add_parser(
-        "attack", help="attack meshes without and with a key, and print the damage as a table"
-    )
-    attack.add_argument(
-        "attacks", nargs="*", metavar="ATTACK", help=f"any of: {', '.join(ATTACKS)} (default: all)"
-    )
-    attack.add_argument(
-        "--runs",
-        type=whole(0, MOST),
-        default=12,
-        metavar="N",
-        help="number of seeds (default %(default)s)",
-    )
-    attack.add_argument(
-        "--page", type=Path, metavar="FILE", help="also write the rows into the table of this page"
-    )
-    attack.set_defaults(run=_attack)
-
-    fuzzing = commands.add_parser(
-        "fuzz", help="send mutated packets, and those of invented nodes, to a small mesh"
-    )
-    fuzzing.add_argument(
-        "--packets",
-        type=whole(0, MOST),
-        default=1_000_000,
-        metavar="N",
-        help="number of packets (default: %(default)s)",
-    )
-    fuzzing.add_argument(
-        "--seed", type=whole(0, MOST), default=1, help="random seed (default: %(default)s)"
-    )
-    fuzzing.set_defaults(run=_fuzz)
+    add_proofs(commands)
 
     metrics = commands.add_parser("metrics", help="list all metrics with unit and definition")
     metrics.set_defaults(run=_metrics)
@@ -207,47 +173,6 @@ def _shard(text: str) -> tuple[int, int]:
     if not (slash and part.isdigit() and of.isdigit() and 0 <= int(part) < int(of)):
         raise argparse.ArgumentTypeError(f"expected I/N with 0 <= I < N, not {text}")
     return int(part), int(of)
-
-
-def _attack(options: argparse.Namespace) -> int:
-    unknown = set(options.attacks).difference(ATTACKS)
-    if unknown:
-        raise MeshError(f"unknown attack {min(unknown)!r}: use one of {', '.join(ATTACKS)}")
-    if options.runs < 1:
-        raise MeshError(f"invalid --runs {options.runs}: must be 1 or more")
-    logging.disable(logging.WARNING)  # an attacked mesh logs a lot
-    print(*TABLE_HEAD, sep="\n", flush=True)
-    for name in options.attacks or ATTACKS:
-        row = damage_row(name, options.runs)
-        print(row, flush=True)
-        if options.page is not None:
-            options.page.write_text(with_row(options.page.read_text("utf-8"), row), "utf-8")
-    return 0
-
-
-def _fuzz(options: argparse.Namespace) -> int:
-    logging.disable(logging.WARNING)
-
-    def progress(done: int) -> None:
-        if sys.stderr.isatty():
-            print(f"\r{done} of {options.packets} packets", end="\r", file=sys.stderr, flush=True)
-
-    for case, key in (("without a key", None), ("with a key", KEY)):
-        result = fuzz(options.packets, options.seed, key, progress)
-        print(
-            f"{case}: {result.packets} packets, no exception; {result.moved} drones moved, "
-            f"{result.connected} of {NODES - 1} routers connected a minute later",
-            flush=True,
-        )
-    for case, keys in (("without a key", None), ("with a key", keys_of)):
-        half, end = crowd(options.packets, options.seed, keys, progress)
-        print(
-            f"{case}: {options.packets} packets of 254 invented nodes; the tables of {NODES} nodes "
-            f"hold {end.entries} entries, {half.entries} after half of the packets, the largest "
-            f"table {end.largest}",
-            flush=True,
-        )
-    return 0
 
 
 def _new(options: argparse.Namespace) -> int:
@@ -340,7 +265,7 @@ def _tables(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from drone_mesh.lab.figures import draw_alone
+    from drone_mesh.lab.plot import draw_alone
     from drone_mesh.lab.results import load_results
 
     results = load_results(options.results).only(options.cells, options.metric)

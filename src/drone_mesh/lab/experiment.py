@@ -17,7 +17,9 @@ from drone_mesh.lab import extensions, movement, places
 from drone_mesh.lab.dotted_path import NoSuchPlace, put
 from drone_mesh.lab.experiment_source import Source, nearest_name
 from drone_mesh.lab.expression import ExpressionError, Where
-from drone_mesh.lab.scenario import Fault, Part, Scenario
+from drone_mesh.lab.faults import Fault
+from drone_mesh.lab.parts import Part
+from drone_mesh.lab.scenario import Scenario
 from drone_mesh.yaml_file import KeyPath, read_mapping
 
 NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$"  # used as the name of a folder

@@ -12,6 +12,7 @@ from drone_mesh.drone.flight_path import FlightPath, Vector
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
 from drone_mesh.lab import scenario as given
+from drone_mesh.lab.faults import Jam
 from drone_mesh.lab.impairments import Impairments
 from drone_mesh.nrf24.airtime import NS_PER_S
 from drone_mesh.nrf24.emulator.noise import Noise
@@ -83,9 +84,7 @@ def put_obstacles(
     return planner
 
 
-def put_noise(
-    network: Network, jam: given.Jam, range_m: float, rng: random.Random
-) -> Callable[[], None]:
+def put_noise(network: Network, jam: Jam, range_m: float, rng: random.Random) -> Callable[[], None]:
     """Start a transmitter of noise on a shared channel; returns what stops it."""
     air = cast(_Air, network.air)
     mhz = 2400 + air.settings.channel

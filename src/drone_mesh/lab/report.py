@@ -9,7 +9,8 @@ import jinja2
 
 from drone_mesh.errors import MeshError
 from drone_mesh.lab.animation import animate_repair
-from drone_mesh.lab.figures import Drawing, axis_drawings, phases_drawing, survival_drawing
+from drone_mesh.lab.figures import Drawing, axis_drawings
+from drone_mesh.lab.healing_figures import phases_drawing, survival_drawing
 from drone_mesh.lab.metrics import METRICS
 from drone_mesh.lab.results import Results, load_results, number
 from drone_mesh.lab.show import replay

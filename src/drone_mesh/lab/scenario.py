@@ -1,49 +1,29 @@
 """One run as an experiment file describes it: layout, radio, techniques and faults."""
 
 # Pydantic reads these annotations when the module is loaded, and Python 3.8 has no list[int].
-from typing import Any, ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
+from typing import ClassVar, Dict, FrozenSet, List, Optional, Tuple, Union
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, field_validator, model_validator
 from typing_extensions import Annotated, Literal
 
 from drone_mesh.air.obstacle_file import BoxRow
 from drone_mesh.air.reach import MAX_DISTANCE_M
-from drone_mesh.communication.data.packets import MAX_MESSAGE_BYTES
 from drone_mesh.communication.named_techniques import DEFAULT_ROUTING
 from drone_mesh.communication.repair.options import CLEARANCE_M, DEFAULT_REPAIR
 from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.goal import MAX_HEIGHT_M
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.lab.conditions import parse_condition
+from drone_mesh.lab.faults import Fault
+from drone_mesh.lab.parts import Above0, AtLeast0, NodeId, Part, PartOfKind, Point, Share
 from drone_mesh.mobility import Mobility
 from drone_mesh.mobility.named_models import check as check_mobility
 from drone_mesh.mobility.settings import Knot
 
-Share = Annotated[float, Field(ge=0, le=1)]
-Above0 = Annotated[float, Field(gt=0, le=1e6)]
-AtLeast0 = Annotated[float, Field(ge=0, le=1e6)]
-NodeId = Annotated[int, Field(ge=0, lt=MAX_DRONES)]
-Point = Annotated[List[float], Field(min_length=2, max_length=2)]
-
-
-class Part(BaseModel):
-    """A part of an experiment file: unknown keys are errors, and no value changes its type."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
-
-
 _RANDOM = ("drones", "width_m", "least_distance_m", "require", "gateway_at")
 
 
-class Layout(Part):
+class Layout(PartOfKind):
     """The start positions of the drones."""
 
     KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
@@ -54,6 +34,7 @@ class Layout(Part):
         "casus": frozenset({"case"}),
         "file": frozenset({"path", "places"}),
     }
+    OF_ALL_KINDS = frozenset({"kind", "gateways", "ids"})
 
     kind: Literal["uniform", "clusters", "grid", "line", "casus", "file"] = "uniform"
     drones: Annotated[int, Field(ge=2, le=MAX_DRONES)] = 25  # gateways included
@@ -74,12 +55,7 @@ class Layout(Part):
     places: Optional[List[List[float]]] = None  # its content: id, x, y, 1 for a gateway
 
     @model_validator(mode="after")
-    def _has_only_keys_of_its_kind(self) -> "Layout":
-        allowed = self.KEYS[self.kind] | {"kind", "gateways", "ids"}
-        extra = sorted(self.model_fields_set - allowed)
-        if extra:
-            words = ", ".join(sorted(allowed))
-            raise ValueError(f"layout {self.kind} has no {extra[0]}: it has {words}")
+    def _can_be_drawn(self) -> "Layout":
         if self.mean_degree is not None and self.width_m is not None:
             raise ValueError("mean_degree and width_m exclude each other: give one")
         if self.kind == "file" and self.path is None:
@@ -88,13 +64,8 @@ class Layout(Part):
             raise ValueError(f"{self.gateways} gateways leave no router of {self.drones} drones")
         return self
 
-    @model_serializer(mode="wrap")
-    def _dump_keys_of_its_kind(self, dump: Any) -> Dict[str, Any]:
-        kept = self.KEYS[self.kind] | {"kind", "gateways", "ids"}
-        return {key: value for key, value in dump(self).items() if key in kept}
 
-
-class Radio(Part):
+class Radio(PartOfKind):
     """The medium."""
 
     KEYS: ClassVar[Dict[str, FrozenSet[str]]] = {
@@ -109,19 +80,6 @@ class Radio(Part):
     loss: Share = 0.0  # disc: of the packets on each link; others: of all frames
     delay_s: AtLeast0 = 0.002
     jitter_s: AtLeast0 = 0.0
-
-    @model_validator(mode="after")
-    def _has_only_keys_of_its_kind(self) -> "Radio":
-        extra = sorted(self.model_fields_set - self.KEYS[self.kind] - {"kind"})
-        if extra:
-            words = ", ".join(sorted(self.KEYS[self.kind]))
-            raise ValueError(f"radio {self.kind} has no {extra[0]}: it has {words}")
-        return self
-
-    @model_serializer(mode="wrap")
-    def _dump_keys_of_its_kind(self, dump: Any) -> Dict[str, Any]:
-        kept = self.KEYS[self.kind] | {"kind"}
-        return {key: value for key, value in dump(self).items() if key in kept}
 
 
 class MotionSettings(Part):
@@ -208,179 +166,6 @@ class Repair(Part):
 
     clearance_m: Above0 = CLEARANCE_M
     lost_place: Literal["beside", "above", "below", "exact"] = "beside"
-
-
-class Pick(Part):
-    """The drones: a share or number selected by some rule, or these ids."""
-
-    share: Optional[Share] = None  # of all drones of the layout that are not spared
-    number: Optional[Annotated[int, Field(ge=0, le=MAX_DRONES)]] = None
-    ids: Optional[List[NodeId]] = None
-    pick: Literal["random", "cut_vertex", "next_to_gateway", "circle", "busiest"] = "random"
-    center: Optional[Point] = None  # circle; default: a random drone
-    radius_m: Optional[Above0] = None  # circle: everything within it
-    spare: Literal["gateways", "nothing"] = "gateways"
-
-    @model_validator(mode="after")
-    def _has_one_selection(self) -> "Pick":
-        given = [key for key in ("share", "number", "ids") if getattr(self, key) is not None]
-        if self.pick == "circle" and self.radius_m is None:
-            raise ValueError("pick circle needs radius_m")
-        if self.pick == "circle" and not given:
-            return self
-        if len(given) != 1:
-            raise ValueError("give exactly one of share, number and ids")
-        return self
-
-
-class Link(Part):
-    """One link between two drones, or a number of random ones."""
-
-    between: Optional[Annotated[List[NodeId], Field(min_length=2, max_length=2)]] = None
-    number: Annotated[int, Field(ge=1, le=10_000)] = 1
-    for_s: Optional[Above0] = None  # default: to the end
-
-
-class Jam(Part):
-    """Noise in a circle: packets from or to a drone within it are lost.
-
-    On a shared channel: a transmitter at its centre, at its edge as strong as a link at the edge of
-    the range; `loss` is then the share of the time that it sends.
-    """
-
-    center: Point
-    radius_m: Above0
-    for_s: Optional[Above0] = None
-    loss: Share = 1.0
-
-
-class GatewayOff(Part):
-    """A gateway that is off for a while."""
-
-    id: NodeId = 0
-    for_s: Optional[Above0] = None
-
-
-class Loss(Part):
-    """Packet loss on all links, in place of radio.loss."""
-
-    share: Share
-    for_s: Optional[Above0] = None
-
-
-class Battery(Part):
-    """Drones that die after some distance of flight, or some time."""
-
-    share: Share = 1.0
-    fly_m: Optional[Above0] = None
-    live_min: Optional[Above0] = None
-
-    @model_validator(mode="after")
-    def _has_an_end(self) -> "Battery":
-        if self.fly_m is None and self.live_min is None:
-            raise ValueError("battery needs fly_m or live_min")
-        return self
-
-
-class Churn(Part):
-    """Deaths and returns at random times; or many at once, periodically."""
-
-    deaths_per_min: AtLeast0 = 0.0
-    births_per_min: AtLeast0 = 0.0
-    switched: Annotated[int, Field(ge=0, le=MAX_DRONES)] = 0  # random drones: off, or on again
-    every_s: Above0 = 60.0  # period of `switched`
-    for_s: Optional[Above0] = None
-
-
-class FlightOrders(Part):
-    """Flight orders through a gateway: one drone to one place, or random short ones."""
-
-    id: Optional[NodeId] = None
-    to: Optional[Annotated[List[float], Field(min_length=2, max_length=3)]] = None
-    every_s: Optional[Above0] = None  # random drones, periodically
-    within_m: Above0 = 1.0  # distance from the random drone's position
-    for_s: Optional[Above0] = None
-
-    @model_validator(mode="after")
-    def _has_a_target(self) -> "FlightOrders":
-        if (self.id is None) != (self.to is None) or (self.id is None) == (self.every_s is None):
-            raise ValueError("order needs id and to, or every_s")
-        return self
-
-
-class FlownLayouts(Part):
-    """Layouts of the drone manager, ordered one after the other and kept until they are reached."""
-
-    cases: Annotated[List[Annotated[int, Field(ge=0)]], Field(min_length=1)]
-    apart_s: AtLeast0 = 10.0  # between two orders
-    shuffled: bool = False  # in another order in each run
-    at_once: bool = False  # all drones set out together
-
-
-class Messages(Part):
-    """Users' messages to the first gateway, handed in at once, by these drones in turn."""
-
-    ids: Annotated[List[NodeId], Field(min_length=1)]
-    number: Annotated[int, Field(ge=1, le=10_000)]
-    size: Annotated[int, Field(ge=0, le=MAX_MESSAGE_BYTES)] = MAX_MESSAGE_BYTES
-    reliable: bool = True
-
-
-class Wind(Part):
-    """Wind, which slows flights."""
-
-    speed_factor: Annotated[float, Field(gt=0, le=1)]
-    for_s: Optional[Above0] = None
-
-
-class Fault(Part):
-    """One event in the network, at a time or when a condition holds."""
-
-    ACTIONS: ClassVar[Tuple[str, ...]] = (
-        "kill", "revive", "cut_link", "jam", "gateway_off", "loss", "battery", "churn", "order",
-        "layouts", "send", "wind",
-    )  # fmt: skip
-
-    at_s: Optional[AtLeast0] = None
-    when: Optional[str] = None
-    kill: Optional[Pick] = None
-    revive: Optional[Pick] = None
-    cut_link: Optional[Link] = None
-    jam: Optional[Jam] = None
-    gateway_off: Optional[GatewayOff] = None
-    loss: Optional[Loss] = None
-    battery: Optional[Battery] = None
-    churn: Optional[Churn] = None
-    order: Optional[FlightOrders] = None
-    layouts: Optional[FlownLayouts] = None
-    send: Optional[Messages] = None
-    wind: Optional[Wind] = None
-
-    @field_validator("when")
-    @classmethod
-    def _is_a_condition(cls, text: Optional[str]) -> Optional[str]:
-        if text is not None:
-            parse_condition(text)
-        return text
-
-    @model_validator(mode="after")
-    def _has_one_action_and_one_start(self) -> "Fault":
-        actions = [name for name in self.ACTIONS if getattr(self, name) is not None]
-        if len(actions) != 1:
-            raise ValueError(f"a fault is exactly one of {', '.join(self.ACTIONS)}")
-        if (self.at_s is None) == (self.when is None):
-            raise ValueError("a fault needs either at_s or when")
-        return self
-
-    @property
-    def action(self) -> str:
-        """The name of its action, one of ACTIONS."""
-        return next(name for name in self.ACTIONS if getattr(self, name) is not None)
-
-    @property
-    def what(self) -> Any:
-        """The settings of its action."""
-        return getattr(self, self.action)
 
 
 class ObstacleSettings(Part):

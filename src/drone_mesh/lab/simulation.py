@@ -6,17 +6,13 @@ import hashlib
 import math
 import time
 from dataclasses import replace
-from typing import Any, Callable, Iterator, Protocol, cast
+from typing import Callable, Iterator, Protocol, cast
 
 import numpy as np
 
 from drone_mesh.air.graph import Graph
 from drone_mesh.channel.statistics import RadioStatistics
-from drone_mesh.communication.repair.options import LostPlace, RepairOptions
-from drone_mesh.communication.seals.keys import MeshKey
-from drone_mesh.communication.timing import MeshTiming
 from drone_mesh.inprocess import Network
-from drone_mesh.inprocess.positions import PositionErrors
 from drone_mesh.inprocess.radio import InProcessAir
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.impairments import Impairments
@@ -30,24 +26,20 @@ from drone_mesh.lab.network_sample import (
     route_hops,
     sample_of,
 )
-from drone_mesh.lab.places import StartPoint, draw_places
 from drone_mesh.lab.probes import ProbeSender
 from drone_mesh.lab.propagation import obstacles_of, put_obstacles
 from drone_mesh.lab.record import AirFigures, RunRecord, ServiceGap, Topology
-from drone_mesh.lab.scenario import Positions, Scenario
+from drone_mesh.lab.scenario import Scenario
+from drone_mesh.lab.scenario_network import network_of, places_of
 from drone_mesh.lab.streams import Streams
 from drone_mesh.lab.timeline import Timeline
 from drone_mesh.mobility import Track
-from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
-from drone_mesh.nrf24.settings import DEFAULT_RATE, data_rate
 from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.observation import describe_obstacles
 
 FLIGHT_SAMPLE_S = 0.25  # period of distance checks while a drone flies: 0.5 m at 2 m/s
 
 ABLE_WITHIN_M = 1.0  # a place believed to be so near to the range leads to the gateway
-
-_KEY = MeshKey(b"the key of a lab")
 
 OnStatus = Callable[[MeshStatus], None]
 Stopwatch = Callable[[], float]
@@ -62,8 +54,8 @@ class Simulation:
     ) -> None:
         """Raises ConfigurationError for a layout that cannot be drawn."""
         self.scenario = scenario
-        places = _places(scenario, streams)
-        self.network = _network(scenario, streams, places)
+        places = places_of(scenario, streams)
+        self.network = network_of(scenario, streams, places)
         self.simulating_s = 0.0  # processor time in the network, without the lab's own
         self._stopwatch = stopwatch
         self.impairments = Impairments(self.network, streams.of, scenario.radio.loss)
@@ -277,71 +269,3 @@ def _air_figures(network: Network) -> AirFigures | None:
         tries=sum(radio.sent + radio.tries for radio in radios),
         given_up=sum(radio.lost for radio in radios),
     )
-
-
-def _network(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> Network:
-    timing = MeshTiming(
-        check_period_s=scenario.timing.check_period_s,
-        connection_lost_after_s=scenario.timing.connection_lost_after_s,
-        send_attempts=scenario.timing.send_attempts,
-    )
-    network = Network(
-        seed=streams.number("mesh"),
-        timing=timing,
-        routing=scenario.routing,
-        max_distance_m=scenario.range_m,
-        **_options(scenario, streams, places),
-    )
-    grounded = streams.of("grounded")
-    for place in places:
-        if place.gateway:
-            network.add_gateway(place.node_id, place.x, place.y)
-        else:
-            is_grounded = grounded.random() < scenario.grounded_share
-            why = "on the ground" if is_grounded else ""
-            network.add_router(place.node_id, place.x, place.y, why_not_fly=why)
-    return network
-
-
-def _places(scenario: Scenario, streams: Streams) -> list[StartPoint]:
-    obstacles = obstacles_of(scenario.obstacles) if scenario.obstacles.boxes else None
-    return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
-
-
-def _options(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> dict[str, Any]:
-    """The arguments that differ from the network's defaults."""
-    options: dict[str, Any] = {
-        "repair": scenario.repair,
-        "repair_options": RepairOptions(
-            clearance_m=scenario.repair_options.clearance_m,
-            range_m=scenario.range_m,
-            lost_place=LostPlace(scenario.repair_options.lost_place),
-        ),
-    }
-    if scenario.key:
-        gateways = {place.node_id for place in places if place.gateway}
-        options["key"] = lambda node: _KEY if node in gateways else _KEY.for_node(node)
-    if scenario.positions != Positions():
-        options["positions"] = PositionErrors(**scenario.positions.model_dump())
-    if scenario.radio.kind == "disc":
-        options["delay_s"] = scenario.radio.delay_s
-        options["jitter_s"] = scenario.radio.jitter_s
-    else:
-        rate = scenario.radio.rate or DEFAULT_RATE
-        options.update(radio=scenario.radio.kind, rate=rate, links=_links(scenario, rate, streams))
-        part = scenario.obstacles
-        options.update(fading=part.fading, rician_k_db=part.rician_k_db)
-    return options
-
-
-def _links(scenario: Scenario, rate: str, streams: Streams) -> LinkModel:
-    """Which frames arrive undamaged if no other frame is on the air."""
-    links: LinkModel = IdealDisc(scenario.range_m)
-    if scenario.radio.links == "distance" or scenario.obstacles.fading != "none":
-        links = LogDistance.with_edge_at(
-            scenario.range_m, streams.of("links"), bits_per_s=data_rate(rate).value
-        )
-    if scenario.radio.loss:
-        rng = streams.of("frames")
-        return ScriptedLoss(links, lambda _hop: rng.random() < scenario.radio.loss)
-    return links

@@ -12,13 +12,14 @@ from drone_mesh.communication.data.ticket import Ticket
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.inprocess import Network
 from drone_mesh.lab.conditions import StartCondition, parse_condition
+from drone_mesh.lab.faults import Fault
 from drone_mesh.lab.flights import Flights
 from drone_mesh.lab.formations import Formations
 from drone_mesh.lab.impairments import Impairments, Jamming
 from drone_mesh.lab.network_sample import NetworkSample, gateways_of
 from drone_mesh.lab.picking import pick_drones
 from drone_mesh.lab.propagation import put_noise
-from drone_mesh.lab.scenario import Fault, Scenario
+from drone_mesh.lab.scenario import Scenario
 from drone_mesh.lab.streams import Streams
 
 HEALING_STARTS_WITH = frozenset({"kill", "cut_link", "jam", "gateway_off"})

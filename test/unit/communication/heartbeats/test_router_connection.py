@@ -10,6 +10,7 @@ from rig import FROM_0, Rig, packet
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.medium import Medium
 from drone_mesh.communication.routing.techniques.etx_tree import EtxTree
+from drone_mesh.communication.timing import MeshTiming
 
 HEARTBEAT, PRESENT, REQUEST, MISSING = 4, 3, 2, 5
 ANSWER = "00 00 04 01 01 01 00 00"  # of gateway 0, a neighbour
@@ -43,6 +44,17 @@ def test_a_heartbeat_of_a_gateway_connects_with_one_hop_more_than_it_made(hops, 
     assert rig.mesh.get_preferred_gateway() == 9
     assert rig.mesh.get_hops_from_gateway_away() == shown
     assert rig.mesh.get_route_to_gateway() == 2
+
+
+def test_a_router_that_does_not_know_its_distance_waits_as_long_as_for_ten_hops():
+    rig = Rig()
+    rig.antenna.medium = replace(Medium(), answer_s=1.0, answer_per_hop_s=0.2)
+    rig.know_neighbour(0)
+    rig.mesh.control.may_use(0)
+    for wait_s, sent in ((2.9, 1), (0.2, 0), (0.0, 1)):
+        rig.mesh.control.send_heartbeat(0)
+        assert len(rig.sent(HEARTBEAT)) == sent
+        rig.wait(wait_s)
 
 
 def test_becoming_connected_introduces_the_node_at_once():
@@ -375,6 +387,27 @@ def test_an_introduction_counts_for_one_heartbeat():
         rig.wait(0.1)
         rig.hear("00 02 04 01 01 01 00 04")
         rig.wait(0.5)
+
+
+def test_a_shortcut_without_an_answer_is_avoided_for_a_minute():
+    rig = Rig(timing=MeshTiming(check_period_s=1000.0))
+    rig.connect_through(2, hops=4)
+
+    def next_hop_after(shortcut):
+        rig.hear(shortcut)
+        rig.forget()
+        rig.mesh.control.send_heartbeat(0)
+        return rig.sent(HEARTBEAT)[0][3]
+
+    assert next_hop_after("03 03 03 01 fe 02 01") == 3
+    rig.wait(0.6)
+    assert rig.sent(HEARTBEAT) == [packet("01 01 04 02 00 01 00 00")]
+    rig.hear("00 02 04 01 01 01 00 04")
+    rig.wait(59.0)
+    assert next_hop_after("03 03 03 01 fe 02 01") == 2
+    rig.hear("00 02 04 01 01 01 00 04")
+    rig.wait(2.0)
+    assert next_hop_after("03 03 03 01 fe 02 01") == 3
 
 
 def test_a_shortcut_that_does_not_take_the_heartbeat_is_no_loss():

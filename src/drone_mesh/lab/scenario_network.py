@@ -1,0 +1,87 @@
+"""The network of a scenario: its nodes, at their places, on its medium."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drone_mesh.communication.repair.options import LostPlace, RepairOptions
+from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.communication.timing import MeshTiming
+from drone_mesh.inprocess import Network
+from drone_mesh.inprocess.positions import PositionErrors
+from drone_mesh.lab.places import StartPoint, draw_places
+from drone_mesh.lab.propagation import obstacles_of
+from drone_mesh.lab.scenario import Positions, Scenario
+from drone_mesh.lab.streams import Streams
+from drone_mesh.nrf24.emulator.links import IdealDisc, LinkModel, LogDistance, ScriptedLoss
+from drone_mesh.nrf24.settings import DEFAULT_RATE, data_rate
+
+_KEY = MeshKey(b"the key of a lab")
+
+
+def network_of(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> Network:
+    timing = MeshTiming(
+        check_period_s=scenario.timing.check_period_s,
+        connection_lost_after_s=scenario.timing.connection_lost_after_s,
+        send_attempts=scenario.timing.send_attempts,
+    )
+    network = Network(
+        seed=streams.number("mesh"),
+        timing=timing,
+        routing=scenario.routing,
+        max_distance_m=scenario.range_m,
+        **_options(scenario, streams, places),
+    )
+    grounded = streams.of("grounded")
+    for place in places:
+        if place.gateway:
+            network.add_gateway(place.node_id, place.x, place.y)
+        else:
+            is_grounded = grounded.random() < scenario.grounded_share
+            why = "on the ground" if is_grounded else ""
+            network.add_router(place.node_id, place.x, place.y, why_not_fly=why)
+    return network
+
+
+def places_of(scenario: Scenario, streams: Streams) -> list[StartPoint]:
+    obstacles = obstacles_of(scenario.obstacles) if scenario.obstacles.boxes else None
+    return draw_places(scenario.layout, scenario.range_m, streams.of("layout"), obstacles)
+
+
+def _options(scenario: Scenario, streams: Streams, places: list[StartPoint]) -> dict[str, Any]:
+    """The arguments that differ from the network's defaults."""
+    options: dict[str, Any] = {
+        "repair": scenario.repair,
+        "repair_options": RepairOptions(
+            clearance_m=scenario.repair_options.clearance_m,
+            range_m=scenario.range_m,
+            lost_place=LostPlace(scenario.repair_options.lost_place),
+        ),
+    }
+    if scenario.key:
+        gateways = {place.node_id for place in places if place.gateway}
+        options["key"] = lambda node: _KEY if node in gateways else _KEY.for_node(node)
+    if scenario.positions != Positions():
+        options["positions"] = PositionErrors(**scenario.positions.model_dump())
+    if scenario.radio.kind == "disc":
+        options["delay_s"] = scenario.radio.delay_s
+        options["jitter_s"] = scenario.radio.jitter_s
+    else:
+        rate = scenario.radio.rate or DEFAULT_RATE
+        options.update(radio=scenario.radio.kind, rate=rate, links=_links(scenario, rate, streams))
+        part = scenario.obstacles
+        options.update(fading=part.fading, rician_k_db=part.rician_k_db)
+    return options
+
+
+def _links(scenario: Scenario, rate: str, streams: Streams) -> LinkModel:
+    """Which frames arrive undamaged if no other frame is on the air."""
+    links: LinkModel = IdealDisc(scenario.range_m)
+    if scenario.radio.links == "distance" or scenario.obstacles.fading != "none":
+        links = LogDistance.with_edge_at(
+            scenario.range_m, streams.of("links"), bits_per_s=data_rate(rate).value
+        )
+    if scenario.radio.loss:
+        rng = streams.of("frames")
+        return ScriptedLoss(links, lambda _hop: rng.random() < scenario.radio.loss)
+    return links
