@@ -133,6 +133,24 @@ def test_a_search_is_passed_on_once_by_each_node():
     assert rig.broadcasts() == [packet("00 01 44 fe fe 05 20 00")]
 
 
+def test_a_search_that_comes_again_after_ten_seconds_is_another_one():
+    rig = router_rig()
+    for wait_s, passed_on in ((0.0, 1), (9.9, 0), (0.2, 1)):
+        rig.wait(wait_s)
+        rig.hear("00 03 44 01 fe 05 20 00")
+        assert len(searches(rig)) == passed_on
+
+
+def test_a_gateway_searches_three_times_a_second_at_most():
+    rig = gateway_rig()
+    search = rig.mesh.control.search
+    assert search(5)
+    rig.wait(0.25)
+    assert not search(6)
+    rig.wait(0.1)
+    assert search(6)
+
+
 @pytest.mark.parametrize("other", ["05 21 00", "06 20 00"])
 def test_another_number_or_another_node_is_another_search(other):
     rig = router_rig()
