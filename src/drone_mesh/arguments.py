@@ -20,6 +20,11 @@ def is_whole(text: str) -> bool:
     return _WHOLE.fullmatch(text) is not None
 
 
+def is_up_to(text: str, most: int) -> bool:
+    """Whether the text is a whole number 0..`most`, without a sign."""
+    return is_whole(text) and text[0] != "-" and int(text) <= most
+
+
 def is_decimal(text: str) -> bool:
     """Whether the text is a number in decimal digits, also with an exponent."""
     return _DECIMAL.fullmatch(text) is not None

@@ -223,10 +223,11 @@ class PacketAntenna(IWirelessCommunication):
     def _receive(self) -> None:
         show_s = self._runtime.now_s() + self._debug_period_s
         while not self._ending:
-            info = self._info
-            if info is not None and self._runtime.now_s() >= show_s:
-                show_s += self._debug_period_s
-                self._show(info)
+            info, late_s = self._info, self._runtime.now_s() - show_s
+            if late_s >= 0.0:
+                show_s += self._debug_period_s * (late_s // self._debug_period_s + 1.0)
+                if info is not None:
+                    self._show(info)
             for received in self._radio.receive(RECEIVE_TIMEOUT_S):
                 self._hand_on(received)
             wanted = self._runtime.now_s() < self._power_until_s

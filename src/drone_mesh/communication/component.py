@@ -62,6 +62,11 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self._antenna.debugging_mode(self, False)
         self._antenna.stop_antenna()
 
+    def switch_debug(self) -> None:
+        """Start or stop displaying this node."""
+        self._debug = not self._debug
+        self._antenna.debugging_mode(self, self._debug)
+
     @property
     def deadlines(self) -> Deadlines:
         """What is due when. A host of many nodes reads its `next_s`: faster than `next_tick_s`."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
+from drone_mesh.arguments import is_up_to
 from drone_mesh.communication.data.packets import MAX_DATA_PORT
 from drone_mesh.communication.data.ticket import TO_ALL
 from drone_mesh.communication.interfaces import MAX_NODE_ID
@@ -114,10 +115,10 @@ class Topics:
         """The destination of a message on a `tx` topic; None if the topic is invalid."""
         node, _tx, rest = topic[len(self._prefix) + 1 :].partition("/tx")
         port = rest[1:] or "0"
-        if not (port.isascii() and port.isdigit() and int(port) <= MAX_DATA_PORT):
+        if not is_up_to(port, MAX_DATA_PORT):
             return None
         if node == "all":
             return Destination(TO_ALL, int(port))
-        if not (node.isascii() and node.isdigit() and int(node) <= MAX_NODE_ID):
+        if not is_up_to(node, MAX_NODE_ID):
             return None
         return Destination(int(node), int(port))

@@ -6,6 +6,7 @@ import argparse
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from drone_mesh.arguments import is_up_to
 from drone_mesh.errors import ConfigurationError
 from drone_mesh.web import LOOPBACK
 from drone_mesh.web.listening import MAX_PORT
@@ -59,6 +60,6 @@ def _address(option: str, text: str | None) -> AirAddress | None:
     if text is None:
         return None
     host, _, port = text.rpartition(":")
-    if not (port.isascii() and port.isdigit() and int(port) <= MAX_PORT):
+    if not is_up_to(port, MAX_PORT):
         raise ConfigurationError(f"invalid {option} {text!r}: use [HOST:]PORT, as in 9100")
     return AirAddress(host.strip("[]") or LOOPBACK, int(port))

@@ -8,6 +8,7 @@ import random
 import time
 from typing import Any, Callable
 
+from drone_mesh.channel.antenna import DEBUG_PERIOD_S
 from drone_mesh.communication.assembly import assemble_component
 from drone_mesh.communication.gateway import MeshnetworkGateway
 from drone_mesh.communication.interfaces import IInternetConnection, IWirelessCommunication
@@ -58,7 +59,7 @@ class RadioNode:
         self._executor = MeshExecutor(time.monotonic, False, name=f"mesh {radio.node_id}")
         self._slot = self._executor.slot()
         self._antenna = NRF24HighLevelInterface(
-            radio, self._slot.submit, debug_period_s=options.debug_period_s
+            radio, self._slot.submit, debug_period_s=options.debug_period_s or DEBUG_PERIOD_S
         )
         self._origin = options.flight.origin
         self.events = EventHistory() if events is None else events
@@ -115,6 +116,10 @@ class RadioNode:
             "uptime_s": round(now_s - self._started_s, 2),
             "events": self.events.since(after, self._started_s),
         }
+
+    def switch_debug(self) -> None:
+        """Begin or end the lines of --debug. Any thread."""
+        self._slot.submit(lambda _now_s: self.component.switch_debug())
 
     def check_others(self) -> None:
         """Have a gateway report changes at its routers; to be called periodically."""

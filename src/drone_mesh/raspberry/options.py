@@ -277,7 +277,8 @@ def _parser(program: str, description: str) -> argparse.ArgumentParser:
         default=DEBUG_PERIOD_S,
         metavar="SECONDS",
         help="period of the log line with what a simulated node publishes as NodeDebugInfo, and "
-        "the use of the channel; 0 for none (default: %(default)g)",
+        "the use of the channel; 0 for none (default: %(default)g); the signal USR1 ends and "
+        "begins them",
     )
     parser.add_argument(
         "--log-level",

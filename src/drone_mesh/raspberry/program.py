@@ -80,6 +80,23 @@ def _signals() -> Iterator[StopRequest]:
                 signal.signal(number, handler)
 
 
+class _DebugSwitch:
+    """The signal USR1 begins and ends the lines of --debug, within POLL_PERIOD_S."""
+
+    def __init__(self) -> None:
+        self.pressed = False
+
+    def __enter__(self) -> _DebugSwitch:
+        self._before = signal.signal(signal.SIGUSR1, self._press)
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        signal.signal(signal.SIGUSR1, self._before)
+
+    def _press(self, _number: int, _frame: FrameType | None) -> None:
+        self.pressed = not self.pressed
+
+
 def _run(options: Options, request: StopRequest) -> None:
     with contextlib.ExitStack() as stack:
         move_radios: MoveRadio = _stay
@@ -115,6 +132,7 @@ def _run(options: Options, request: StopRequest) -> None:
             stack.callback(record.close)
         for node in nodes:
             node.start()
+        switch = stack.enter_context(_DebugSwitch())
         manager = ServiceManager()
         manager.ready()
         watch = _Watch(nodes, options, manager)
@@ -124,6 +142,9 @@ def _run(options: Options, request: StopRequest) -> None:
                 record.check(time.monotonic())
             for node in nodes:
                 node.check_others()
+                if switch.pressed:
+                    node.switch_debug()
+            switch.pressed = False
             move_radios()
         manager.stopping()
         _log.info("stopping")

@@ -38,6 +38,17 @@ def test_debugging_stays_off_unless_it_is_asked_for():
     assert [call[0] for call in rig.antenna.calls] == ["start_antenna", "stop_antenna"]
 
 
+def test_debugging_is_switched_while_the_node_runs():
+    rig = Rig()
+    rig.antenna.calls.clear()
+    rig.mesh.switch_debug()
+    rig.mesh.switch_debug()
+    assert rig.antenna.calls == [
+        ("debugging_mode", rig.mesh, False),
+        ("debugging_mode", rig.mesh, True),
+    ]
+
+
 def test_a_router_introduces_itself_without_a_gateway_and_a_gateway_with_itself():
     for gateway, introduction in ((False, "03 03 03 fe fe ff 00"), (True, "03 03 03 fe fe 00 01")):
         rig = Rig(node_id=3, gateway=gateway)

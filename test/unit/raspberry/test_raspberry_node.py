@@ -104,6 +104,26 @@ def test_a_signal_ends_a_node_that_listens_and_powers_its_radio_down(wired, numb
     assert signal.getsignal(number) is handler
 
 
+def test_the_signal_usr1_switches_the_lines_of_debug(wired, monkeypatch):
+    pressed, switched = [], []
+    monkeypatch.setattr(program.RadioNode, "switch_debug", lambda node: switched.append(node))
+
+    def is_switched():
+        if wired.state is State.RX and not pressed:  # it runs
+            pressed.append(True)
+            os.kill(os.getpid(), signal.SIGUSR1)
+        return switched
+
+    handler = signal.getsignal(signal.SIGUSR1)
+    signal.signal(signal.SIGUSR1, signal.SIG_IGN)
+    try:
+        assert run_until(is_switched, parse_router, "--id 7 --spi 0.1 --ce 5 --irq 6") == 0
+        assert signal.getsignal(signal.SIGUSR1) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGUSR1, handler)
+    assert len(switched) == 1
+
+
 def test_without_a_chip_it_ends_with_one_line_and_releases_everything(wired, capfd):
     wired.faults.miso_stuck_at = 0x00
     threads = set(threading.enumerate())
