@@ -190,6 +190,17 @@ class TwoSimulationsTest(unittest.TestCase):
             lines = [line for line in refused.stderr.splitlines() if "pybullet" not in line]
             self.assertEqual(len(lines), 1, refused.stderr)
             self.assertIn(f"{program}: /site_a/{node} already runs on this master", lines[0])
+        launched = subprocess.run(
+            ["roslaunch", "drone_mesh", "factory.launch", "namespace:=site_a"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            timeout=WALL_LIMIT_S,
+            check=False,
+            text=True,
+        )
+        lines = [line for line in launched.stderr.splitlines() if "already runs" in line]
+        self.assertEqual(len(lines), 1, launched.stderr)
+        self.assertIn("/site_a/DroneFactory already runs", lines[0])
         self.assertEqual(pid_of("/site_a/DroneFactory"), pid)
 
 

@@ -19,6 +19,7 @@ from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.stopping import quiet_on_closed_pipe
 
+SPEAKER_VARIABLE = "DRONE_MESH_SPEAKER"  # the node of a launch file that says why it cannot start
 ANSWER_TIMEOUT_S = 5.0  # wall; our choice: a node that is silent for longer is dead
 FAILED = 2  # exit code: the tool could not do its work; 1 means that it did, with a bad result
 
@@ -64,21 +65,28 @@ def _require_free_name(name: str) -> None:
     """Raises NameTaken: the master would end the node that has this name."""
     given = [word[len("__name:=") :] for word in sys.argv if word.startswith("__name:=")]
     full = rospy.resolve_name(given[-1] if given else name)
+    if _is_taken(full):
+        speaker = os.environ.get(SPEAKER_VARIABLE)
+        if speaker and _is_taken(rospy.resolve_name(speaker)):
+            sys.exit(FAILED)
+        raise NameTaken(
+            f"{full} already runs on this master: stop it, give this one a namespace "
+            "(namespace:=site_a for factory.launch, __ns:=site_a for rosrun), or set "
+            "ROS_MASTER_URI to another master"
+        )
+
+
+def _is_taken(full: str) -> bool:
     before_s = socket.getdefaulttimeout()
     socket.setdefaulttimeout(ANSWER_TIMEOUT_S)
     try:
         uri = rosgraph.Master(full).lookupNode(full)
         answer = xmlrpc.client.ServerProxy(uri).getName(full)  # code, text, name
     except (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException):
-        return  # it never ran, or it died
+        return False  # it never ran, or it died
     finally:
         socket.setdefaulttimeout(before_s)
-    if isinstance(answer, list) and full in answer:
-        raise NameTaken(
-            f"{full} already runs on this master: stop it, give this one a namespace "
-            "(namespace:=site_a for factory.launch, __ns:=site_a for rosrun), or set "
-            "ROS_MASTER_URI to another master"
-        )
+    return isinstance(answer, list) and full in answer
 
 
 def start_node(about: str | None, name: str, *, disable_signals: bool = False) -> None:
