@@ -145,48 +145,102 @@ def test_mavsdk_uploads_a_mission_that_the_vehicle_flies(mavsdk_ground_station) 
 # MAVProxy, the ground station ----------------------------------------------------------------
 
 
+class MavProxy:
+    """MAVProxy in a process of its own, with these modules."""
+
+    def __init__(self, port: int, modules: str, folder: Path) -> None:
+        program = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent))
+        assert program is not None
+        self._process = subprocess.Popen(
+            [
+                sys.executable,
+                program,
+                f"--master=udpout:127.0.0.1:{port}",
+                f"--default-modules={modules}",
+                f"--state-basedir={folder}",
+            ],
+            env={**os.environ, "HOME": str(folder), "PYTHONUNBUFFERED": "1"},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            cwd=folder,
+        )
+        self._said: list[str] = []
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self) -> None:
+        self._said.extend(iter(lambda: self._process.stdout.read(1), ""))
+
+    @property
+    def said(self) -> str:
+        return "".join(self._said)
+
+    def command(self, line: str, effect: Callable[[], bool]) -> None:
+        self._process.stdin.write(f"{line}\n")
+        self._process.stdin.flush()
+        wait_for(f"{line}; {self.said}", effect)
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._reader.join()
+        self._process.stdin.close()
+        self._process.stdout.close()
+
+
 def test_mavproxy_guides_arms_takes_off_and_reads_the_parameters(tmp_path: Path) -> None:
     server, vehicle, port = serve(ARDUPILOT)
-    program = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent))
-    assert program is not None
-    proxy = subprocess.Popen(
-        [
-            sys.executable,
-            program,
-            f"--master=udpout:127.0.0.1:{port}",
-            "--default-modules=mode,arm,cmdlong,param",
-            f"--state-basedir={tmp_path}",
-        ],
-        env={**os.environ, "HOME": str(tmp_path), "PYTHONUNBUFFERED": "1"},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        cwd=tmp_path,
-    )
-    said: list[str] = []
-    reader = threading.Thread(target=lambda: said.extend(iter(lambda: proxy.stdout.read(1), "")))
-    reader.start()
-
-    def command(line: str, effect: Callable[[], bool]) -> None:
-        proxy.stdin.write(f"{line}\n")
-        proxy.stdin.flush()
-        wait_for(f"{line}; {''.join(said)}", effect)
-
+    proxy = MavProxy(port, "mode,arm,cmdlong,param", tmp_path)
     try:
-        wait_for("it read the mode", lambda: "Mode LOITER" in "".join(said))
-        wait_for("it read the parameters", lambda: "Received 7 parameters" in "".join(said))
-        command("mode GUIDED", lambda: vehicle.mode is Mode.FOLLOW)
-        command("arm throttle", lambda: vehicle.body.armed)
-        command("takeoff 5", lambda: vehicle.body.place.height > 4.9)
-        wait_for("it read the new mode", lambda: "Mode GUIDED" in "".join(said))
-        assert "ARMED" in "".join(said)
+        wait_for("it read the mode", lambda: "Mode LOITER" in proxy.said)
+        wait_for("it read the parameters", lambda: "Received 7 parameters" in proxy.said)
+        proxy.command("mode GUIDED", lambda: vehicle.mode is Mode.FOLLOW)
+        proxy.command("arm throttle", lambda: vehicle.body.armed)
+        proxy.command("takeoff 5", lambda: vehicle.body.place.height > 4.9)
+        wait_for("it read the new mode", lambda: "Mode GUIDED" in proxy.said)
+        assert "ARMED" in proxy.said
     finally:
-        proxy.kill()
-        proxy.wait()
-        reader.join()
-        proxy.stdin.close()
-        proxy.stdout.close()
+        proxy.close()
+        server.close()
+
+
+def test_mavproxy_uploads_a_mission_that_the_vehicle_flies_and_downloads_it(
+    tmp_path: Path,
+) -> None:
+    server, vehicle, port = serve(ARDUPILOT)
+    proxy = MavProxy(port, "mode,arm,cmdlong,wp", tmp_path)
+    home = ORIGIN.to_earth(Location(0.0, 0.0, 0.0))
+    ends = [ORIGIN.to_earth(Location(20.0, 0.0, 10.0)), ORIGIN.to_earth(Location(20.0, 15.0, 12.0))]
+    # QGroundControl's format: number, current, frame (3: height above home), command, 4 parameters,
+    # place, whether to go on. Item 0 is home.
+    way_points = [(0, 16, home, home.altitude_m), (3, 22, ends[0], 10.0), (3, 16, ends[1], 12.0)]
+    lines = [
+        f"{number}\t{int(number == 0)}\t{frame}\t{command}\t0\t0\t0\t0\t"
+        f"{place.latitude_deg:.8f}\t{place.longitude_deg:.8f}\t{height:.6f}\t1"
+        for number, (frame, command, place, height) in enumerate(way_points)
+    ]
+    (tmp_path / "plan.txt").write_text("\n".join(["QGC WPL 110", *lines, ""]))
+    saved = tmp_path / "saved.txt"
+    try:
+        wait_for("it read the mode", lambda: "Mode LOITER" in proxy.said)
+        proxy.command("wp load plan.txt", lambda: "Loaded 3 waypoints" in proxy.said)
+        proxy.command("wp list", lambda: "Saved 3 waypoints" in proxy.said)
+        proxy.command("wp save saved.txt", saved.exists)
+        again = [line.split("\t") for line in saved.read_text().splitlines()[1:]]
+        assert [item[2:4] for item in again] == [["0", "16"], ["3", "22"], ["3", "16"]]
+        for item, end in zip(again[1:], ends):
+            assert float(item[8]) == pytest.approx(end.latitude_deg, abs=1e-6)
+            assert float(item[9]) == pytest.approx(end.longitude_deg, abs=1e-6)
+        proxy.command("mode GUIDED", lambda: vehicle.mode is Mode.FOLLOW)
+        proxy.command("arm throttle", lambda: vehicle.body.armed)
+        proxy.command("takeoff 5", lambda: vehicle.body.place.height > 4.9)
+        proxy.command("mode AUTO", lambda: "Mode AUTO" in proxy.said)
+        there = Location(20.0, 15.0, 12.0)
+        wait_for("it is at the end", lambda: vehicle.body.place.distance_m(there) < 0.2)
+    finally:
+        proxy.close()
         server.close()
 
 
