@@ -315,6 +315,7 @@ class NodeState(Message, NodeStatus):
     emergency_in: float
     battery: float
     crashed: bool
+    shares_id: bool
     why_not_fly: str
     repair: str
     def __init__(
@@ -355,6 +356,7 @@ class NodeState(Message, NodeStatus):
         emergency_in: float = ...,
         battery: float = ...,
         crashed: bool = ...,
+        shares_id: bool = ...,
         why_not_fly: str = ...,
         repair: str = ...,
     ) -> None: ...

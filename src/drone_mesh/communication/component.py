@@ -8,6 +8,7 @@ getters of IMeshDebugInfo.
 from __future__ import annotations
 
 import abc
+import math
 import struct
 
 from drone_mesh.communication import messages
@@ -90,6 +91,9 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             self.data.on_due()
         if now_s >= deadlines.get(Due.NODE_REPORT):
             self._reporter.on_due()
+        if now_s >= deadlines.get(Due.OWN_ID):
+            deadlines.set(Due.OWN_ID, math.inf)
+            self._antenna.switch_power(True)
         due_s = deadlines.get(Due.CHECK)
         if now_s >= due_s:
             period_s = self._timing.check_period_s
@@ -112,7 +116,7 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
             return
         me = self._node_id
         if from_ == me:
-            self.complaints.own_id_heard(now_s)
+            self._own_id_heard(kind, payload, now_s)
             return
         if creator > MAX_NODE_ID or from_ > MAX_NODE_ID or forward > BROADCAST:
             self._drop("a packet with invalid ids", payload)
@@ -154,6 +158,16 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         else:
             self._receivers[kind](payload, creator, from_)
 
+    def _own_id_heard(self, kind: int, payload: bytes, now_s: float) -> None:
+        """Another radio uses this node's id: name it, show that it is taken, or give way."""
+        self.complaints.own_id_heard(now_s)
+        own_id = self._own_id
+        if not self._served and own_id.was_heard and self.control.says_connected(kind, payload):
+            self._deadlines.set(Due.OWN_ID, own_id.give_way(now_s))
+            self._antenna.switch_power(False)
+        elif own_id.heard(now_s):
+            self.control.introduce()
+
     def on_delivered(self, neighbour: int, tries: int, now_s: float) -> None:
         """A neighbour has received a packet; the routes learn from this."""
         self._deadlines.now_s = now_s
@@ -178,6 +192,11 @@ class MeshnetworkComponent(MeshNode, IMeshNetwork):
         self.control.on_registered()
 
     # Implemented by router and gateway -------------------------------------------------------
+
+    @property
+    @abc.abstractmethod
+    def _served(self) -> bool:
+        """Whether the mesh knows this node, so that another one with its id gives way to it."""
 
     def _begin(self) -> None:
         """Start this kind of node, before routing starts."""

@@ -112,6 +112,10 @@ class IControlPlane(abc.ABC):
         """A packet of this node came back through `from_`."""
 
     @abc.abstractmethod
+    def says_connected(self, kind: int, payload: bytes) -> bool:
+        """Whether it is the introduction of a node that a gateway answers."""
+
+    @abc.abstractmethod
     def on_delivered(self, neighbour: int, tries: int) -> None:
         """A neighbour received a queued packet after `tries` transmissions."""
 

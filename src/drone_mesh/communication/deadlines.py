@@ -20,6 +20,7 @@ class Due(enum.IntEnum):
     DATA = 8  # users' messages
     NODE_REPORT = 9  # the next report to the gateway
     GOAL = 10  # repeats a drone's goal after take-off
+    OWN_ID = 11  # the end of the time in which it gives way to another radio with its id
 
 
 class Deadlines:

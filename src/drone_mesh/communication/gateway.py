@@ -189,6 +189,11 @@ class MeshnetworkGateway(MeshnetworkComponent, IGatewayCommands):
     def _begin(self) -> None:
         self._internet.connect(self)
 
+    @property
+    def _served(self) -> bool:
+        """Always true: a gateway is looked for as soon as it starts."""
+        return True
+
     def _antenna_is_off(self) -> None:
         """Nothing changes: without an antenna it is still a gateway."""
 

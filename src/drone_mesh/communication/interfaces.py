@@ -73,6 +73,10 @@ class IMeshDebugInfo(abc.ABC):
         """Hops to the preferred gateway; 0 for a gateway with internet, 255 while unknown."""
 
     @abc.abstractmethod
+    def get_shares_id(self) -> bool:
+        """Whether another radio with this node's id was heard lately."""
+
+    @abc.abstractmethod
     def get_last_good_known_location_id(self) -> int:
         """Id of the node whose place this one would fly to, or NO_ROUTE."""
 
@@ -189,6 +193,9 @@ class IWirelessCommunication(abc.ABC):
     @abc.abstractmethod
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         """Start or stop displaying `info` together with the antenna's own state."""
+
+    def switch_power(self, on: bool) -> None:  # noqa: B027 (a medium may know each id only once)
+        """Switch it off or on, and inform the mesh."""
 
     @abc.abstractmethod
     def on(self) -> bool:

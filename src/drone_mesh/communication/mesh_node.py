@@ -35,6 +35,7 @@ from drone_mesh.communication.medium import ChannelUse
 from drone_mesh.communication.neighbours import Neighbours
 from drone_mesh.communication.observer import MeshObserver, Reporter, ignore_events
 from drone_mesh.communication.orders.intake import OrderIntake
+from drone_mesh.communication.own_id import OwnId
 from drone_mesh.communication.packet_types import DATA_TYPES
 from drone_mesh.communication.parts import NodeBasics, NodeParts
 from drone_mesh.communication.places import KnownPlaces
@@ -95,6 +96,7 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         )
         self._report = Reporter(node_id, self._deadlines, observer)
         self.complaints = Complaints(node_id)
+        self._own_id = OwnId(rng)
         self.places = KnownPlaces()
         self._frame = CommonFrame(engine.frame_digest())
         self._pilot = Pilot(engine, self._deadlines, self.complaints)
@@ -170,6 +172,10 @@ class MeshNode(IMeshDebugInfo, IControlHost):
         if node in (self._node_id, NO_ROUTE):
             return node
         return self.control.routes.get_direction_to_node(node)
+
+    def get_shares_id(self) -> bool:
+        """Whether another radio with this node's id was heard lately."""
+        return self._own_id.is_shared(self._deadlines.now_s)
 
     def get_repair_status(self) -> RepairStatus:
         """What the node does about a lost connection, and why."""

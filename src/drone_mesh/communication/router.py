@@ -98,6 +98,7 @@ class MeshnetworkRouter(MeshnetworkComponent):
         return self._repair.may_connect(node, know_gateway)
 
     def on_connected(self) -> None:  # noqa: D102
+        self._own_id.connected_s = min(self._own_id.connected_s, self._deadlines.now_s)
         self.places.connected_here(self._pilot.place(), self.control.hops)
         self._repair.on_connected()
 
@@ -108,6 +109,11 @@ class MeshnetworkRouter(MeshnetworkComponent):
         self._repair.on_neighbour_lost(node)
 
     # Packets ---------------------------------------------------------------------------------
+
+    @property
+    def _served(self) -> bool:
+        connected_for_s = self._deadlines.now_s - self._own_id.connected_s
+        return connected_for_s > self._timing.check_period_s
 
     def _antenna_is_off(self) -> None:
         self._repair.on_antenna_off()

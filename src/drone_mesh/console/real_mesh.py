@@ -72,6 +72,7 @@ def _node(entry: Mapping[str, Any], gateway: int) -> NodeStatus:
         total_messages=int(entry.get("messages_sent", 0)),
         tries=float(entry.get("tries", 0.0)),
         why_not_fly=str(entry.get("why_not_fly", "")),
+        shares_id=bool(entry.get("shares_id", False)),
     )
     if entry.get("battery_percent") is not None:
         node.battery = float(entry["battery_percent"])

@@ -153,6 +153,7 @@ local f = {
   battery = ProtoField.uint8("drone_mesh.battery", "Battery (%)"),
   flying = ProtoField.bool("drone_mesh.flying", "In flight", 8, nil, 0x01),
   can_fly = ProtoField.bool("drone_mesh.can_fly", "Can fly", 8, nil, 0x02),
+  shares_id = ProtoField.bool("drone_mesh.shares_id", "Another radio uses its id", 8, nil, 0x04),
   tries = ProtoField.uint8("drone_mesh.tries", "Tries per packet (0.1)"),
   data = ProtoField.bytes("drone_mesh.data", "Data"),
   rest = ProtoField.bytes("drone_mesh.rest", "Behind the body"),
@@ -163,7 +164,7 @@ local shown_as = {
   hopsUntilGateway = { f.hops }, knowGateway = { f.know_gateway }, preferredGateway = { f.gateway },
   timeSincePosix = { f.time }, nextHop = { f.next_hop }, part = { f.last_part, f.part },
   latitudeSteps = { f.place }, longitudeSteps = { f.place }, heightSteps = { f.place },
-  flags = { f.flying, f.can_fly },
+  flags = { f.flying, f.can_fly, f.shares_id },
 }
 table.insert(bodies[6], { "order", "uint16", 2 }) -- behind the body of a MOVE_TO_LOCATION
 for _, body in pairs(bodies) do

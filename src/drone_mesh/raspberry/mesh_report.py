@@ -60,6 +60,7 @@ def _gateway(
         "flying": bool(engine.is_flying()),
         "why_not_fly": engine.why_not_fly(),
         "tries": gateway.get_channel_use().tries,
+        "shares_id": gateway.get_shares_id(),
         "messages_sent": gateway.get_total_message_sent(),
         **_place(place, origin),
     }
@@ -98,6 +99,7 @@ def _node(
         "flying": report.flying,
         "why_not_fly": reported.why_not_fly,
         "tries": report.tries,
+        "shares_id": report.shares_id,
         **_place(report.place, origin),
     }
 

@@ -41,6 +41,7 @@ def node_status(
         "connected": component.get_connected_to_gateway(),
         "gateway": _known(component.get_preferred_gateway()),
         "hops": _known(component.get_hops_from_gateway_away()),
+        "another_radio_uses_its_id": component.get_shares_id(),
         "known_nodes": component.get_router_tech_table_size(),
         "messages_sent": component.get_total_message_sent(),
         "steps_back_to": _known(component.get_last_good_known_location_id()),

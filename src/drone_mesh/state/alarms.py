@@ -9,7 +9,7 @@ from typing import Any, Iterable
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition, condition_of
-from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
+from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus, another_radio
 
 LOW_BATTERY_PERCENT = 20.0  # our choice
 _ORDER_FAILURES = {  # the words of the alarm; the reason follows
@@ -120,6 +120,8 @@ class AlarmBook:
         found = []
         if node.crashed:
             found.append("crashed")
+        if node.shares_id:
+            found.append(another_radio(node.id))
         if node.battery <= LOW_BATTERY_PERCENT:  # false if it is not known
             found.append("low battery")
         is_lost = condition is Condition.DISCONNECTED and node.role == Role.ROUTER

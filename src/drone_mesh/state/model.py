@@ -60,6 +60,7 @@ class NodeStatus:
     emergency_in: float = math.inf  # simulated s
     battery: float = math.nan  # percent; NaN: none, or unknown
     crashed: bool = False
+    shares_id: bool = False  # another radio with its id was heard lately
     why_not_fly: str = ""  # why its drone cannot fly now; empty: it can, or unknown
     repair: str = ""  # what the node does about a lost connection, and why; empty: nothing
 
@@ -130,6 +131,11 @@ def data_in_words(node: NodeStatus) -> str:
         f"{node.data_received} received ({node.data_bytes_received} bytes), "
         f"{node.data_queued} waiting, {node.data_given_up} given up"
     )
+
+
+def another_radio(node: int) -> str:
+    """What is wrong if a node shares its id."""
+    return f"another radio uses id {node}"
 
 
 def position_is_known(node: NodeStatus) -> bool:

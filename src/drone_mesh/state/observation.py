@@ -35,6 +35,7 @@ def describe_component(
     status.fallback = component.get_last_good_known_location_id()
     fallback_age_s = now_s - component.get_last_good_known_location_seen_s()
     status.fallback_age = math.nan if status.fallback == NO_ROUTE else fallback_age_s
+    status.shares_id = component.get_shares_id()
     status.known_nodes = component.get_router_tech_table_size()
     status.total_messages = component.get_total_message_sent()
     use = component.get_channel_use()

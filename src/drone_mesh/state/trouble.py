@@ -9,7 +9,7 @@ from typing import Sequence
 
 from drone_mesh.drone.roles import Role
 from drone_mesh.state.condition import Condition, condition_of
-from drone_mesh.state.model import NodeStatus
+from drone_mesh.state.model import NodeStatus, another_radio
 from drone_mesh.state.routes import reaches_gateway
 
 
@@ -51,12 +51,17 @@ def find_trouble(nodes: Sequence[NodeStatus]) -> list[Trouble]:
             )
         elif condition is Condition.OFF:
             text = "battery empty" if node.battery == 0.0 else "switched off"
+            text = f"{another_radio(node.id)}: off until it is gone" if node.shares_id else text
             troubles.append(Trouble(node.id, Severity.WARN, text))
         elif not node.connected:
             text = "flying" if condition is Condition.FLYING else "not connected to a gateway"
             if node.crashed:
                 text = f"crashed, {text}"
+            if node.shares_id:
+                text = f"{another_radio(node.id)}, {text}"
             troubles.append(Trouble(node.id, Severity.ERROR, text))
+        elif node.shares_id:
+            troubles.append(Trouble(node.id, Severity.WARN, another_radio(node.id)))
         elif node.crashed:
             troubles.append(Trouble(node.id, Severity.WARN, "crashed"))
         elif node.role == Role.ROUTER and not reaches_gateway(node.route, by_id):

@@ -38,6 +38,7 @@ class RecordingAntenna(IWirelessCommunication):
         self.taken = []
         self.tried = []
         self.broadcasts = []
+        self.switched = []
         self.calls = []
         self.dead = set()
         self.losing = 0
@@ -69,6 +70,9 @@ class RecordingAntenna(IWirelessCommunication):
 
     def debugging_mode(self, info, on):
         self.calls.append(("debugging_mode", info, on))
+
+    def switch_power(self, on):
+        self.switched.append(on)
 
     def on(self):
         return self.powered

@@ -22,7 +22,6 @@ BAD = {
     "creator 255": packet("ff 02 03 01 fe"),
     "from 254": packet("02 fe 03 01 fe"),
     "from 255": packet("02 ff 03 01 fe"),
-    "from myself": packet("02 01 03 01 fe"),
     "forward 255": packet("02 02 03 01 ff"),
     "to another node": packet("02 02 03 03 fe"),
     "to 254": packet("02 02 03 fe fe"),
@@ -288,14 +287,34 @@ def test_a_packet_that_it_made_itself_is_not_forwarded_and_its_entry_forgotten()
     assert rig.routing.get_set_of_children() == {2, 3}
 
 
-def test_another_radio_with_its_id_is_named(caplog):
+def test_another_radio_with_its_id_is_named_and_shown_that_the_id_is_in_use(caplog):
     rig = Rig()
+    rig.connect_to_gateway()
+    rig.wait(11.0)
     caplog.clear()
-    rig.hear("01 01 03 01 fe ff 00")
+    rig.antenna.broadcasts.clear()
+    for _ in range(5):
+        rig.hear("01 01 03 01 fe ff 00")
     assert [record.getMessage() for record in caplog.records] == [
         "node 1: another radio uses id 1: give each node its own (1 so far)"
     ]
-    assert rig.sent() == []
+    assert [payload[2] for payload in rig.broadcasts()] == [3, 3, 3]
+    assert rig.mesh.get_shares_id()
+    rig.wait(61.0)
+    assert not rig.mesh.get_shares_id()
+    assert rig.antenna.switched == []
+
+
+def test_a_router_that_has_just_come_is_off_while_a_connected_one_uses_its_id():
+    rig = Rig()
+    rig.hear("01 01 03 01 fe ff 00", "01 01 03 01 fe ff 00")
+    assert rig.antenna.switched == []
+    rig.hear("01 01 03 01 fe 02 01")
+    assert rig.antenna.switched == [False]
+    rig.wait(44.0)
+    assert rig.antenna.switched == [False]
+    rig.wait(2.0)
+    assert rig.antenna.switched == [False, True]
 
 
 @pytest.mark.parametrize("forged", ["01 02 80 01 09", "01 02 04 01 09 01 00 02", "01 02 06 01 09"])

@@ -207,6 +207,9 @@ class Info(IMeshDebugInfo):
     def get_hops_from_gateway_away(self):
         return 3
 
+    def get_shares_id(self):
+        return False
+
     def get_last_good_known_location_id(self):
         return 255
 

@@ -77,6 +77,14 @@ def test_of_the_failed_orders_of_a_drone_the_last_one_is_an_alarm():
     assert said(book) == [("refused an order: battery at 1 %", [4], False, False)]
 
 
+def test_another_radio_with_the_id_of_a_node_is_an_alarm():
+    book = AlarmBook()
+    book.update(state(1.0, well(1, shares_id=True)))
+    assert said(book) == [("another radio uses id 1", [1], False, False)]
+    book.update(state(70.0, well(1)))
+    assert said(book) == [("another radio uses id 1", [1], True, False)]
+
+
 def test_silent_and_crashed_nodes_are_alarms():
     book = AlarmBook()
     book.update(state(1.0, well(1, report_age=60.0), well(2, crashed=True)))

@@ -86,6 +86,14 @@ def test_a_crashed_drone_is_a_warning_while_its_node_works_and_an_error_when_it_
     assert condition_of(nodes[1]) is Condition.CRASHED
 
 
+def test_another_radio_with_the_id_of_a_node_is_named_whether_the_node_is_connected_or_not():
+    nodes = [GATEWAY, router(1, shares_id=True), router(2, shares_id=True, connected=False)]
+    assert [(t.node, t.severity, t.text) for t in find_trouble(nodes)] == [
+        (1, Severity.WARN, "another radio uses id 1"),
+        (2, Severity.ERROR, "another radio uses id 2, not connected to a gateway"),
+    ]
+
+
 def test_a_battery_is_named_when_it_is_low_and_when_it_is_empty():
     low = router(1, battery=18.0, why_not_fly="battery at 18 %")
     empty = router(2, battery=0.0, on=False)

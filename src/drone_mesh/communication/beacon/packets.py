@@ -6,7 +6,8 @@ import math
 import struct
 from typing import NamedTuple, Tuple
 
-from drone_mesh.communication.interfaces import NO_ROUTE
+from drone_mesh.communication.interfaces import MAX_NODE_ID, NO_ROUTE
+from drone_mesh.communication.messages import HEADER_BYTES
 from drone_mesh.drone.location import Location
 
 Velocity = Tuple[float, float, float]  # m/s: north, east, up, as in a Location
@@ -25,6 +26,7 @@ _PLACE = struct.Struct("<3H3b")
 _GATEWAY_PLACE = struct.Struct("<3H")
 _DIGEST = struct.Struct("<H")
 _HEAD = struct.Struct(f"<BBBBBB{ANCESTORS}s")  # what follows may be absent
+_GATEWAY_AT = HEADER_BYTES + 2
 _SEARCH = struct.Struct("<BHB")
 _FOUND = struct.Struct("<B")
 
@@ -171,6 +173,11 @@ class Beacon(NamedTuple):
             tuple(near),
             bool(interval & _OFFLINE),
         )
+
+
+def names_gateway(payload: bytes) -> bool:
+    """Whether the packet is a beacon of a connected node."""
+    return payload[_GATEWAY_AT] <= MAX_NODE_ID
 
 
 def newer(number: int, than: int) -> int:

@@ -6,7 +6,7 @@ import math
 
 from drone_mesh.communication import messages
 from drone_mesh.communication.beacon.own_motion import OwnMotion
-from drone_mesh.communication.beacon.packets import Beacon, Found, Motion, Search
+from drone_mesh.communication.beacon.packets import Beacon, Found, Motion, Search, names_gateway
 from drone_mesh.communication.beacon.routes import BeaconRoutes, Neighbour
 from drone_mesh.communication.beacon.search import HOPS_AROUND, MOST_HOPS, Searches
 from drone_mesh.communication.beacon.trickle import Trickle
@@ -357,6 +357,10 @@ class BeaconPlane(IControlPlane):
         """The courier sends it another way."""
         self._routes.now_s = self._deadlines.now_s
         self._routes.alive(from_)
+
+    def says_connected(self, kind: int, payload: bytes) -> bool:
+        """Whether it is the beacon of a connected node."""
+        return kind == MessageType.BEACON and names_gateway(payload)
 
     def on_delivered(self, neighbour: int, tries: int) -> None:
         """It is alive."""

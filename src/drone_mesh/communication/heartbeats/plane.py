@@ -16,6 +16,7 @@ from drone_mesh.communication.heartbeats.node_search import NodeSearch
 from drone_mesh.communication.heartbeats.parts import HeartbeatParts
 from drone_mesh.communication.interfaces import BROADCAST, NO_ROUTE
 from drone_mesh.communication.medium import Medium
+from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.parts import NodeBasics
 from drone_mesh.communication.routing.interfaces import IRoutingEssentials, IRoutingTechnique
 from drone_mesh.drone.location import Location
@@ -79,6 +80,10 @@ class HeartbeatPlane(IControlPlane, IRoutingEssentials):
     def own_came_back(self, from_: int) -> None:
         """It teaches no route except that `from_` is in reach."""
         self._technique.can_communicate_with_node(from_)
+
+    def says_connected(self, kind: int, payload: bytes) -> bool:
+        """Whether it is the PRESENT of a connected node."""
+        return kind == MessageType.PRESENT and messages.present_body(payload)[1]
 
     def on_delivered(self, neighbour: int, tries: int) -> None:
         """The routes learn from this."""

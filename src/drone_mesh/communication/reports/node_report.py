@@ -20,7 +20,7 @@ STEPS_PER_M = 5  # places are encoded in steps of 0.2 m: 5000 m fit into an int1
 UNKNOWN = 255  # in a field of one byte
 NO_PLACE = -(2**15)
 WORDS_BYTES = 13  # in one packet
-_FLYING, _CAN_FLY = 1, 2
+_FLYING, _CAN_FLY, _SHARES_ID = 1, 2, 4
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class NodeReport:
     flying: bool
     can_fly: bool
     tries: float  # per packet, to 0.1; 0: not known
+    shares_id: bool = False  # another radio uses its id
 
     def packet(self, creator: int, gateway: int) -> bytes:
         """The 32 bytes, from `creator` for `gateway`."""
@@ -53,7 +54,7 @@ class NodeReport:
             self.next_hop,
             *steps,
             UNKNOWN if self.battery_percent is None else self.battery_percent,
-            self.flying * _FLYING | self.can_fly * _CAN_FLY,
+            self.flying * _FLYING | self.can_fly * _CAN_FLY | self.shares_id * _SHARES_ID,
             min(UNKNOWN, round(self.tries * 10)),
         )
 
@@ -72,6 +73,7 @@ class NodeReport:
             bool(flags & _FLYING),
             bool(flags & _CAN_FLY),
             tries / 10,
+            bool(flags & _SHARES_ID),
         )
 
 

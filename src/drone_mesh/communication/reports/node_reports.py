@@ -56,6 +56,7 @@ class NodeReporter:
             flying=parts.pilot.goal is not None,
             can_fly=not why_not,
             tries=parts.antenna.channel_use().tries,
+            shares_id=mesh.get_shares_id(),
         )
         parts.delivery.send_own(report.packet(parts.node_id, gateway))
         self._send_words(why_not, gateway)

@@ -220,7 +220,7 @@ class HopSeal:
         if waiting is None or not self._is_proven(answer):
             return None
         nonce, epoch, count = _ANSWER.unpack_from(answer, messages.HEADER_BYTES)
-        if nonce != waiting.nonce:
+        if nonce != waiting.nonce or epoch == self._epoch:  # its own, thrown back at it
             return None
         del self._challenges[node]
         known = self._peers.get(node)

@@ -21,7 +21,7 @@ from drone_mesh.communication.interfaces import (
     IWirelessCommunication,
 )
 from drone_mesh.communication.medium import ChannelUse, Medium
-from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TYPE_AT
+from drone_mesh.communication.messages import CREATOR_AT, FORWARD_AT, TO_AT, TYPE_AT
 from drone_mesh.communication.packet_types import MessageType
 from drone_mesh.communication.seals.end_to_end import EndToEnd, NotProven, reserved_bytes
 from drone_mesh.communication.seals.keys import Keys
@@ -151,6 +151,9 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
     def debugging_mode(self, info: IMeshDebugInfo, on: bool) -> None:
         self._antenna.debugging_mode(info, on)
 
+    def switch_power(self, on: bool) -> None:
+        self._antenna.switch_power(on)
+
     def on(self) -> bool:
         return self._antenna.on()
 
@@ -213,9 +216,7 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
 
     def _not_opened(self, payload: bytes, now_s: float) -> None:
         from_, kind = messages.sender(payload), messages.type_of(payload)
-        if from_ == self._node_id:
-            self.complaints.own_id_heard(now_s)
-        elif from_ > MAX_NODE_ID:
+        if from_ > MAX_NODE_ID:
             self.complaints.dropped("a packet with invalid ids", payload, now_s)
         elif kind == _CHALLENGE:
             self._on_challenge(payload, from_, now_s)
@@ -223,7 +224,10 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
             if self._seal.answered(payload, now_s):
                 self._unopened.pop(from_, None)
         else:
-            self._complain(payload, from_, now_s)
+            if from_ == self._node_id and not self._seal.knows(from_, now_s):
+                self.complaints.own_id_heard(now_s)
+            else:
+                self._complain(payload, from_, now_s)
             self._challenge(from_, now_s)
 
     def _on_challenge(self, challenge: bytes, from_: int, now_s: float) -> None:
@@ -236,10 +240,10 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         if answer is None:
             self.complaints.counts["challenges without an answer"] += 1
             return
-        self._antenna.send_message_to(answer)
+        self._send(answer)
         if self._present:
             present = messages.readdressed(self._present, from_)
-            self._antenna.send_message_to(self._seal.seal(present))
+            self._send(self._seal.seal(present))
         if not self._seal.knows(from_, now_s):
             self._challenge(from_, now_s)
 
@@ -250,7 +254,14 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
         if self._antenna.medium.shared and self._seal.crowded:  # some of these ids may not exist
             self._antenna.broadcast_message(challenge)
         else:
-            self._antenna.send_message_to(challenge)
+            self._send(challenge)
+
+    def _send(self, packet: bytes) -> None:
+        """Send to the node in byte 3; to another radio with this node's id as to all."""
+        if packet[TO_AT] == self._node_id:
+            self._antenna.broadcast_message(packet)
+        else:
+            self._antenna.send_message_to(packet)
 
     def _not_proven(self, reason: str, payload: bytes, now_s: float) -> None:
         """Copies, and packets for an old nonce, are normal; forged orders are not."""

@@ -1,0 +1,48 @@
+"""OwnId: what a node does about another radio that uses its id (docs/protocol.md, "One id twice").
+
+Both name it. A router that was first connected less than a check period ago gives way to one that
+is connected: it switches its antenna off for a while, as a radio that listens also acknowledges
+packets for the other one.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+
+from drone_mesh.communication.limits import RateLimit
+
+SHARED_FOR_S = 60.0  # our choice: for so long after the last packet of the other, both say so
+OFF_S = 30.0  # our choice: the antenna of a node that gives way is off for 1 to 2 times this
+INTRODUCTIONS = 3  # our choice: per minute, to show the other one that the id is in use
+
+
+class OwnId:
+    """Another radio with the id of one node. Belongs to the component's thread."""
+
+    def __init__(self, rng: random.Random) -> None:
+        """`rng`: two that give way to a third must not come back together."""
+        self._rng = rng
+        self.connected_s = math.inf  # when the node was first connected, since it last gave way
+        self._heard_s = -math.inf
+        self._introductions = RateLimit(INTRODUCTIONS, SHARED_FOR_S)
+
+    @property
+    def was_heard(self) -> bool:
+        """Whether the other radio was ever heard, so that this node has shown itself to it."""
+        return self._heard_s > -math.inf
+
+    def heard(self, now_s: float) -> bool:
+        """A packet of the other radio. Returns whether to introduce this node to it."""
+        self._heard_s = now_s
+        return self._introductions.count(0, now_s)
+
+    def give_way(self, now_s: float) -> float:
+        """The other one is connected. Returns until when to be off."""
+        self._heard_s = now_s
+        self.connected_s = math.inf
+        return now_s + OFF_S * (1.0 + self._rng.random())
+
+    def is_shared(self, now_s: float) -> bool:
+        """Whether the other radio was heard lately. Any thread may ask."""
+        return now_s - self._heard_s <= SHARED_FOR_S

@@ -1,0 +1,40 @@
+"""Two radios with one id: both say so, and the later one leaves the earlier one its connection."""
+
+from __future__ import annotations
+
+import pytest
+
+from drone_mesh.communication.seals.keys import MeshKey
+from drone_mesh.inprocess import Network
+
+KEY = MeshKey(bytes(range(16)))
+
+
+def start(routing: str, key: MeshKey | None) -> tuple[Network, Network]:
+    """A mesh with router 2, and another mesh of one drone beside it, to be added."""
+    mesh = Network(1, radio="chips", rate="1M", routing=routing, key=key)
+    mesh.add_gateway(0, 0.0, 0.0)
+    mesh.add_router(1, 6.0, 0.0)
+    mesh.add_router(2, 12.0, 0.0)
+    twin = Network(2, radio=mesh.air, routing=routing, key=key)
+    return mesh, twin
+
+
+@pytest.mark.parametrize("routing", ["child_table_tree", "beacon"])
+@pytest.mark.parametrize("key", [None, KEY], ids=["without a key", "with a key"])
+def test_the_later_of_two_radios_with_one_id_gives_way_and_both_name_it(routing, key):
+    mesh, twin = start(routing, key)
+    assert mesh.run_until(mesh.all_connected, within_s=30.0)
+    mesh.run_for(11.0)
+    twin.add_router(2, 6.0, 5.0, start_s=mesh.now_s())
+    earlier, later = mesh.nodes[2].component, twin.nodes[2].component
+    assert mesh.run_until(lambda: earlier.get_shares_id() and later.get_shares_id(), within_s=120.0)
+    mesh.run_for(2.0)
+    for _ in range(8):
+        mesh.run_for(5.0)
+        assert earlier.get_connected_to_gateway()
+        assert not later.get_connected_to_gateway()
+    told = [node.id for node in (*mesh.status().nodes, *twin.status().nodes) if node.shares_id]
+    assert told == [2, 2]
+    mesh.stop()
+    twin.stop()
