@@ -9,6 +9,7 @@ from drone_mesh.communication.throttle import Throttle
 
 COMPLAINT_PERIOD_S = 30.0  # our choice: one line per reason and node in this time
 FOREIGN_FOR_S = 60.0  # our choice: a neighbour sends several packets in this time
+CHALLENGED_FOR_S = 10.0  # our choice: a neighbour with a key challenges one without every 2 s
 
 _log = logging.getLogger(__name__)
 
@@ -36,8 +37,11 @@ class Complaints:
         self.add(reason, payload.hex(), now_s)
 
     def is_foreign(self, neighbour: int, now_s: float) -> bool:
-        """Whether this neighbour takes no packets of this node, or this node none of its."""
-        return now_s - self._foreign_s.get(neighbour, -math.inf) <= FOREIGN_FOR_S
+        """Whether this neighbour takes no packets of this node, or this node none of its.
+
+        A stranger can challenge in a neighbour's name, so it counts only while it goes on.
+        """
+        return now_s - self._foreign_s.get(neighbour, -math.inf) <= CHALLENGED_FOR_S
 
     def foreign_neighbour(self, now_s: float) -> str:
         """The latest such reason; empty if it is older than FOREIGN_FOR_S."""

@@ -131,6 +131,7 @@ class EndToEnd:
         self._changed_s = 0.0
         self._heard: dict[int, int] = {}  # the nonces of others; any node can claim one
         self._proved: dict[int, int] = {}  # those that came with a proof
+        self._ways: dict[int, int] = {}  # the neighbours through which these proofs came
         self._orders: dict[int, int] = {}  # by addressee: orders sealed since then
         self._sequences: dict[int, int] = {}  # by addressee: the number used last
         self._gateways: set[int] = set()  # nodes that proved to be one
@@ -194,6 +195,13 @@ class EndToEnd:
             return self._proved.get(forward, claimed)
         return claimed
 
+    def way_of_order(self, drone: int) -> int | None:
+        """The neighbour that has carried the drone's last proof, for the tries with that nonce.
+
+        Any node that relays can draw the route to a drone to itself, with packets in its name.
+        """
+        return self._ways.get(drone) if self._orders.get(drone, 0) % 2 else None
+
     def _form(self, payload: bytes) -> _Form | None:
         kind = payload[TYPE_AT]
         if kind == _HEARTBEAT and payload[CREATOR_AT] != messages.preferred_gateway(payload):
@@ -252,6 +260,7 @@ class EndToEnd:
                     raise
             else:
                 self._proved[creator] = nonce
+                self._ways[creator] = payload[FROM_AT]
                 self._orders[creator] = 0
                 if form is not _OF_ROUTER:
                     self._gateways.add(creator)

@@ -134,6 +134,12 @@ class SealedAntenna(IWirelessCommunication, IMeshSeals, IMeshNetwork):
             if proven is None:
                 return True
             payload = proven
+            if payload[TYPE_AT] == _ORDER:
+                way = self._end_to_end.way_of_order(payload[FORWARD_AT])
+                if way is not None and way != payload[TO_AT]:
+                    sealed = self._seal.seal(messages.readdressed(payload, way))
+                    if self._antenna.send_message_to(sealed):
+                        return True
         return self._antenna.send_message_to(self._seal.seal(payload))
 
     def send_messages(self, payloads: Sequence[bytes]) -> list[bool]:

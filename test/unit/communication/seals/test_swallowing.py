@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from seal_rig import KEY
+from seal_rig import KEY, packet
 
 from drone_mesh.communication.data.ticket import TO_GATEWAY, TicketState
 from drone_mesh.communication.heartbeats.swallowing import Swallowing
@@ -100,3 +100,17 @@ def test_a_gateway_that_answers_is_asked_three_times_less_often():
     swallowing.answered()
     assert not swallowing.must_ask(20.0)
     assert swallowing.must_ask(30.0)
+
+
+def test_an_order_goes_where_the_drones_proof_came_from_not_where_claims_in_its_name_come_from():
+    network = Network(seed=1, key=own_keys)
+    network.add_fleet(1, 8, 3, 6.0)
+    assert network.run_until(network.all_connected, within_s=30.0)
+    network.run_for(30.0)
+    assert network.path_to_gateway(3) == [3, 2, 0]
+    swallow(network, 4)
+    network.nodes[4].component._antenna.send_message_to(packet("03 04 04 00 00 01 00 01"))
+    network.run_for(0.002)
+    assert network.nodes[0].component.get_direction_to(3) == 4
+    network.order(3, 12.0, 2.0)
+    assert network.run_until(lambda: network.location(3).latitude == 2.0, within_s=5.0)
