@@ -32,7 +32,9 @@ setup(
     version=ElementTree.parse(str(HERE / "package.xml")).findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
-    package_data={"": ["*.csv", "*.html", "*.lua", "*.pyi", "*.service", "py.typed", "static/*"]},
+    package_data={
+        "": ["*.csv", "*.html", "*.lua", "*.pyi", "*.service", "py.typed", "leaflet/*", "static/*"]
+    },
     install_requires=requirements("base"),
     extras_require={extra: requirements(extra) for extra in EXTRAS},
 )

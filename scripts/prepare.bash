@@ -97,6 +97,23 @@ npm_install() {
   cp "$javascript/package-lock.json" "$javascript/.installed"
 }
 
+# map_library: Leaflet, which draws the tiles of a map, beside the web console. It is no part of this
+# project, so git ignores it; `setup.py` takes it along.
+map_library() {
+  local from="$root/scripts/javascript" to="$root/src/drone_mesh/console/leaflet" at
+  cmp -s "$from/package-lock.json" "$to/.installed" && return
+  command -v npm >/dev/null || apt_install nodejs npm
+  say "installing Leaflet from npm"
+  at=$(mktemp -d)
+  cp "$from"/package{,-lock}.json "$at"
+  (cd "$at" && npm ci --omit=dev --no-audit --no-fund </dev/null) || fail "npm could not install it"
+  rm -rf "$to"
+  mkdir "$to"
+  cp "$at"/node_modules/leaflet/{LICENSE,dist/leaflet-src.esm.js,dist/leaflet.css} "$to"
+  cp "$from/package-lock.json" "$to/.installed"
+  rm -rf "$at"
+}
+
 # build_step WHAT COMMAND...: logs the output; prints the end of it on failure.
 build_step() {
   local log="$root/build/build.log"
@@ -154,5 +171,6 @@ prepare_checks() {
 prepare_everything() {
   apt_install "${ros_packages[@]}" "${screen_packages[@]}"
   prepare_checks
+  map_library
   pip_install requirements/{browser,docs}.txt
 }

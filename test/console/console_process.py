@@ -17,6 +17,7 @@ from drone_mesh.console.history import History
 from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ALL_ACTIONS, FRAME_PERIOD_S, ConsoleServer
+from drone_mesh.console.tiles import open_tiles
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.layouts import Layouts
 from drone_mesh.web.access import access_for
@@ -75,6 +76,7 @@ def main(arguments: list[str] | None = None) -> None:
         "--recorded", type=float, default=0.0, help="simulated seconds of a recording; 2 a second"
     )
     parser.add_argument("--origin", default="", metavar="LAT,LON,ALT")
+    parser.add_argument("--tiles", default="", metavar="MAP")
     parser.add_argument("--real", action="store_true", help="offer what a real gateway can do")
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.INFO)
@@ -93,6 +95,7 @@ def main(arguments: list[str] | None = None) -> None:
         GatewayControls.ACTIONS if options.real else ALL_ACTIONS,
         recording=options.recording,
         whole=whole,
+        tiles=open_tiles(options.tiles) if options.tiles else None,
     )
     runner = ConsoleRunner(server, options.address, options.port)
     stop = threading.Event()

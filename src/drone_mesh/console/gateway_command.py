@@ -20,6 +20,7 @@ from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
+from drone_mesh.console.tiles import Tiles, open_tiles
 from drone_mesh.errors import ConfigurationError, MeshError
 from drone_mesh.stopping import StopRequest
 from drone_mesh.web import LOOPBACK
@@ -98,6 +99,13 @@ def main(
         default=DEFAULT_PORT,
         help="TCP port (default: %(default)s; 0: any free one)",
     )
+    parser.add_argument(
+        "--tiles",
+        default="",
+        metavar="MAP",
+        help="a map under the drones, if the nodes have an --origin: an MBTiles or PMTiles file, "
+        "or an address with {z}, {x} and {y} (default: none)",
+    )
     options = parser.parse_args(arguments)
     if not options.gateway.startswith(("http://", "https://")):
         parser.error(f"--gateway {options.gateway}: must begin with http:// or https://")
@@ -108,7 +116,8 @@ def main(
             signal.signal(number, lambda *_: stop.make())
         try:
             client = GatewayClient(options.gateway, environment.get(GATEWAY_TOKEN, ""))
-            _serve(client, options.bind, options.port, token, stop)
+            tiles = open_tiles(options.tiles) if options.tiles else None
+            _serve(client, options.bind, options.port, token, stop, tiles)
         except MeshError as error:
             print(f"drone_mesh_console: {error}", file=sys.stderr)
             return 1
@@ -116,11 +125,18 @@ def main(
 
 
 def _serve(
-    client: GatewayClient, address: str, port: int, token: PageToken, stop: StopRequest
+    client: GatewayClient,
+    address: str,
+    port: int,
+    token: PageToken,
+    stop: StopRequest,
+    tiles: Tiles | None,
 ) -> None:
     store = FrameStore(History())
     controls = GatewayControls(client)
-    server = ConsoleServer(store, controls, token.access(address), actions=GatewayControls.ACTIONS)
+    server = ConsoleServer(
+        store, controls, token.access(address), actions=GatewayControls.ACTIONS, tiles=tiles
+    )
     runner = ConsoleRunner(server, address, port)
     runner.start()
     print(token.greeting(address, runner.port), flush=True)

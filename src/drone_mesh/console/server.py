@@ -53,6 +53,7 @@ from drone_mesh.console.orders import (
 )
 from drone_mesh.console.page import Page
 from drone_mesh.console.stage import Stage
+from drone_mesh.console.tiles import Tiles
 from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied, TooManyGuesses
 
@@ -75,10 +76,8 @@ COOKIE = "drone_mesh_token"
 POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1
 TRY_LATER = 1013  # registry of close codes of RFC 6455
 
+_POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 _HEADERS = {
-    "Content-Security-Policy": (
-        "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-    ),
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
@@ -88,9 +87,13 @@ _HEADERS = {
 class Guard:
     """ASGI middleware: refuses clients without access, and sets the headers of every response."""
 
-    def __init__(self, app: ASGIApp, access: Access) -> None:
+    def __init__(self, app: ASGIApp, access: Access, image_sources: str) -> None:
+        """`image_sources`: from where the page may load pictures."""
         self._app = app
         self._access = access
+        policy = f"{_POLICY}; img-src {image_sources}"
+        headers = {"Content-Security-Policy": policy, **_HEADERS}
+        self._headers = [(key.lower().encode(), value.encode()) for key, value in headers.items()]
         self._refusals = Throttle(REFUSAL_LOG_PERIOD_S)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -122,10 +125,9 @@ class Guard:
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [
-                    *message["headers"],
-                    *((name.lower().encode(), value.encode()) for name, value in _HEADERS.items()),
-                ]
+                given = {name for name, _value in message["headers"]}
+                ours = [header for header in self._headers if header[0] not in given]
+                message["headers"] = [*message["headers"], *ours]
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
@@ -149,13 +151,15 @@ class ConsoleServer:
         recording: str = "",
         whole: History | None = None,
         is_played: bool = True,
+        tiles: Tiles | None = None,
     ) -> None:
         """`demonstrate`: show a repair as soon as a page opens; `actions`: the orders it offers.
 
         `recording`: its name, if the console shows one; `whole`: its whole history. Without
         `whole`, pages look back at the store's history. A recording that is not playing is shown
-        from its start.
+        from its start. `tiles`: the map under a mesh with an origin.
         """
+        self._tiles = tiles
         self._actions = actions
         self._store = store
         self._controls = controls
@@ -172,10 +176,15 @@ class ConsoleServer:
                 Route("/", self._index),
                 Route("/palette.css", self._palette),
                 EarthFiles(store, self._history, self._workers).route,
+                *(tiles.routes if tiles else ()),
                 Mount("/static", StaticFiles(directory=STATIC)),
                 WebSocketRoute("/ws", self._websocket),
             ],
-            middleware=[Middleware(Guard, access=access)],
+            middleware=[
+                Middleware(
+                    Guard, access=access, image_sources=tiles.image_sources if tiles else "'self'"
+                )
+            ],
         )
 
     @property
@@ -241,13 +250,14 @@ class ConsoleServer:
     async def _send_frames(self, page: Page) -> None:
         loop = asyncio.get_running_loop()
         try:
-            hello = {
+            hello: dict[str, object] = {
                 "type": "hello",
                 "layouts": list(self._layouts),
                 "limits": {**LIMITS, "events": EVENTS_KEPT, "samples": SAMPLES_KEPT},
                 "actions": list(self._actions),
                 "packet_kinds": [kind.value for kind in PacketKind],
                 "recording": self._recording,
+                "map": self._tiles.for_page() if self._tiles else None,
             }
             await self._send(page, json.dumps(hello))
             before_s = loop.time()

@@ -17,6 +17,7 @@ import { PacketDots } from "./packets.js";
 import { NodePanel } from "./panel.js";
 import { Story } from "./story.js";
 import { NodeTable } from "./table.js";
+import { Tiles } from "./tiles.js";
 import { TimeLine } from "./timeline.js";
 
 const TOAST_MS = 5000;
@@ -122,6 +123,8 @@ connection.addEventListener("told", (event) => toast(event.detail, false));
 new EventLog(mesh, byId("events"), byId("show-neighbours"), byId("only-selected"));
 const charts = new Charts(mesh);
 const packets = new PacketDots(mesh, map, connection, byId("map-card"));
+const tiles = new Tiles(mesh, map.camera, (text) => toast(text, true));
+map.drawn = () => tiles.follow();
 new TimeLine(mesh, (request) => connection.ask({ do: "time", ...request }));
 new Story(
   mesh,

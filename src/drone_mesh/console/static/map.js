@@ -62,6 +62,7 @@ export class MapView {
     this.pending = false;
     this.stage = { places: [], cast: new Set() }; // of a demonstration
     this.marks = []; // at the edges: {x, y, ids, angle} of drones outside, px
+    this.drawn = null; // called after each picture
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
     const canvas = this.canvas;
     new ResizeObserver(() => this.#resize()).observe(canvas);
@@ -237,6 +238,7 @@ export class MapView {
       );
     this.#describe(drawn);
     this.#keepTurning(drawn);
+    this.drawn?.();
   }
 
   /** Where drones that are dragged, or about to leave, would fly. */

@@ -36,6 +36,7 @@ export class Mesh extends EventTarget {
     this.alarms = []; // [{text, nodes, since, over, acknowledged}]
     this.recording = ""; // its name, if the console shows one
     this.timeline = {}; // {start, end, now, live, paused, factor, packets} of the recorded time
+    this.map = null; // {url, min_zoom, max_zoom, credit, bounds} of the map under the drones
     this.marks = []; // on the time line: [{t, kind, node}]
     this.hasPresent = false; // whether there is a present to return to
     this.selected = null;
@@ -128,7 +129,8 @@ export class Mesh extends EventTarget {
     this.#notify("packets", packets);
   }
 
-  applyHello({ layouts, limits, actions, recording, packet_kinds: packetKinds }) {
+  applyHello({ layouts, limits, actions, recording, packet_kinds: packetKinds, map }) {
+    this.map = map;
     this.packetKinds = packetKinds;
     this.recording = recording;
     this.actions = actions;

@@ -21,6 +21,7 @@ from drone_mesh.console.orders import LayoutOffer, places_of
 from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
+from drone_mesh.console.tiles import open_tiles
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, naming_argument
@@ -146,7 +147,8 @@ def main() -> None:
     without it, a random one is made and printed if other machines can reach the address; ~demo
     (str): "repair" shows a repair as soon as a page is open; ~recording (str): path of the bag that
     is played; its page takes no orders; ~origin (str): LAT,LON,ALT, where the world's origin
-    is on the earth, in degrees and metres above sea level.
+    is on the earth, in degrees and metres above sea level; ~tiles (str): a map, see
+    open_tiles.
     /DroneManager/casus (str): the file of the layouts.
     """
     start_node(main.__doc__, "mesh_console")
@@ -164,6 +166,11 @@ def _run() -> int:
     recording = str(rospy.get_param("~recording", ""))
     origin = _origin(str(rospy.get_param("~origin", "")))
     whole = History(math.inf, math.inf) if recording else None
+    given = str(rospy.get_param("~tiles", ""))
+    if given and origin is None:
+        raise ConfigurationError("tiles:= needs origin:=LAT,LON,ALT: where the world is on the map")
+    with naming_argument("tiles:=", given.partition("#")[0]):
+        tiles = open_tiles(given) if given else None
     store = FrameStore(History() if whole is None else None, origin)
     layouts = layout_offers(manager_layouts())
     access = token.access(address)
@@ -176,6 +183,7 @@ def _run() -> int:
         demo == REPAIR_DEMO,
         recording=Path(recording).name,
         whole=whole,
+        tiles=tiles,
     )
     runner = ConsoleRunner(server, address, port)
     stop = StopRequest()  # created where signals are handled, in the thread that waits
