@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import sys
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import rosgraph
 import rospy
 
+from drone_mesh.arguments import MOST, decimal
 from drone_mesh.errors import MeshError
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import require_master, run_tool
@@ -47,28 +47,20 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("bag", type=Path, help="the bag of the recorded run, or a gateway's record")
     parser.add_argument(
-        "--rate", type=_rate, default=1.0, metavar="R", help="seconds of the bag per second (1)"
+        "--rate",
+        type=decimal(0.001, 1000.0),
+        default=1.0,
+        metavar="R",
+        help="seconds of the bag per second (1)",
     )
     parser.add_argument(
-        "--start", type=_seconds, default=0.0, metavar="S", help="seconds of the bag to skip (0)"
+        "--start",
+        type=decimal(0.0, MOST),
+        default=0.0,
+        metavar="S",
+        help="seconds of the bag to skip (0)",
     )
     return parser
-
-
-def _rate(text: str) -> float:
-    return _number(text, 0.001, 1000.0, "a number from 0.001 to 1000")
-
-
-def _seconds(text: str) -> float:
-    return _number(text, 0.0, sys.float_info.max, "a number, 0 or more")
-
-
-def _number(text: str, lowest: float, highest: float, expected: str) -> float:
-    with contextlib.suppress(ValueError):
-        number = float(text)
-        if lowest <= number <= highest:
-            return number
-    raise argparse.ArgumentTypeError(f"invalid value {text!r}: must be {expected}")
 
 
 def _run(options: argparse.Namespace) -> int:
