@@ -49,6 +49,16 @@ class Motion(NamedTuple):
             place.height + up * seconds,
         )
 
+    def apart_m(self, seconds: float, other: Motion, others_s: float) -> float:
+        """From where it will be to where the other one will be, each in its own time."""
+        # Without the objects of `after`: this is the most frequent question of all.
+        (a, b, c), (u, v, w) = self
+        (d, e, f), (x, y, z) = other
+        north = a + u * seconds - (d + x * others_s)
+        east = b + v * seconds - (e + y * others_s)
+        up = c + w * seconds - (f + z * others_s)
+        return math.sqrt(north * north + east * east + up * up)
+
 
 class Below(NamedTuple):
     """Some of the nodes that a node leads to, in circular order of their ids.

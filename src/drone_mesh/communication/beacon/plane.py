@@ -223,7 +223,7 @@ class BeaconPlane(IControlPlane):
         if motion is None or self._shown is None:
             return
         shown_s, shown = self._shown
-        if shown.after(now_s - shown_s).distance_m(motion.place) > self._step_m:
+        if shown.apart_m(now_s - shown_s, motion, 0.0) > self._step_m:
             self._motion.has_turned(now_s)
             self._shown = None
             self._trickle.hurry(now_s)

@@ -6,7 +6,7 @@ docs/protocol.md, "Beacons", describes the rules.
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterator, NamedTuple
+from typing import Callable, Iterator, NamedTuple, Tuple
 
 from drone_mesh.communication.beacon.packets import (
     ANCESTORS,
@@ -32,6 +32,9 @@ LINGERS = 4.0  # intervals: a node that has left is still announced for so long
 SEEN_S = 10.0  # our choice: an older place of a node does not tell the way to it
 NEAR = 2.0  # intervals: an older report that a neighbour hears a node shows no way to it
 HINT_S = 3.0  # a packet that came from a node shows the way to it for this long
+
+Rank = Tuple[float, bool, float, int]
+"""Of a way up, the lowest is the best: cost in hops, not the present one, -heard_s, neighbour."""
 
 
 class Way(NamedTuple):
@@ -71,15 +74,20 @@ class Neighbour:
         if beacon.motion is not None:
             self.motion, self.reported_s = beacon.motion, now_s
             self.apart_m = 0.0 if own is None else own.place.distance_m(beacon.motion.place)
-        below = beacon.below
-        before = dict(self.announced_s)
-        for node in filter(below.covers, before):
-            del self.announced_s[node]
-        for node in below.listed:
-            self.announced_s[node] = before.get(node, now_s)
-        self.announced_s.update(dict.fromkeys(below.new, now_s))
-        self.listed_s.update(dict.fromkeys((*below.listed, *below.new), now_s))
-        self.near_s.update(dict.fromkeys(beacon.near, now_s))
+        if beacon.near:
+            self.near_s.update(dict.fromkeys(beacon.near, now_s))
+        _after, listed, new = below = beacon.below
+        if listed:
+            announced_s = self.announced_s
+            for node in announced_s.keys() - listed:
+                if below.covers(node):
+                    del announced_s[node]
+            for node in listed:
+                announced_s.setdefault(node, now_s)
+            self.listed_s.update(dict.fromkeys(listed, now_s))
+        if new:
+            self.announced_s.update(dict.fromkeys(new, now_s))
+            self.listed_s.update(dict.fromkeys(new, now_s))
 
     def until_s(self) -> float:
         """Until when it counts as a neighbour without a further sign of life."""
@@ -177,7 +185,16 @@ class BeaconRoutes(IRoutes):
         if self._has_internet:
             return False
         before = self.gateway, self.parent, self.hops, self.offline
-        best = min(map(self._rank, self._candidates()), default=None)
+        best: Rank | None = None
+        present = self.neighbours.get(self.parent)
+        if present is not None and self._leads_up(present):
+            best = self._rank(present)
+        for neighbour in self.neighbours.values():
+            # Most cannot be better, whatever the risk of their links.
+            least = self._hops_through(neighbour), neighbour is not present
+            if (best is None or least < best) and self._leads_up(neighbour):
+                rank = self._rank(neighbour)
+                best = rank if best is None else min(best, rank)
         if self._is_gateway and (best is None or best[0] >= OFFLINE):
             self._be_root()
         elif best is None:
@@ -219,30 +236,37 @@ class BeaconRoutes(IRoutes):
 
     def _candidates(self) -> Iterator[Neighbour]:
         """The neighbours that lead to a gateway without leading through this node."""
-        me = self._node_id
-        for neighbour in self.neighbours.values():
-            beacon = neighbour.beacon
-            if beacon.gateway in (NO_ROUTE, me) or beacon.hops >= NO_ROUTE - 1:
-                continue
-            if beacon.parent == me or me in beacon.ancestors or not neighbour.usable:
-                continue
-            if newer(self._newest[beacon.gateway][0], beacon.number) > BACK:
-                continue
-            if not self._is_stale(beacon.gateway):
-                yield neighbour
+        return filter(self._leads_up, self.neighbours.values())
+
+    def _leads_up(self, neighbour: Neighbour) -> bool:
+        me, beacon = self._node_id, neighbour.beacon
+        if beacon.gateway in (NO_ROUTE, me) or beacon.hops >= NO_ROUTE - 1:
+            return False
+        if beacon.parent == me or me in beacon.ancestors or not neighbour.usable:
+            return False
+        number, at_s, _offline = self._newest[beacon.gateway]
+        if newer(number, beacon.number) > BACK:
+            return False
+        is_fresh = self.now_s - at_s <= STALE * beacon.interval_s  # then it is not stale
+        return is_fresh or not self._is_stale(beacon.gateway)
 
     def _is_stale(self, gateway: int) -> bool:
         slowest_s = max((n.beacon.interval_s for n in self.neighbours.values()), default=0.0)
         return self.now_s - self._newest[gateway][1] > STALE * slowest_s
 
-    def _rank(self, neighbour: Neighbour) -> tuple[float, bool, float, int]:
+    def _rank(self, neighbour: Neighbour) -> Rank:
         """The lowest is the best way up: few hops over links that last; if equal, the present."""
-        beacon, node = neighbour.beacon, neighbour.node
-        other = self.gateway not in (NO_ROUTE, beacon.gateway)
-        cost = beacon.hops + self.risk(neighbour) + (ANOTHER_GATEWAY if other else 0.0)
-        if self._newest[beacon.gateway][2]:
+        cost = self._hops_through(neighbour) + self.risk(neighbour)
+        if self._newest[neighbour.beacon.gateway][2]:
             cost += OFFLINE
-        return cost, node != self.parent, -neighbour.heard_s, node
+        return cost, neighbour.node != self.parent, -neighbour.heard_s, neighbour.node
+
+    def _hops_through(self, neighbour: Neighbour) -> float:
+        """What the way up through a neighbour costs at least, without its own link."""
+        beacon = neighbour.beacon
+        if self.gateway in (NO_ROUTE, beacon.gateway):
+            return beacon.hops
+        return beacon.hops + ANOTHER_GATEWAY
 
     def risk(self, neighbour: Neighbour) -> float:
         """What the expected end of the link to a neighbour costs, in hops (Su et al. 2001)."""
@@ -250,12 +274,10 @@ class BeaconRoutes(IRoutes):
         if own is None or other is None or neighbour.apart_m > WRONG * self._range_m:
             return 0.0
         reach_m, age_s = REACH * self._range_m, self.now_s - neighbour.reported_s
-        if own.place.distance_m(other.after(age_s)) > reach_m:
+        if own.apart_m(0.0, other, age_s) > reach_m:
             return GONE
         soon_s = neighbour.beacon.interval_s
-        if own.after(soon_s).distance_m(other.after(age_s + soon_s)) > reach_m:
-            return LEAVES
-        return 0.0
+        return LEAVES if own.apart_m(soon_s, other, age_s + soon_s) > reach_m else 0.0
 
     # Any way -----------------------------------------------------------------------------------
 
