@@ -93,7 +93,7 @@ def test_beacons_become_rarer_while_nothing_changes():
 
 
 def test_a_drone_that_turns_tells_its_neighbours_at_once():
-    network = grid(radio="disc")
+    network = grid(seed=2, radio="disc")
     network.run_for(20.0)
     sent = []
     network.nodes[5].antenna.broadcast_message = sent.append

@@ -12,6 +12,7 @@ from drone_mesh.drone.location import Location
 OVER_S = 2.0  # our choice: noise of a receiver and turns of a drone cancel out
 TURN_S = 0.5  # our choice: only so long before a turn is noticed count samples for the new velocity
 STANDS_S = 10.0  # our choice: a drone that has not moved for this long stands
+REGION_M = 256.0  # our choice: far less than the distance up to which a beacon tells its place
 AGAIN_S = 0.1  # our choice: a receiver for satellites gives ten positions per second
 
 
@@ -23,6 +24,7 @@ class OwnMotion:
         self._locate = locate
         self._step_m = step_m
         self._anchor: Location | None = None
+        self.region: Location | None = None  # about where it is: the same for most nodes near it
         self._moved_s = -math.inf
         self._samples: deque[tuple[float, Location]] = deque()
         self._motion: Motion | None = None
@@ -47,11 +49,14 @@ class OwnMotion:
         place = self._locate()
         if place is None:
             self._samples.clear()
-            self._motion = None
+            self._motion = self.region = None
             return None
         if self._anchor is None or self._anchor.distance_m(place) > self._step_m:
             self._moved_s = -math.inf if self._anchor is None else now_s
             self._anchor = place
+            self.region = None
+        if self.region is None:
+            self.region = Location(*(REGION_M * round(value / REGION_M) for value in place))
         samples = self._samples
         samples.append((now_s, place))
         while now_s - samples[1][0] >= OVER_S if len(samples) > 1 else False:

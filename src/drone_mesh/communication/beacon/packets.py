@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import struct
 from typing import NamedTuple, Tuple
@@ -140,6 +141,7 @@ class Beacon(NamedTuple):
         return room - used
 
     @classmethod
+    @functools.lru_cache(maxsize=256)  # in one process many nodes receive the same one
     def from_body(cls, body: bytes, here: Location | None) -> Beacon | None:
         """Decode the bytes of `to_body`; None if they are damaged.
 

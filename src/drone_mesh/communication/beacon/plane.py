@@ -22,6 +22,7 @@ from drone_mesh.drone.location import Location
 
 HELD_S = 2.5  # our choice: a packet without a next hop waits this long
 RETRY_S = 0.15  # our choice: so often it asks again, beside each beacon that arrives
+LOOK_S = 0.2  # our choice: links change that slowly
 CHECK_S = 1.0  # our choice: how often a router without a gateway considers its repair
 LATE = 1.25  # intervals, with their jitter: then a beacon of the parent was lost, or it is dead
 TURN_HOPS = 8  # for each neighbour: children ask one after the other, and the answer is for all
@@ -44,7 +45,8 @@ class BeaconPlane(IControlPlane):
         self._basics, self._host, self._states = basics, host, states
         self._me, self._antenna = basics.node_id, basics.antenna
         self._deadlines = basics.deadlines
-        self._room = messages.BODY_BYTES - basics.seals.reserved_bytes(MessageType.BEACON)
+        room = self._room = messages.BODY_BYTES - basics.seals.reserved_bytes(MessageType.BEACON)
+        self._body = slice(messages.HEADER_BYTES, messages.HEADER_BYTES + room)
         self._routes = self.routes = BeaconRoutes(
             self._me, states is None, basics.range_m, basics.neighbours.place_of
         )
@@ -64,6 +66,7 @@ class BeaconPlane(IControlPlane):
         self._trickle = Trickle(self._antenna.medium, basics.rng)
         self._searches = Searches(self._me, self._routes, self._broadcast)
         self._sent = 0  # beacons
+        self._look_s = -math.inf  # when it looks at everything anew, whatever a beacon says
         self._probed_s = self._retry_s = self._check_s = -math.inf
         self._turn = basics.rng.random()  # among the children of its parent
         self._asks = True  # whether its next beacon asks for those of the neighbours
@@ -226,14 +229,15 @@ class BeaconPlane(IControlPlane):
         if shown.apart_m(now_s - shown_s, motion, 0.0) > self._step_m:
             self._motion.has_turned(now_s)
             self._shown = None
+            self._look_s = now_s
             self._trickle.hurry(now_s)
 
     def _plan(self) -> None:
         """Schedule the next call of `on_time`."""
         due_s = self._trickle.due_s
         routes = self._routes
-        for neighbour in routes.neighbours.values():
-            due_s = min(due_s, neighbour.until_s() + 1e-3)
+        if routes.neighbours:
+            due_s = min(due_s, min([n.until_s() for n in routes.neighbours.values()]) + 1e-3)
         parent = routes.neighbours.get(routes.parent)
         if parent is not None:
             again_s = self._probed_s + parent.beacon.interval_s + 1e-3
@@ -299,8 +303,7 @@ class BeaconPlane(IControlPlane):
         if self._basics.complaints.is_foreign(creator, now_s):  # readable, but it takes no packets
             self._basics.complaints.dropped("a beacon of another mesh", payload, now_s)
             return
-        here = None if routes.motion is None else routes.motion.place
-        beacon = Beacon.from_body(messages.body(payload)[: self._room], here)
+        beacon = Beacon.from_body(payload[self._body], self._motion.region)
         if beacon is None:
             self._basics.complaints.dropped("a damaged beacon", payload, now_s)
             return
@@ -308,11 +311,16 @@ class BeaconPlane(IControlPlane):
             self._basics.frame.heard(creator, beacon.digest)
         if self._basics.frame.refuses(creator):
             beacon = beacon._replace(motion=None, gateway_place=None)
-        if routes.heard(creator, beacon):
+        is_quiet = now_s < self._look_s and not routes.is_news(creator, beacon)
+        is_new = routes.heard(creator, beacon)
+        self._take_places(creator, beacon)
+        if is_quiet and not self._courier.holds:
+            return  # most beacons
+        self._look_s = now_s + LOOK_S
+        if is_new:
             self._trickle.reset(now_s)
         if routes.has_news and not routes.is_root:
             self._trickle.hurry(now_s)
-        self._take_places(creator, beacon)
         self._choose()
         if creator == routes.parent:
             self._show()

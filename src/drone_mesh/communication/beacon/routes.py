@@ -6,6 +6,7 @@ docs/protocol.md, "Beacons", describes the rules.
 from __future__ import annotations
 
 import math
+from operator import itemgetter
 from typing import Callable, Iterator, NamedTuple, Tuple
 
 from drone_mesh.communication.beacon.packets import (
@@ -19,6 +20,10 @@ from drone_mesh.communication.beacon.packets import (
 from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.communication.neighbours import HeardPlace
 from drone_mesh.communication.ways import IRoutes
+
+_WAY_UP = itemgetter(
+    *map(Beacon._fields.index, ("gateway", "hops", "parent", "ancestors", "offline"))
+)
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
 BACK = 2  # sequence numbers: a route that stands on an older one is not used
@@ -79,9 +84,8 @@ class Neighbour:
         _after, listed, new = below = beacon.below
         if listed:
             announced_s = self.announced_s
-            for node in announced_s.keys() - listed:
-                if below.covers(node):
-                    del announced_s[node]
+            for node in [n for n in announced_s if n not in listed and below.covers(n)]:
+                del announced_s[node]
             for node in listed:
                 announced_s.setdefault(node, now_s)
             self.listed_s.update(dict.fromkeys(listed, now_s))
@@ -148,6 +152,20 @@ class BeaconRoutes(IRoutes):
             if by > 0 or (by < -BACK and self._is_stale(gateway)):  # it may have been restarted
                 self._newest[gateway] = beacon.number, self.now_s, beacon.offline
         return is_new
+
+    def is_news(self, node: int, beacon: Beacon) -> bool:
+        """Whether a neighbour's beacon may change this node's way up or what it announces."""
+        neighbour = self.neighbours.get(node)
+        if neighbour is None or node == self.parent or not neighbour.usable or beacon.looks:
+            return True
+        if self.parent == NO_ROUTE and not self._has_internet:
+            return True
+        before = neighbour.beacon
+        return (
+            _WAY_UP(beacon) != _WAY_UP(before)
+            or beacon.interval_s < before.interval_s
+            or (beacon.parent == self._node_id and bool(beacon.below.new))
+        )
 
     def alive(self, node: int) -> None:
         """A sign of life of a node: a packet of it, or an acknowledgement."""
