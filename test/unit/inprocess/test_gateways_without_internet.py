@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from scenarios import events, fleet, flown, run_until
 
+from drone_mesh.communication.seals.keys import MeshKey
 from drone_mesh.inprocess import Network
 
 CHECK_PERIOD_S = 10.0
@@ -60,6 +61,27 @@ def test_routers_move_to_the_other_gateway_and_come_back(routing):
     assert gateway.get_preferred_gateway() == 0
     assert gateway.get_hops_from_gateway_away() == 0
     assert flown(network) == set()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("radio", ["disc", "shared"])
+@pytest.mark.parametrize("routing", TECHNIQUES)
+def test_routers_move_and_come_back_in_a_mesh_with_a_key_and_on_a_shared_channel(routing, radio):
+    network = two_ends(routing, routers=4, radio=radio, key=MeshKey(bytes(range(16))))
+    network.internet(0, False)
+    assert run_until(
+        network,
+        lambda: network.all_connected() and set(preferred(network, network.nodes)) == {1},
+        CHECK_PERIOD_S + 2.0,
+        step_s=0.5,
+    )
+    network.internet(0, True)
+    assert run_until(
+        network,
+        lambda: network.all_connected() and preferred(network, [0, 2]) == [0, 0],
+        2 * CHECK_PERIOD_S,
+        step_s=0.5,
+    )
 
 
 @pytest.mark.parametrize("routing", TECHNIQUES)
