@@ -26,8 +26,8 @@ _WAY_UP = itemgetter(
 )
 
 FRESH = 2.5  # intervals: a neighbour that was silent for longer is none
-BACK = 2  # sequence numbers: a route that stands on an older one is not used
-STALE = 5.0  # intervals: a gateway without a new number for longer is lost
+BACK = 2  # sequence numbers: a new neighbour that is further behind the others may lead nowhere
+STALE = 5.0  # intervals: a neighbour whose number was not a new one for longer leads nowhere
 REACH = 0.97  # of the range: two nodes further apart are expected to lose each other
 WRONG = 1.15  # of the range: a neighbour heard from further away, or this node, errs in its place
 LEAVES, GONE = 1.0, 3.0  # hops that a detour may cost around a link that will break, or should have
@@ -123,7 +123,10 @@ class BeaconRoutes(IRoutes):
         self._own_number = 0  # of the latest beacon as a gateway
         self.motion: Motion | None = None  # this node's own
         self.now_s = 0.0
-        # By gateway: number, when it came, whether the gateway had no internet then.
+        # By neighbour and gateway: the newest number, and when it came. A number counts only for
+        # the neighbour that sent it, so a false one makes no other neighbour look old.
+        self._numbers: dict[tuple[int, int], tuple[int, float]] = {}
+        # By gateway, of all neighbours: number, when it came, whether the gateway had no internet.
         self._newest: dict[int, tuple[int, float, bool]] = {}
         self._hints: dict[int, tuple[int, float]] = {}  # by node: a neighbour that led to it, when
         self._announced: set[int] = set()  # of the nodes below
@@ -145,13 +148,25 @@ class BeaconRoutes(IRoutes):
                 self._new.add(node)
             self._new.update(beacon.below.new)
         neighbour.heard(beacon, self.motion, self.now_s)
-        gateway = beacon.gateway
-        if gateway not in (NO_ROUTE, self._node_id):
-            number = self._newest.get(gateway, (beacon.number - 1, 0.0, False))[0]
-            by = newer(beacon.number, number)
-            if by > 0 or (by < -BACK and self._is_stale(gateway)):  # it may have been restarted
-                self._newest[gateway] = beacon.number, self.now_s, beacon.offline
+        if beacon.gateway not in (NO_ROUTE, self._node_id):
+            self._take_number(node, beacon)
         return is_new
+
+    def _take_number(self, node: int, beacon: Beacon) -> None:
+        """Note whether a neighbour stands on a newer beacon of the gateway than before."""
+        now_s, gateway, number = self.now_s, beacon.gateway, beacon.number
+        newest, newest_s, _offline = self._newest.get(gateway, (number - 1, -math.inf, False))
+        ahead = newer(number, newest)
+        known = self._numbers.get((node, gateway))
+        if known is None:
+            since_s = newest_s if ahead >= -BACK else -math.inf
+            self._numbers[node, gateway] = number, now_s if ahead > 0 else since_s
+        else:
+            by = newer(number, known[0])
+            if by > 0 or (by < -BACK and self._is_stale(node, gateway)):  # perhaps a restart
+                self._numbers[node, gateway] = number, now_s
+        if ahead > 0 or now_s - newest_s > STALE * self._slowest_s():
+            self._newest[gateway] = number, now_s, beacon.offline
 
     def is_news(self, node: int, beacon: Beacon) -> bool:
         """Whether a neighbour's beacon may change this node's way up or what it announces."""
@@ -262,15 +277,15 @@ class BeaconRoutes(IRoutes):
             return False
         if beacon.parent == me or me in beacon.ancestors or not neighbour.usable:
             return False
-        number, at_s, _offline = self._newest[beacon.gateway]
-        if newer(number, beacon.number) > BACK:
-            return False
+        _number, at_s = self._numbers[neighbour.node, beacon.gateway]
         is_fresh = self.now_s - at_s <= STALE * beacon.interval_s  # then it is not stale
-        return is_fresh or not self._is_stale(beacon.gateway)
+        return is_fresh or not self._is_stale(neighbour.node, beacon.gateway)
 
-    def _is_stale(self, gateway: int) -> bool:
-        slowest_s = max((n.beacon.interval_s for n in self.neighbours.values()), default=0.0)
-        return self.now_s - self._newest[gateway][1] > STALE * slowest_s
+    def _is_stale(self, node: int, gateway: int) -> bool:
+        return self.now_s - self._numbers[node, gateway][1] > STALE * self._slowest_s()
+
+    def _slowest_s(self) -> float:
+        return max((n.beacon.interval_s for n in self.neighbours.values()), default=0.0)
 
     def _rank(self, neighbour: Neighbour) -> Rank:
         """The lowest is the best way up: few hops over links that last; if equal, the present."""

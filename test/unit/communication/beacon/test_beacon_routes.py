@@ -58,14 +58,32 @@ def test_a_neighbour_that_stands_on_this_node_is_no_parent(routes, generation):
     assert routes.parent == 255
 
 
-def test_two_numbers_back_is_still_a_route_and_three_is_none(routes):
-    routes.heard(1, beacon(number=5, hops=2, parent=3))
+def test_a_new_neighbour_two_numbers_back_is_a_route_and_one_three_back_is_none(routes):
     routes.heard(2, beacon(number=8, hops=4, parent=3))
+    routes.heard(1, beacon(number=5, hops=2, parent=3))
     routes.choose()
     assert routes.parent == 2
-    routes.heard(1, beacon(number=6, hops=2, parent=3))
+    routes.heard(4, beacon(number=6, hops=2, parent=3))
     routes.choose()
-    assert routes.parent == 1
+    assert routes.parent == 4
+
+
+def test_a_number_that_is_far_ahead_makes_no_other_neighbour_look_old(routes):
+    for second in range(8):
+        routes.now_s = float(second)
+        routes.heard(1, beacon(number=second, hops=0, parent=255))
+        routes.heard(2, beacon(number=second + 10, hops=1))
+        routes.choose()
+        assert routes.parent == 1
+
+
+def test_a_neighbour_whose_number_stays_the_same_for_five_intervals_leads_nowhere(routes):
+    for second in range(8):
+        routes.now_s = float(second)
+        routes.heard(1, beacon(number=3, hops=1))
+        routes.heard(2, beacon(number=second, hops=4))
+        routes.choose()
+        assert routes.parent == (1 if second <= 5 else 2)
 
 
 def test_a_gateway_without_a_new_number_for_five_intervals_is_lost(routes):
