@@ -15,6 +15,7 @@ class FlightNews:
     def __init__(self) -> None:
         self._quiet_until_s = -math.inf
         self._tries: dict[Location, float] = {}  # gateway's place -> when another may fly there
+        self._failures: set[tuple[int, Location | None]] = set()  # that were reported
         self._failed_s: dict[int, float] = {}  # node -> when it reported a failed flight there
 
     def took_off(self, quiet_until_s: float) -> None:
@@ -32,6 +33,12 @@ class FlightNews:
         if place is not None:
             until_s = now_s + keep_s
             self._tries[place] = max(until_s, self._tries.get(place, until_s))
+
+    def failed(self, node: int, place: Location | None, now_s: float, keep_s: float) -> None:
+        """`node` found no gateway at `place`; it says so in each round, and the first counts."""
+        if (node, place) not in self._failures:
+            self._failures.add((node, place))
+            self.tries(place, now_s, keep_s)
 
     def is_tried(self, place: Location, now_s: float, near_m: float) -> bool:
         """Whether a drone has been so close to `place` that a gateway there would have answered."""
@@ -52,3 +59,4 @@ class FlightNews:
         self.drone_flew = False
         self._quiet_until_s = -math.inf
         self._tries.clear()
+        self._failures.clear()

@@ -31,6 +31,7 @@ SETTLE_S = 0.5  # our choice: a bid takes some milliseconds per hop; enough for 
 TAKE_OFF_WITHIN_S = 5.0  # docs/protocol.md, "Negotiation": then the winner is passed over
 ROUNDS_WITHOUT_FLIER = 2  # docs/protocol.md, "Negotiation": then the second choice counts
 LATER_ROUNDS = 1.0 / 3.0  # of the patience, our choice: a step back takes about 5 s
+HOME_FAILED_ROUNDS = 10  # our choice: then another drone tries; its radio may hear the gateway
 HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a group to a gateway
 
 IN_A_ROUND = (RepairState.ASKING, RepairState.NEGOTIATING, RepairState.WATCHING)
@@ -285,8 +286,8 @@ class GroupRepair(LoneRepair):
         mesh = self.mesh
         if mesh.connected or not self._news.is_new_failure(node, mesh.now_s, TAKE_OFF_WITHIN_S):
             return
-        rounds_s = 2 * (mesh.connection_lost_after_s + mesh.check_period_s)
-        self._news.tries(about or mesh.gateway_place, mesh.now_s, rounds_s)
+        rounds_s = HOME_FAILED_ROUNDS * (mesh.connection_lost_after_s + mesh.check_period_s)
+        self._news.failed(node, about or mesh.gateway_place, mesh.now_s, rounds_s)
         mesh.bid(HOME_FAILED, node, but_not_to=from_, about=about)
 
     def _was_home(self) -> Location | None:

@@ -541,6 +541,16 @@ def test_a_drone_that_knows_no_place_flies_to_where_it_was_connected_last():
     assert rig.engine.goals[:1] == [Location(12.0, 0.0, 0.0)]
 
 
+def test_after_flights_to_both_places_in_vain_it_looks_around_where_it_was_connected_last():
+    rig = lone_rig()
+    for _ in range(20):
+        if rig.engine.goals:
+            goal = rig.engine.goals[-1]
+            rig.engine.place = Location(float(goal.latitude), float(goal.longitude), 0.0)
+        rig.wait(15.0)
+    assert rig.engine.goals[-3:] == [BESIDE_GATEWAY, Location(12.0, 0.0, 0.0), BESIDE_GATEWAY]
+
+
 def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_and_says_so():
     rig = Rig()
     rig.engine.place = Location(12.0, 0.0, 0.0)
@@ -988,6 +998,20 @@ def test_what_another_drone_found_in_vain_is_no_second_choice():
         rig.wait(TO_DECISION_S)
     assert rig.engine.goals == []
     assert "another drone flew to the gateway without success" in rig.repair_in_words()
+
+
+def test_ten_rounds_after_another_drone_was_at_the_gateway_in_vain_it_tries_itself():
+    """The first one repeats in each round that it failed; perhaps only its radio is deaf."""
+    rig = group_rig(2, 3)
+    rig.antenna.dead = set()
+    while rig.now_s < 400.0:
+        assert rig.engine.goals == []
+        rig.wait(5.0)
+        rig.hear(bid(3, HOME_FAILED), bid(2, -1.0))
+    while not rig.engine.goals and rig.now_s < 500.0:
+        rig.wait(5.0)
+        rig.hear(bid(3, HOME_FAILED), bid(2, -1.0))
+    assert rig.engine.goals == [A_LEG_FROM_12]
 
 
 def test_what_another_drone_found_in_vain_elsewhere_does_not_keep_this_one_from_the_gateway():
