@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable, Sequence
+from typing import Callable, Collection, Sequence
 
 from drone_mesh.drone.location import Location
 from drone_mesh.inprocess import Network
@@ -10,6 +10,7 @@ from drone_mesh.inprocess.status import event_records
 from drone_mesh.lab.network_sample import gateways_of, physical_graph
 from drone_mesh.layouts import Layouts
 from drone_mesh.state.formation_preview import preview
+from drone_mesh.state.model import MeshStatus
 from drone_mesh.state.standing_orders import PartState, StandingOrders
 
 LOOK_S = 1.0  # our choice: /mesh/state comes at least as often at real time
@@ -32,6 +33,8 @@ class Formations:
         self._layouts = Layouts.shipped()
         self._orders = StandingOrders()
         self._goals: dict[int, Location] = {}
+        self._out_of_reach: set[int] = set()  # left out by the plan
+        self._at_once = False
         self._number = 0
         self._events_read = 0
 
@@ -48,8 +51,18 @@ class Formations:
         orders = self._layouts.orders(case)
         self._goals = {drone: goal for drone, goal in orders if drone in self._network.nodes}
         self.given_s, self.reached_s = status.stamp_s, None
-        self.planned_s = preview(status, self._goals, at_once=at_once).duration_s
+        self._at_once = at_once
+        self._plan(status, self._reach())
         self._number = self._orders.give(case, self._goals, status.stamp_s, at_once)
+
+    def _plan(self, status: MeshStatus, reach: Collection[int]) -> None:
+        standing = self._orders.goals(status)
+        plan = preview(status, self._goals, at_once=self._at_once, standing=standing)
+        self._out_of_reach = plan.stays.keys() - reach
+        self.planned_s = status.stamp_s - (self.given_s or 0.0) + plan.duration_s
+
+    def _reach(self) -> Collection[int]:
+        return physical_graph(self._network).hops_from(gateways_of(self._network))
 
     def _look(self, _: object) -> None:
         network = self._network
@@ -64,10 +77,13 @@ class Formations:
     def _observe(self) -> None:
         """A drone can be reached while it flies, or has power and a path to a gateway.
 
-        One that has been at its place and left it for a repair is not missing.
+        One that has been at its place and left it for a repair is not missing. The plan is made
+        anew when a drone can be reached that had no path when it was made.
         """
         network = self._network
-        reach = physical_graph(network).hops_from(gateways_of(network))
+        reach = self._reach()
+        if self._out_of_reach.intersection(reach):
+            self._plan(network.status(), reach)
         (progress,) = [p for p in self._orders.all_progress() if p.number == self._number]
         done = {*progress.drones[PartState.ARRIVED], *progress.drones[PartState.REFUSED]}
         self.missing = [

@@ -107,14 +107,20 @@ class Departures:
                     to = self._aside(drone) or self._goals[drone]
                 else:
                     continue
-                waits = not self._try(drone, to, choice) and drone not in choice.blocked or waits
+                if not self._try(drone, to, choice) and drone not in choice.blocked:
+                    waits = waits or self._may_go_later(drone, to)
         if not waits:  # nobody will make a path for the others
-            for drone in left:
+            hops = self._hops_at_the_end()
+            for drone in sorted(left, key=lambda drone: hops.get(drone, NO_ROUTE)):
                 if drone not in choice.set_out:
                     self._try(drone, self._goals[drone], choice)
         if not self._ends:
             self._resolve([drone for drone in left if drone not in choice.blocked], choice)
         return choice
+
+    def is_in_reach(self, drone: int) -> bool:
+        """Whether its goal has a path to a gateway over drones that stay, or arrive there."""
+        return self._is_near(self._goals[drone], self._anchors())
 
     def taken_by(self, drone: int) -> str:
         """Why its goal is not free, and will not be; empty if it may be."""
@@ -148,17 +154,27 @@ class Departures:
         self._leave(drone, path)
         return True
 
+    def _may_go_later(self, drone: int, to: Location) -> bool:
+        """Whether it only waits for those that fly now."""
+        path = self._path(drone, to)
+        blocks = path is not None and self._airspace.in_the_way(drone, path)
+        return not blocks and self._mesh_holds_without(drone, landed=True)
+
     # The mesh --------------------------------------------------------------------------------
 
-    def _mesh_holds_without(self, drone: int) -> bool:
-        """Whether enough drones stay connected, and all that are still to be ordered."""
+    def _mesh_holds_without(self, drone: int, landed: bool = False) -> bool:
+        """Whether enough drones stay connected, and all that are still to be ordered.
+
+        `landed`: once those that fly now are back in the mesh.
+        """
         before = self._reach.over(self._resting)
         after = self._reach.over(self._resting - {drone})
         if (before - after - {drone}) & self._to_go:
             return False
-        connected = after - self._rerouting - self._behind[drone]
-        flying = len(self._ends) + 1 if self._flying_are_members else 0
-        return len(connected) + flying >= CONNECTED_SHARE * self._fleet
+        connected = len(after - self._rerouting - self._behind[drone])
+        if landed or self._flying_are_members:
+            connected += len(self._ends)
+        return connected + self._flying_are_members >= CONNECTED_SHARE * self._fleet
 
     def _anchors(self) -> np.ndarray:
         """Places from which a drone will have a path to a gateway, (n, 3)."""
@@ -168,6 +184,13 @@ class Departures:
         reach = Reach(places, self._gateways & places.keys(), self._range_m)
         anchors: np.ndarray = np.array([places[n] for n in reach.hops(places)])
         return anchors.reshape(-1, 3)
+
+    def _hops_at_the_end(self) -> Mapping[int, int]:
+        """Of the drones that will have a path to a gateway when all are at their places."""
+        places = {n: self._nodes[n].position for n in self._resting if self._nodes[n].on}
+        places.update({n: end.to_vector() for n, end in self._ends.items() if self._nodes[n].on})
+        places.update({n: self._goals[n].to_vector() for n in self._to_go})
+        return Reach(places, self._gateways & places.keys(), self._range_m).hops(places)
 
     def _is_near(self, goal: Location, anchors: np.ndarray) -> bool:
         away = anchors - np.asarray(goal.to_vector())

@@ -6,7 +6,7 @@ The flights of the plan, on an ideal mesh: a drone is connected if places and ra
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Mapping
+from typing import AbstractSet, Mapping
 
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
@@ -24,7 +24,7 @@ STEP_S = 2.0  # our choice: how often the plan looks who may set out; also its t
 class FormationPreview:
     """What would happen to a fleet; ids ascending."""
 
-    duration_s: float = 0.0  # until the last drone has landed
+    duration_s: float = 0.0  # until the last drone of the formation has landed
     out_of_reach: list[int] = field(default_factory=list)  # without a path at the end
     cut_off: list[int] = field(default_factory=list)  # at rest and without a path on the way
     stays: dict[int, str] = field(default_factory=dict)  # who does not set out: why
@@ -52,13 +52,25 @@ def preview(
     goals: Mapping[int, Location],
     rules: FlightRules = FlightRules(),  # noqa: B008 (immutable)
     at_once: bool = False,
+    standing: Mapping[int, Location] | None = None,
 ) -> FormationPreview:
-    """Fly this formation from the present state of the mesh."""
-    return _Rehearsal(mesh, goals, rules).run(at_once)
+    """Fly this formation from the present state of the mesh.
+
+    `standing`: goals of formations that were ordered before. Their other drones fly too.
+    """
+    others = {} if at_once or standing is None else standing
+    return _Rehearsal(mesh, {**others, **goals}, goals.keys(), rules).run(at_once)
 
 
 class _Rehearsal:
-    def __init__(self, mesh: MeshStatus, goals: Mapping[int, Location], rules: FlightRules) -> None:
+    def __init__(
+        self,
+        mesh: MeshStatus,
+        goals: Mapping[int, Location],
+        formation: AbstractSet[int],
+        rules: FlightRules,
+    ) -> None:
+        self._formation = formation
         self._rules = rules
         self._range_m = mesh.max_distance
         self._routing = mesh.routing
@@ -83,9 +95,10 @@ class _Rehearsal:
             sent = self._due() if at_once else self._choose()
         self._found.out_of_reach = sorted(self._routers() - self._connected().keys())
         self._found.cut_off = sorted(set(self._found.cut_off) - set(self._found.out_of_reach))
-        for drone, goal in self._goals.items():
-            node = self._nodes[drone]
-            if Location.from_vector(node.position).distance_m(goal) > AT_PLACE_M:
+        self._found.stays = {n: why for n, why in self._found.stays.items() if n in self._formation}
+        for drone in self._formation & self._nodes.keys():
+            here = Location.from_vector(self._nodes[drone].position)
+            if here.distance_m(self._goals[drone]) > AT_PLACE_M:
                 self._found.stays.setdefault(drone, "it has no route")
         return self._found
 
@@ -130,7 +143,8 @@ class _Rehearsal:
             if path.share_flown(self._now_s) >= 1.0:
                 node.path = ()
                 del self._flights[drone]
-                self._found.duration_s = path.start_s + path.duration_s
+                if drone in self._formation:
+                    self._found.duration_s = path.start_s + path.duration_s
 
     def _routers(self) -> set[int]:
         return {n for n, node in self._nodes.items() if node.on and node.role != Role.GATEWAY}

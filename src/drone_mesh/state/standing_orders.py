@@ -22,6 +22,7 @@ from drone_mesh.state.orders import CLOCKS_DIFFER_S
 
 FIRST_PAUSE_S = 5.0  # our choice, simulated: an order over 100 nodes takes less than a second
 LONGEST_PAUSE_S = 40.0  # our choice: each try costs a packet per hop
+CUT_OFF = "its place is out of reach"  # it was there, and a repair brought it back
 UNDER_WAY_S = 30.0  # a gateway repeats an order for as long: the drone may still set out
 
 
@@ -225,9 +226,11 @@ class StandingOrders:
             departures = self._departures(mesh, rules)
             taken = {drone: departures.taken_by(drone) for drone in together}
             free = {drone: part.goal for drone, part in together.items() if not taken[drone]}
-            choice = departures.choose(due)
+            back = {drone for drone, part in due.items() if part.arrived}
+            cut_off = {drone: CUT_OFF for drone in back if not departures.is_in_reach(drone)}
+            choice = departures.choose(due.keys() - cut_off.keys())
             together.update(due)
-            for drone, reason in [*taken.items(), *choice.blocked.items()]:
+            for drone, reason in [*taken.items(), *cut_off.items(), *choice.blocked.items()]:
                 if reason:
                     together[drone].stay(PartState.REFUSED, reason)
             for drone, to in [*free.items(), *choice.set_out.items()]:
@@ -238,18 +241,25 @@ class StandingOrders:
         return list(wanted.items())
 
     def _departures(self, mesh: MeshStatus, rules: FlightRules) -> Departures:
-        goals: dict[int, Location] = {}
-        sent: dict[int, Location] = {}
+        sent = {
+            drone: _as_ordered(part.sent_to)
+            for order in self._orders.values()
+            for drone, part in order.parts.items()
+            if part.state.is_open and part.sent_to is not None
+        }
+        return Departures(mesh, self.goals(mesh), sent, rules)
+
+    def goals(self, mesh: MeshStatus) -> dict[int, Location]:
+        """The places that drones still have to reach, or have reached and keep."""
         at = {n.id: Location.from_vector(n.position) for n in mesh.nodes if position_is_known(n)}
+        goals: dict[int, Location] = {}
         for order in self._orders.values():
             for drone, part in order.parts.items():
                 goal = _as_ordered(part.goal)
                 stands = drone in at and at[drone].distance_m(goal) <= AT_PLACE_M
                 if part.state.is_open or (part.state is PartState.ARRIVED and stands):
                     goals[drone] = goal
-                    if part.state.is_open and part.sent_to is not None:
-                        sent[drone] = _as_ordered(part.sent_to)
-        return Departures(mesh, goals, sent, rules)
+        return goals
 
     def _follow(self, part: _Part, node: NodeStatus | None, at_once: bool, now_s: float) -> bool:
         """Update one drone's state; returns whether it may be ordered now."""

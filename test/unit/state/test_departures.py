@@ -97,6 +97,32 @@ def test_far_drones_set_out_before_relays():
     assert list(choose(state, goals).set_out) == [3]
 
 
+def test_a_far_drone_does_not_wait_for_a_relay_that_cannot_go():
+    places = {n: at(0.9 * n - 7, 2.0) for n in range(1, 16)}
+    routes = {n: (n, 9, 0) for n in range(1, 5)}
+    state = mesh(places, routes=routes)
+    state.nodes[7].path = (*places[7].to_vector(), -8.0, 8.0, 0.0)
+    assert list(choose(state, {8: at(40, 40), 9: at(6, 0)}).set_out) == [8]
+
+
+def test_a_far_drone_does_not_wait_for_one_whose_place_a_waiting_relay_holds():
+    places = {n: at(0.9 * n - 9, -2.0) for n in range(1, 17)} | {17: at(6, 3), 18: at(14, 3)}
+    goals = {16: at(6, 3), 17: at(30, 30), 18: at(40, 40), 15: at(-40, 0)}
+    flying = mesh(places)
+    flying.nodes[14].path = (*places[14].to_vector(), 3.0, -8.0, 0.0)
+    assert 16 not in choose(flying, goals).set_out
+    assert 18 in choose(flying, goals).set_out
+
+
+def test_a_preview_flies_the_drones_of_standing_formations_too():
+    places = {1: at(1, 0), 2: at(4, 0)}
+    there = {1: at(4, 0)}
+    assert preview(mesh(places), there).stays == {1: "drone 2 is in the way"}
+    found = preview(mesh(places), there, standing={2: at(-4, 0)})
+    assert found.stays == {}
+    assert found.duration_s > preview(mesh({1: at(1, 0)}), there).duration_s
+
+
 def test_at_most_a_fifth_of_the_drones_is_away_at_once():
     places = {n: at(1.5 * (n % 5) - 3, 1.5 * (n // 5) + 1.5) for n in range(1, 21)}
     goals = {n: place._replace(longitude=place.longitude + 8) for n, place in places.items()}

@@ -104,6 +104,20 @@ def test_a_drone_that_found_no_mesh_at_its_place_is_ordered_back_once_it_is_conn
     assert orders.update(state(60.0, gateway(), repaired, late, *others)) == [(4, EAST)]
 
 
+def test_a_drone_brought_back_from_a_place_out_of_reach_is_named_until_that_is_in_reach():
+    far, north, back = EAST._replace(longitude=14.0), drone(5, at=NORTH), drone(4, at=HOME)
+    aside = drone(5, at=NORTH, to=NORTH._replace(longitude=3.0))
+    others = [gateway(), *(drone(n, at=Location(n - 10.0, -3.0, 0.0)) for n in range(10, 20))]
+    orders = StandingOrders()
+    orders.give(7, {4: far, 5: EAST}, now_s=0.0)
+    orders.update(state(0.0, drone(4), north, *others))
+    orders.update(state(9.0, drone(4, at=far, connected=False), aside, *others))
+    assert orders.update(state(60.0, back, aside, *others)) == []
+    assert "4 refused: its place is out of reach" in words(orders)[0]
+    there = drone(5, at=NORTH, to=EAST)
+    assert orders.update(state(61.0, back, there, *others)) == [(4, far)]
+
+
 def test_a_drone_that_finds_no_mesh_at_its_place_is_not_ordered_back_when_nobody_else_comes():
     orders = StandingOrders()
     orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)

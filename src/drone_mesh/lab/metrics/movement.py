@@ -118,7 +118,10 @@ def formation_s(run: RunRecord) -> float:
     return NAN if given_s is None or reached_s is None else reached_s - given_s
 
 
-@metric("s", "by which this is longer than the plan", better="less", censored=True)
+@metric(
+    "s", "by which this is longer than the plan, made when all these had a path",
+    better="less", censored=True,
+)  # fmt: skip
 def formation_late_s(run: RunRecord) -> float:
     return formation_s(run) - run.formations.planned_s
 

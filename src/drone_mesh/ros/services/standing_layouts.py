@@ -133,7 +133,11 @@ class StandingLayouts:
     def preview(self, orders: Sequence[Order], at_once: bool) -> FormationPreview | None:
         """What would happen if these were ordered now; None: the state of the mesh is unknown."""
         mesh = self._mesh
-        return None if mesh is None else preview(mesh, dict(orders), flight_rules(), at_once)
+        if mesh is None:
+            return None
+        with self._lock:
+            standing = self._orders.goals(mesh)
+        return preview(mesh, dict(orders), flight_rules(), at_once, standing)
 
     def replace(self, drone: int) -> None:
         """This drone is ordered elsewhere."""
