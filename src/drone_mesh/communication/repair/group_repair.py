@@ -31,7 +31,6 @@ SETTLE_S = 0.5  # our choice: a bid takes some milliseconds per hop; enough for 
 TAKE_OFF_WITHIN_S = 5.0  # docs/protocol.md, "Negotiation": then the winner is passed over
 ROUNDS_WITHOUT_FLIER = 2  # docs/protocol.md, "Negotiation": then the second choice counts
 LATER_ROUNDS = 1.0 / 3.0  # of the patience, our choice: a step back takes about 5 s
-LAST_CHOICE = 3  # rounds without a flight, our choice: then the place of the last connection counts
 HOME_FAILED_ROUNDS = 20  # our choice: then another drone tries; its radio may hear the gateway
 HOME_AGAIN_S = 60.0  # docs/protocol.md, "Negotiation": between flights of a group to a gateway
 
@@ -143,15 +142,10 @@ class GroupRepair(LoneRepair):
                 reason = f"the place of {step.owner} is occupied by {occupant}"
             elif step.home and not alone and self._is_tried(step.place):
                 reason = "another drone flew to the gateway without success"
-            elif alone or self._is_its_turn(step, is_first_choice):
+            elif is_first_choice or self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER:
                 return step, ""
             is_first_choice = False
         return None, reason
-
-    def _is_its_turn(self, step: Step, is_first_choice: bool) -> bool:
-        if step.owner == NO_ROUTE:
-            return self._rounds_without_flier >= LAST_CHOICE
-        return is_first_choice or self._rounds_without_flier >= ROUNDS_WITHOUT_FLIER
 
     def _is_tried(self, place: Location) -> bool:
         """Whether another drone has been so close that a gateway would have answered it."""

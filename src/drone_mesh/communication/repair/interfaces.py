@@ -116,7 +116,7 @@ class IRepairActions(abc.ABC):
     @property
     @abc.abstractmethod
     def steps(self) -> list[Step]:
-        """The flights back: to the lost next hop, to the gateway, to where it was connected."""
+        """The flights back: to the lost next hop and the gateway; else where it was connected."""
 
     @property
     @abc.abstractmethod

@@ -95,11 +95,9 @@ class RepairViews(IRepairActions):
     @property
     def steps(self) -> list[Step]:  # noqa: D102
         places, gateway = self._parts.places, self._control.gateway
-        candidates = [
-            (places.good, places.good_id),
-            (places.gateway, gateway),
-            (places.connected_at, NO_ROUTE),
-        ]
+        candidates = [(places.good, places.good_id), (places.gateway, gateway)]
+        if places.good is None and places.gateway is None:
+            candidates = [(places.connected_at, NO_ROUTE)]
         return [
             Step(place, owner, home=owner == gateway != NO_ROUTE)
             for place, owner in candidates

@@ -541,16 +541,6 @@ def test_a_drone_that_knows_no_place_flies_to_where_it_was_connected_last():
     assert rig.engine.goals[:1] == [Location(12.0, 0.0, 0.0)]
 
 
-def test_after_flights_to_both_places_in_vain_it_looks_around_where_it_was_connected_last():
-    rig = lone_rig()
-    for _ in range(20):
-        if rig.engine.goals:
-            goal = rig.engine.goals[-1]
-            rig.engine.place = Location(float(goal.latitude), float(goal.longitude), 0.0)
-        rig.wait(15.0)
-    assert rig.engine.goals[-3:] == [BESIDE_GATEWAY, Location(12.0, 0.0, 0.0), BESIDE_GATEWAY]
-
-
 def test_a_drone_that_knows_no_place_and_is_where_it_was_connected_last_stays_and_says_so():
     rig = Rig()
     rig.engine.place = Location(12.0, 0.0, 0.0)
