@@ -104,7 +104,9 @@ def test_places_and_tracks_are_saved_in_degrees(page):
     assert saved["tracks.kml"].count("<LineString>") == 1
     (track,) = json.loads(saved["tracks.geojson"])["features"]
     assert track["properties"]["drone"] == 3
-    assert len(track["properties"]["times_s"]) == len(track["geometry"]["coordinates"]) > 3
+    flown = track["geometry"]["coordinates"]
+    assert len(track["properties"]["times_s"]) == len(flown)
+    assert flown[0][0] < flown[-1][0], "to the east"
     places = json.loads(saved["places.geojson"])["features"]
     (three,) = (place for place in places if place["properties"]["drone"] == 3)
     longitude, latitude, altitude = three["geometry"]["coordinates"]
