@@ -130,9 +130,9 @@ def _run(options: Options, request: StopRequest) -> None:
         if options.record is not None:
             record = MeshRecord(options.record, nodes[0].submit, nodes[0].mesh)
             stack.callback(record.close)
+        switch = stack.enter_context(_DebugSwitch())  # first: without it, USR1 ends the program
         for node in nodes:
             node.start()
-        switch = stack.enter_context(_DebugSwitch())
         manager = ServiceManager()
         manager.ready()
         watch = _Watch(nodes, options, manager)
