@@ -10,6 +10,25 @@ from drone_mesh.lab.network_sample import NetworkSample
 
 
 @dataclass
+class Lapses:
+    """Of the routers that have a path, how many are in a state that they should be in."""
+
+    shares: list[float] = field(default_factory=list)  # of each sample
+    lapses_s: list[float] = field(default_factory=list)  # times with a path, but not in that state
+    _since_s: dict[int, float] = field(default_factory=dict, repr=False)  # node -> of its lapse
+
+    def look(self, now_s: float, reachable: AbstractSet[int], well: AbstractSet[int]) -> None:
+        """Take one sample: the routers that have a path, and those in that state."""
+        lapsing = reachable - well
+        if reachable:
+            self.shares.append(1.0 - len(lapsing) / len(reachable))
+        for node in self._since_s.keys() - lapsing:  # well again, off, or without any path
+            self.lapses_s.append(now_s - self._since_s.pop(node))
+        for node in lapsing - self._since_s.keys():
+            self._since_s[node] = now_s
+
+
+@dataclass
 class LinkWatch:
     """Sums over the samples of a run, from `from_s` on."""
 
@@ -22,9 +41,8 @@ class LinkWatch:
     router_s: float = 0.0  # live routers times seconds
     reachable_s: float = 0.0  # of these, with a path over existing links
     served_s: float = 0.0  # of these, served
-    shares: list[float] = field(default_factory=list)  # of each sample: served of those with a path
-    lapses_s: list[float] = field(default_factory=list)  # times with a path, but not served
-    _lapsing: dict[int, float] = field(default_factory=dict, repr=False)  # node -> since when
+    service: Lapses = field(default_factory=Lapses)
+    connection: Lapses = field(default_factory=Lapses)
     _links: set[tuple[int, int]] | None = field(default=None, repr=False)
     _last_s: float = field(default=0.0, repr=False)
 
@@ -44,14 +62,6 @@ class LinkWatch:
             self.router_s += len(sample.alive) * passed_s
             self.reachable_s += len(reachable) * passed_s
             self.served_s += len(sample.served & reachable) * passed_s
-            self._follow_lapses(sample, reachable)
+            self.service.look(sample.now_s, reachable, sample.served)
+            self.connection.look(sample.now_s, reachable, sample.connected)
         self._links, self._last_s = links, sample.now_s
-
-    def _follow_lapses(self, sample: NetworkSample, reachable: AbstractSet[int]) -> None:
-        lapsing = reachable - sample.served
-        if reachable:
-            self.shares.append(1.0 - len(lapsing) / len(reachable))
-        for node in self._lapsing.keys() - lapsing:  # served again, off, or without any path
-            self.lapses_s.append(sample.now_s - self._lapsing.pop(node))
-        for node in lapsing - self._lapsing.keys():
-            self._lapsing[node] = sample.now_s

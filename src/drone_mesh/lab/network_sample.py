@@ -15,7 +15,8 @@ class NetworkSample:
 
     now_s: float
     alive: frozenset[int]  # routers whose antenna has power
-    served: frozenset[int]  # of these, the ones connected over a working path
+    connected: frozenset[int]  # of these, the ones that consider themselves connected
+    served: frozenset[int]  # of these, the ones with a working path
 
     @property
     def share(self) -> float:
@@ -32,15 +33,20 @@ def sample_of(network: Network) -> NetworkSample:
     nodes = network.nodes
     leads = {n: node.antenna.powered for n, node in nodes.items() if node.is_gateway}
     alive = []
+    connected = []
     served = []
     for node_id, node in nodes.items():
         if node_id in leads and node.is_gateway:
             continue
         if node.antenna.powered:
             alive.append(node_id)
-            if node.component.get_connected_to_gateway() and _leads(network, node_id, leads):
-                served.append(node_id)
-    return NetworkSample(network.clock.now_s, frozenset(alive), frozenset(served))
+            if node.component.get_connected_to_gateway():
+                connected.append(node_id)
+                if _leads(network, node_id, leads):
+                    served.append(node_id)
+    return NetworkSample(
+        network.clock.now_s, frozenset(alive), frozenset(connected), frozenset(served)
+    )
 
 
 def _leads(network: Network, start: int, leads: dict[int, bool]) -> bool:

@@ -129,7 +129,7 @@ def test_links_that_come_and_go_are_counted_per_drone_and_minute() -> None:
     routers = frozenset({1, 2})
 
     def look(now_s: float, near: dict[int, list[int]], served: set[int]) -> None:
-        sample = NetworkSample(now_s, routers, frozenset(served))
+        sample = NetworkSample(now_s, routers, routers, frozenset(served))
         watch.look(sample, Graph(near), [0])
 
     look(5.0, {0: [1, 2], 1: [0], 2: [0]}, {1, 2})  # before it begins
@@ -196,13 +196,19 @@ def test_many_drones_at_once_are_switched_off_and_on_again_each_minute() -> None
     assert set(batches.values()) == {4}
 
 
-def test_lapses_are_the_times_in_which_a_router_has_a_path_and_is_not_served() -> None:
+def test_lapses_are_the_times_in_which_a_router_has_a_path_and_is_not_served_or_connected() -> None:
     watch = LinkWatch(0.0)
     line = Graph({0: [1], 1: [0, 2], 2: [1]})
-    for now_s, served in ((0, {1, 2}), (1, {1}), (2, {1}), (3, {1, 2}), (4, set()), (5, {1, 2})):
-        watch.look(NetworkSample(float(now_s), frozenset({1, 2}), frozenset(served)), line, [0])
-    assert sorted(watch.lapses_s) == [1.0, 1.0, 2.0]
-    assert watch.shares == [0.5, 0.5, 1.0, 0.0, 1.0]
+    both, nobody, first = frozenset({1, 2}), frozenset[int](), frozenset({1})
+    served = (both, first, first, both, nobody, both)
+    connected = (both, both, first, both, nobody, first)
+    for now_s, (states, served_now) in enumerate(zip(connected, served)):
+        watch.look(NetworkSample(float(now_s), both, states, served_now), line, [0])
+    watch.look(NetworkSample(6.0, both, both, both), line, [0])
+    assert sorted(watch.service.lapses_s) == [1.0, 1.0, 2.0]
+    assert watch.service.shares == [0.5, 0.5, 1.0, 0.0, 1.0, 1.0]
+    assert sorted(watch.connection.lapses_s) == [1.0, 1.0, 2.0]
+    assert watch.connection.shares == [1.0, 0.5, 1.0, 0.0, 0.5, 1.0]
 
 
 CHANNEL = {"kind": "shared", "rate": "1M"}

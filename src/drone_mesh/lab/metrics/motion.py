@@ -38,22 +38,42 @@ def served(run: RunRecord) -> float:
 
 @metric("share", "the same share at the worst of 20 moments (5th percentile)", better="more")
 def served_p5(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.shares, 0.05)
+    return _percentile([] if run.links is None else run.links.service.shares, 0.05)
 
 
 @metric("share", "the same share, median over time", better="more")
 def served_p50(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.shares, 0.5)
+    return _percentile([] if run.links is None else run.links.service.shares, 0.5)
 
 
 @metric("s", "median time that a router has a path and is not served", better="less")
 def lapse_p50_s(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.lapses_s, 0.5)
+    return _percentile([] if run.links is None else run.links.service.lapses_s, 0.5)
 
 
 @metric("s", "99th percentile of these times", better="less")
 def lapse_p99_s(run: RunRecord) -> float:
-    return _percentile([] if run.links is None else run.links.lapses_s, 0.99)
+    return _percentile([] if run.links is None else run.links.service.lapses_s, 0.99)
+
+
+@metric("share", "connected routers of those with a path at the worst of 20 moments", better="more")
+def connected_p5(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.connection.shares, 0.05)
+
+
+@metric("share", "the same share, median over time", better="more")
+def connected_p50(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.connection.shares, 0.5)
+
+
+@metric("s", "median time that a router has a path and is not connected", better="less")
+def unconnected_p50_s(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.connection.lapses_s, 0.5)
+
+
+@metric("s", "99th percentile of these times", better="less")
+def unconnected_p99_s(run: RunRecord) -> float:
+    return _percentile([] if run.links is None else run.links.connection.lapses_s, 0.99)
 
 
 @metric(
