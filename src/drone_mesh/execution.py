@@ -2,7 +2,8 @@
 
 The core has no threads (docs/protocol.md, "Driven from outside"). Packets, orders and time meet
 here: work from other threads waits in one first-in-first-out queue, timers wait in a heap of
-deadlines, and one worker runs whatever has waited longest.
+deadlines, and one worker runs whatever has waited longest. Requests from outside simulated
+time, such as orders of users, wait until nothing else does.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ import logging
 import math
 import queue
 import threading
-from collections import Counter
+from collections import Counter, deque
 from typing import Callable, Protocol
 
 FAILURE_PERIOD_S = 30.0  # our choice: one traceback per kind of failure in this time
 RETRY_AFTER_S = 1.0  # our choice: pause before failed work that is still due runs again
 MOST_WAITING = 1000  # our choice: packets for one node; four from each other node
+REQUESTS_PER_STEP = 4  # our choice: of simulated time, which goes on while further ones wait
+REQUEST_PAUSE_S = 0.05  # our choice: wall; then as many again, if simulated time stands still
 _WAKE = None  # in the queue: no function, only check the deadlines again
 
 _log = logging.getLogger(__name__)
@@ -86,7 +89,7 @@ class _Periodic:
 class ExecutorSlot:
     """One component's place in an executor; the antenna uses `submit` before the component exists.
 
-    Any thread may call `submit` and `call_every`; everything else is for the executor's worker.
+    Any thread may call `submit`, `request` and `call_every`; the rest is for the executor's worker.
     """
 
     def __init__(self, executor: MeshExecutor) -> None:
@@ -97,6 +100,10 @@ class ExecutorSlot:
     def submit(self, function: Work) -> None:
         """Run `function(now_s)` on the worker's thread, after all earlier submissions."""
         self._executor.submit(function, self)
+
+    def request(self, function: Work) -> None:
+        """As MeshExecutor.request."""
+        self._executor.request(function, self)
 
     def take(self, driven: Driven) -> None:
         """Drive this component from now on. Only on the worker's thread."""
@@ -118,8 +125,8 @@ class ExecutorSlot:
 class MeshExecutor:
     """Owns components and calls into them from one thread.
 
-    Any thread may use `submit`, `call_every`, `time_advanced`, `lag_s`, `start` and `stop`. An
-    exception from one component is logged and counted, and does not affect the others.
+    Any thread may use `submit`, `request`, `call_every`, `time_advanced`, `lag_s`, `start` and
+    `stop`. An exception from one component is logged and counted, and does not affect the others.
     """
 
     def __init__(
@@ -135,6 +142,7 @@ class MeshExecutor:
         self._queue: queue.SimpleQueue[tuple[float, Work, ExecutorSlot | None] | None] = (
             queue.SimpleQueue()
         )
+        self._requests: deque[tuple[Work, ExecutorSlot | None]] = deque()
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._stopping = False
         self._on_idle: Callable[[], None] = lambda: None
@@ -146,6 +154,7 @@ class MeshExecutor:
         # Only for the worker.
         self._deadlines: list[tuple[float, int, ExecutorSlot | _Periodic]] = []
         self._order = itertools.count()
+        self._served_s, self._served = -math.inf, 0  # requests, and at which time of the clock
         self._logged_s: dict[str, float] = {}
         self.failures: Counter[str] = Counter()  # by name of the exception
 
@@ -160,7 +169,7 @@ class MeshExecutor:
         self._on_idle = function
 
     def stop(self) -> None:
-        """Finish the submitted work, then stop; returns when the thread has ended."""
+        """Finish the submitted work, but no requests; returns when the thread has ended."""
         self.submit(self._stop)
         if self._thread.is_alive():
             self._thread.join()
@@ -173,6 +182,18 @@ class MeshExecutor:
         """Run `function(now_s)` on the worker's thread, after all earlier submissions."""
         self._queue.put((self._clock(), function, slot))
 
+    def request(self, function: Work, slot: ExecutorSlot | None = None) -> None:
+        """Run `function(now_s)` after all earlier requests, when no other work is left.
+
+        A simulated world waits for submitted work, but not for requests: only REQUESTS_PER_STEP run
+        in each step of its clock, so that a burst of them does not stop it.
+        """
+        if self._clock_notifies:
+            self._requests.append((function, slot))
+            self._queue.put(_WAKE)
+        else:
+            self.submit(function, slot)
+
     def call_every(self, period_s: float, function: Work) -> Callable[[], None]:
         """Call `function` once per period, first after one; returns a function to stop it."""
         periodic = _Periodic(period_s, function, self._clock() + period_s)
@@ -181,7 +202,7 @@ class MeshExecutor:
 
     def time_advanced(self) -> None:
         """The clock has advanced: check whether work has become due."""
-        if self._clock() >= self._next_due_s:
+        if self._requests or self._clock() >= self._next_due_s:
             self._queue.put(_WAKE)
 
     def lag_s(self, now_s: float) -> float:
@@ -207,6 +228,9 @@ class MeshExecutor:
             if waiting is None:
                 block = not deadlines or deadlines[0][0] > self._clock()
                 if block and self._queue.empty():
+                    if self._may_serve():
+                        self._serve()
+                        continue
                     self._on_idle()
                     self._idle = True
                 waiting = self._take(block)
@@ -220,17 +244,36 @@ class MeshExecutor:
                 waiting = None
                 self._working_since_s = submitted_s
                 self._run(function, now_s, slot)
-            self._next_due_s = deadlines[0][0] if deadlines else math.inf
-            self._working_since_s = math.inf
+            self._note_progress()
+
+    def _note_progress(self) -> None:
+        self._next_due_s = self._deadlines[0][0] if self._deadlines else math.inf
+        self._working_since_s = math.inf
+
+    def _may_serve(self) -> bool:
+        """Whether a request waits that may run in this step of the clock."""
+        if self._clock() > self._served_s:
+            self._served = 0
+        return bool(self._requests) and self._served < REQUESTS_PER_STEP
+
+    def _serve(self) -> None:
+        self._served_s = self._working_since_s = now_s = self._clock()
+        self._served += 1
+        function, slot = self._requests.popleft()
+        self._run(function, now_s, slot)
+        self._note_progress()
 
     def _take(self, block: bool) -> tuple[float, Work, ExecutorSlot | None] | None:
         """The next submitted function; None: check the deadlines again."""
         timeout_s = None
-        if block and not self._clock_notifies and self._deadlines:
+        if block and self._requests:
+            timeout_s = REQUEST_PAUSE_S
+        elif block and not self._clock_notifies and self._deadlines:
             timeout_s = max(0.0, self._deadlines[0][0] - self._clock())
         try:
             return self._queue.get(block, timeout_s)
         except queue.Empty:
+            self._served = 0
             return None
 
     def _tick_first(self, now_s: float) -> None:

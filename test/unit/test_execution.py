@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from drone_mesh.execution import MeshExecutor, PacketInbox
+from drone_mesh.execution import REQUESTS_PER_STEP, MeshExecutor, PacketInbox
 
 PATIENCE_S = 5.0  # for threads; nothing here takes a hundredth of it
 
@@ -194,6 +194,37 @@ def test_it_reports_when_no_work_is_left_and_not_before(clock):
     assert idle.wait(PATIENCE_S), "it never said that it is idle"
     executor.stop()
     assert seen[:4] == [0, 1, 2, "idle"]
+
+
+def test_a_burst_of_requests_lets_the_clock_go_on_between_a_few_of_them(clock):
+    executor = MeshExecutor(clock, clock_notifies=True)
+    slot, seen, done = executor.slot(), [], threading.Event()
+
+    def on_idle():
+        seen.append(f"{executor.lag_s(clock.now_s):g} s late")
+        if len(seen) > 2 * REQUESTS_PER_STEP:
+            done.set()
+        clock.now_s += 0.01
+        executor.time_advanced()
+
+    executor.when_idle(on_idle)
+    for _ in range(2 * REQUESTS_PER_STEP):
+        slot.request(lambda now_s: seen.append(now_s))
+    slot.submit(lambda now_s: seen.append("a packet"))
+    executor.start()
+    assert done.wait(PATIENCE_S), "requests are left"
+    executor.stop()
+    a_few = REQUESTS_PER_STEP
+    first, second = [0.0] * a_few, [0.01] * a_few
+    assert seen[: 2 * a_few + 3] == ["a packet", *first, "0 s late", *second, "0 s late"]
+
+
+def test_requests_are_served_while_the_clock_stands_still(executor, clock):
+    served = threading.Event()
+    for _ in range(REQUESTS_PER_STEP):
+        executor.request(lambda _now_s: None)
+    executor.request(lambda _now_s: served.set())
+    assert served.wait(PATIENCE_S), "the last request waits for the clock"
 
 
 def test_stop_works_off_what_was_submitted_and_joins_the_thread(clock):

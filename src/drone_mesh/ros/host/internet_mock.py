@@ -20,7 +20,7 @@ from drone_mesh.web.allowance import Allowance
 _QUEUE = 512  # answers that may wait for a slow DroneManager: two whole fleets
 
 MOST_ORDERS_AT_ONCE = 512  # our choice: two whole fleets
-ORDER_PERIOD_S = 0.05  # our choice, wall: of further orders; the world waits for each
+ORDER_PERIOD_S = 0.05  # our choice, wall: of further orders
 
 _log = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ class RosInternetMock(IInternetConnection):
     Publishes /gateway/answers (FlightOrderAnswer): the outcome of each order.
     Service: /Nodes/<id>/internetSwitch (PowerSwitch): whether its internet works.
 
-    `connect` and `disconnect` are for the executor's worker, to which orders are submitted.
+    `connect` and `disconnect` are for the executor's worker, which gets the orders as requests.
     """
 
     def __init__(self, node_id: int, slot: ExecutorSlot) -> None:
@@ -54,7 +54,7 @@ class RosInternetMock(IInternetConnection):
                 self._refuse(request.ID, f"more than {1 / ORDER_PERIOD_S:g} orders a second")
                 return
             self._limit.note()
-            self._slot.submit(
+            self._slot.request(
                 lambda now_s: self._order(commands, request, allow_shared_place, now_s)
             )
 

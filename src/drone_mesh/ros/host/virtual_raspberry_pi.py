@@ -110,6 +110,6 @@ class VirtualRaspberryPiGateway(VirtualRaspberryPi):
             self._observers.add(mqtt.observe)
             return SeveralInternets(mock, mqtt)
         http = http_internet(
-            self.slot.submit, HttpSettings(port=DEFAULT_PORT + self.node_id), users=self.users
+            self.slot.request, HttpSettings(port=DEFAULT_PORT + self.node_id), users=self.users
         )
         return SeveralInternets(mock, http)
