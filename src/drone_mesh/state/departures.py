@@ -52,12 +52,15 @@ class Departures:
         goals: Mapping[int, Location],
         under_order: Mapping[int, Location],
         rules: FlightRules = FlightRules(),  # noqa: B008 (immutable)
+        first: Collection[int] = (),
     ) -> None:
         """`goals` of all drones of all formations, those at rest included.
 
         `under_order`: drones that were sent to these places and may set out at any moment.
+        `first`: the drones of the latest formation. The others leave them room.
         """
         self._goals = goals
+        self._first = first
         self._rules = rules
         self._range_m = mesh.max_distance
         self._flying_are_members = mesh.routing == MEMBERS_IN_FLIGHT
@@ -86,7 +89,8 @@ class Departures:
         self._keep_away: set[int] = set()  # drones at rest that others wait for
         members = self._reach.over(self._resting)
         self._at_home = {n for n in self._resting & goals.keys() if self._is_at(n, goals[n])}
-        can_go = members | {n for n, node in self._nodes.items() if node.connected}
+        self._connected = {n for n, node in self._nodes.items() if node.connected}
+        can_go = members | self._connected
         self._to_go = (can_go & self._resting & goals.keys()) - self._at_home
         self._fleet = len(members | (self._ends.keys() & on.keys()))
         for drone in self._resting & under_order.keys():
@@ -96,10 +100,20 @@ class Departures:
         """Who may set out now, and where to, of those that can be ordered."""
         choice = Choice()
         left = sorted(set(candidates) & self._to_go & self._resting, key=self._rank)
-        last = None
+        first = [drone for drone in left if drone in self._first]
+        if not self._some_wait(first, choice):
+            self._some_wait([drone for drone in left if drone not in self._first], choice)
+        if not self._ends:
+            self._resolve([drone for drone in left if drone not in choice.blocked], choice)
+        return choice
+
+    def _some_wait(self, left: list[int], choice: Choice) -> bool:
+        """Let those set out that may; returns whether others of them only wait for their turn."""
+        last: tuple[int, int] | None = None
+        waiting: dict[int, Location] = {}
         while last != (len(choice.set_out), len(self._keep_away)):
             last = len(choice.set_out), len(self._keep_away)
-            anchors, waits = self._anchors(), False
+            anchors, waiting = self._anchors(), {}
             for drone in [drone for drone in left if drone not in choice.set_out]:
                 if self._is_near(self._goals[drone], anchors):
                     to = self._goals[drone]
@@ -107,16 +121,19 @@ class Departures:
                     to = self._aside(drone) or self._goals[drone]
                 else:
                     continue
-                if not self._try(drone, to, choice) and drone not in choice.blocked:
-                    waits = waits or self._may_go_later(drone, to)
-        if not waits:  # nobody will make a path for the others
+                goes = self._try(drone, to, choice) or drone in choice.blocked
+                if not goes and self._may_go_later(drone, to):
+                    waiting[drone] = to
+        if not any(self._routes_hold_without(drone) for drone in waiting):
+            for drone, to in waiting.items():
+                if self._mesh_is_whole_without(drone):
+                    self._try(drone, to, choice, whatever_it_cuts=True)
+        if not waiting:  # nobody will make a path for the others
             hops = self._hops_at_the_end()
             for drone in sorted(left, key=lambda drone: hops.get(drone, NO_ROUTE)):
                 if drone not in choice.set_out:
                     self._try(drone, self._goals[drone], choice)
-        if not self._ends:
-            self._resolve([drone for drone in left if drone not in choice.blocked], choice)
-        return choice
+        return any(drone not in choice.set_out for drone in waiting)
 
     def is_in_reach(self, drone: int) -> bool:
         """Whether its goal has a path to a gateway over drones that stay, or arrive there."""
@@ -129,10 +146,10 @@ class Departures:
         near = [n for n in sorted(others) if self._is_at(n, goal, APART_M)]
         return _in_the_way(near) if near else ""
 
-    def _rank(self, drone: int) -> tuple[int, int, int]:
-        """Far ones first, relays last."""
-        hops = self._nodes[drone].hops
-        return len(self._behind[drone]), 0 if hops == NO_ROUTE else -hops, -drone
+    def _rank(self, drone: int) -> tuple[bool, int, int, int]:
+        """Those of the latest formation first; of these, far ones first, relays last."""
+        hops, later = self._nodes[drone].hops, drone not in self._first
+        return later, len(self._behind[drone]), 0 if hops == NO_ROUTE else -hops, -drone
 
     def _try(
         self, drone: int, to: Location, choice: Choice, whatever_it_cuts: bool = False
@@ -155,26 +172,43 @@ class Departures:
         return True
 
     def _may_go_later(self, drone: int, to: Location) -> bool:
-        """Whether it only waits for those that fly now."""
+        """Whether it only waits for those that fly now, or for other routes."""
         path = self._path(drone, to)
-        blocks = path is not None and self._airspace.in_the_way(drone, path)
-        return not blocks and self._mesh_holds_without(drone, landed=True)
+        if path is not None and self._airspace.in_the_way(drone, path):
+            return False
+        stay = self._stay_without(drone)
+        return stay is not None and self._are_enough(len(stay) + len(self._ends))
 
     # The mesh --------------------------------------------------------------------------------
 
-    def _mesh_holds_without(self, drone: int, landed: bool = False) -> bool:
-        """Whether enough drones stay connected, and all that are still to be ordered.
-
-        `landed`: once those that fly now are back in the mesh.
-        """
+    def _stay_without(self, drone: int) -> set[int] | None:
+        """Drones at rest that keep a path; None: one that is still to be ordered loses it."""
         before = self._reach.over(self._resting)
         after = self._reach.over(self._resting - {drone})
-        if (before - after - {drone}) & self._to_go:
-            return False
-        connected = len(after - self._rerouting - self._behind[drone])
-        if landed or self._flying_are_members:
-            connected += len(self._ends)
+        return None if (before - after - {drone}) & self._to_go else after
+
+    def _are_enough(self, connected: int) -> bool:
         return connected + self._flying_are_members >= CONNECTED_SHARE * self._fleet
+
+    def _mesh_holds_without(self, drone: int) -> bool:
+        """Whether enough drones stay connected, and all that are still to be ordered."""
+        stay = self._stay_without(drone)
+        if stay is None:
+            return False
+        connected = len(stay - self._rerouting - self._behind[drone])
+        return self._are_enough(connected + len(self._ends) * self._flying_are_members)
+
+    def _routes_hold_without(self, drone: int) -> bool:
+        """Whether few enough routes lead over it, once those that fly now have landed."""
+        return self._are_enough(self._fleet - 1 - len(self._behind[drone]))
+
+    def _mesh_is_whole_without(self, drone: int) -> bool:
+        """Whether enough of those that are connected now keep a path, over other routes."""
+        stay = self._stay_without(drone)
+        if stay is None:
+            return False
+        connected = len(stay & self._connected)
+        return self._are_enough(connected + len(self._ends) * self._flying_are_members)
 
     def _anchors(self) -> np.ndarray:
         """Places from which a drone will have a path to a gateway, (n, 3)."""

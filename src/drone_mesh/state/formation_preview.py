@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import AbstractSet, Mapping
 
+from drone_mesh.communication.interfaces import NO_ROUTE
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.flight_path import SPEED_M_S, FlightPath
 from drone_mesh.drone.location import Location
@@ -116,8 +117,8 @@ class _Rehearsal:
     def _choose(self) -> Mapping[int, Location]:
         hops = self._connected()
         for drone, node in self._nodes.items():
-            node.hops = hops.get(drone, 255)
-        departures = Departures(self._status(), self._goals, {}, self._rules)
+            node.hops, node.connected = hops.get(drone, NO_ROUTE), drone in hops
+        departures = Departures(self._status(), self._goals, {}, self._rules, self._formation)
         choice = departures.choose(hops.keys() & self._goals.keys())
         self._found.stays = choice.blocked
         return choice.set_out

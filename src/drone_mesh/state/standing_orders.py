@@ -247,7 +247,11 @@ class StandingOrders:
             for drone, part in order.parts.items()
             if part.state.is_open and part.sent_to is not None
         }
-        return Departures(mesh, self.goals(mesh), sent, rules)
+        first = {d for d, part in self._latest().items() if part.is_followed}
+        return Departures(mesh, self.goals(mesh), sent, rules, first)
+
+    def _latest(self) -> Mapping[int, _Part]:
+        return self._orders[max(self._orders)].parts
 
     def goals(self, mesh: MeshStatus) -> dict[int, Location]:
         """The places that drones still have to reach, or have reached and keep."""

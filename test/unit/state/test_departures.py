@@ -98,11 +98,32 @@ def test_far_drones_set_out_before_relays():
 
 
 def test_a_far_drone_does_not_wait_for_a_relay_that_cannot_go():
-    places = {n: at(0.9 * n - 7, 2.0) for n in range(1, 16)}
-    routes = {n: (n, 9, 0) for n in range(1, 5)}
-    state = mesh(places, routes=routes)
-    state.nodes[7].path = (*places[7].to_vector(), -8.0, 8.0, 0.0)
+    places = {n: at(0.9 * n - 7, 2.0) for n in range(5, 16)} | {9: at(-8, 2)}
+    state = mesh(places | {n: at(-16, n) for n in range(1, 5)})
+    (flying,) = [node for node in state.nodes if node.id == 7]
+    flying.path = (*flying.position, -8.0, 8.0, 0.0)
     assert list(choose(state, {8: at(40, 40), 9: at(6, 0)}).set_out) == [8]
+
+
+def test_a_relay_that_only_routes_need_leaves_when_all_are_connected_though_others_fly():
+    places = {n: at(0.9 * n - 7, 2.0) for n in range(1, 16)}
+    state = mesh(places, routes={n: (n, 9, 0) for n in range(1, 5)})
+    state.nodes[7].path = (*places[7].to_vector(), -8.0, 8.0, 0.0)
+    assert list(choose(state, {9: at(6, 0)}).set_out) == [9]
+    for lost in state.nodes[1:5]:
+        lost.connected = False
+    assert choose(state, {9: at(6, 0)}).set_out == {}
+
+
+def test_drones_of_the_latest_formation_set_out_first_and_others_leave_them_room():
+    places = {n: at(0.9 * n - 5, 2.0) for n in range(1, 11)}
+    goals = {1: at(-6, 6), 2: at(6, 6)}
+    state = mesh(places, routes={3: (3, 2, 0)})
+    assert list(Departures(state, goals, {}, first={2}).choose(goals).set_out) == [2]
+    state.nodes[9].path = (*places[9].to_vector(), 8.0, -8.0, 0.0)
+    state.nodes[3].connected = False
+    assert Departures(state, goals, {}, first={2}).choose(goals).set_out == {}
+    assert list(Departures(state, goals, {}).choose(goals).set_out) == [1]
 
 
 def test_a_far_drone_does_not_wait_for_one_whose_place_a_waiting_relay_holds():

@@ -133,7 +133,7 @@ def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
     orders.give(7, {4: EAST, 5: EAST}, now_s=0.0)
     orders.give(8, {4: NORTH}, now_s=3.0)
     ordered = orders.update(state(60.0, drone(4), drone(5)))
-    assert ordered == [(5, EAST), (4, NORTH)]
+    assert ordered == [(4, NORTH), (5, EAST)]
     assert "1 replaced by a later order: 4" in words(orders)[0]
 
 
