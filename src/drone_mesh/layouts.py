@@ -19,6 +19,7 @@ from drone_mesh.yaml_file import YamlFile, read_mapping, read_mapping_text
 FIELD_CASE = 0
 GRID_CASE = 100
 MAX_CASE = 2**32 - 1  # Casus.srv: uint32 caseID
+MAX_NAME = 100  # characters, of a formation; our choice
 
 _FIELD_PLACES = {  # node id -> longitude, latitude: the field case of the project plan
     1: (-13, 24),

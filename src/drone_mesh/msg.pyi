@@ -126,7 +126,7 @@ class LayoutGoal(Message):
 
 class LayoutProgress(Message):
     id: int
-    case_id: int
+    name: str
     arrived: bytes
     flying: bytes
     later: bytes
@@ -140,7 +140,7 @@ class LayoutProgress(Message):
     def __init__(
         self,
         id: int = ...,
-        case_id: int = ...,
+        name: str = ...,
         arrived: bytes | Sequence[int] = ...,
         flying: bytes | Sequence[int] = ...,
         later: bytes | Sequence[int] = ...,

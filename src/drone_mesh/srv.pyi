@@ -115,6 +115,40 @@ class OrderFlight:
     _request_class = OrderFlightRequest
     _response_class = OrderFlightResponse
 
+class OrderFormationRequest(Message):
+    name: str
+    drones: bytes
+    places: list[Location]
+    at_once: bool
+    def __init__(
+        self,
+        name: str = ...,
+        drones: bytes | Sequence[int] = ...,
+        places: Sequence[Location] = ...,
+        at_once: bool = ...,
+    ) -> None: ...
+
+class OrderFormationResponse(Message):
+    id: int
+    sent: bytes
+    later: bytes
+    no_route: bytes
+    not_in_fleet: bytes
+    message: str
+    def __init__(
+        self,
+        id: int = ...,
+        sent: bytes | Sequence[int] = ...,
+        later: bytes | Sequence[int] = ...,
+        no_route: bytes | Sequence[int] = ...,
+        not_in_fleet: bytes | Sequence[int] = ...,
+        message: str = ...,
+    ) -> None: ...
+
+class OrderFormation:
+    _request_class = OrderFormationRequest
+    _response_class = OrderFormationResponse
+
 class OrderLayoutRequest(Message):
     caseID: int
     at_once: bool

@@ -48,7 +48,7 @@ class YamlFile:
 
 def read_mapping(path: str | Path, limited: bool = True) -> YamlFile:
     """Read this file like read_mapping_text; also raises ConfigurationError if unreadable."""
-    return read_mapping_text(_read_text(path, limited), path, limited)
+    return read_mapping_text(read_text(path, limited), path, limited)
 
 
 def read_mapping_text(text: str, path: str | Path, limited: bool = True) -> YamlFile:
@@ -78,7 +78,8 @@ def read_mapping_text(text: str, path: str | Path, limited: bool = True) -> Yaml
     return YamlFile(path, content, lines)
 
 
-def _read_text(path: str | Path, limited: bool) -> str:
+def read_text(path: str | Path, limited: bool = True) -> str:
+    """Raises ConfigurationError; if `limited`, also for a large file, a pipe or a device."""
     try:
         if limited:
             _check_size(Path(path))

@@ -13,7 +13,7 @@ from drone_mesh.console.dots import Dot
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.errors import PlaceTaken
 from drone_mesh.inprocess.network import Network
-from drone_mesh.layouts import Layouts, UnknownCase
+from drone_mesh.layouts import Layouts, Order, UnknownCase
 from drone_mesh.missions import Mission
 from drone_mesh.mobility.pilot import along
 from drone_mesh.state.events import EventBatcher
@@ -118,12 +118,19 @@ class InProcessMesh:
             orders = self._layouts.orders(case)
         except UnknownCase as error:
             raise OrderRefused(str(error)) from error
+        self._order(orders)
+        return f"ordered layout {case}"
+
+    def formation(self, name: str, orders: Sequence[Order]) -> str:
+        self._order(orders)
+        return f"{name}: ordered {len(orders)} of {len(orders)} drones"
+
+    def _order(self, orders: Sequence[Order]) -> None:
         with self._lock:
             for node, goal in orders:
                 if node in self._network.nodes:
                     place = (goal.longitude, goal.latitude, int(goal.height))
                     self._network.order(node, *place, allow_shared_place=True)
-        return f"ordered layout {case}"
 
     def preview(self, case: int) -> FormationPreview:
         with self._lock:

@@ -13,8 +13,8 @@ import rospy
 import rostest
 from rostest_support import LogWatch, call, wait_for
 
-from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
-from drone_mesh.srv import Casus, OrderFlight, OrderLayout, RequestDroneFlight
+from drone_mesh.msg import FlightOrderAnswer, Location, RequestGatewayDroneFlight
+from drone_mesh.srv import Casus, OrderFlight, OrderFormation, OrderLayout, RequestDroneFlight
 
 
 def request(node_id: int, latitude: float, longitude: float, height: int) -> int:
@@ -118,7 +118,7 @@ class ManagerTest(unittest.TestCase):
         ):
             request(99, 1, 1, 0)
         call("/DroneManager/SetToCasus", Casus, 101)
-        line = "case 101: ordered 4 of 6 drones; drones 5..6 are not in this fleet"
+        line = "layout 101: ordered 4 of 6 drones; drones 5..6 are not in this fleet"
         wait_for("one line", 5, lambda: self.log.lines(line))
         self.assertEqual([order.ID for order in self.orders], [4, 3, 2, 1])
 
@@ -150,6 +150,26 @@ class ManagerTest(unittest.TestCase):
                 (1, -3, 4, 0),
             ],
         )
+
+    def test_a_formation_is_ordered_as_a_layout_is(self) -> None:
+        self.listen(no_route=[4])
+        places = [Location(1.5, 2.5, 3), Location(4.5, 5.5, 0)]
+        answer = call(
+            "/DroneManager/orderFormation", OrderFormation, "field.kml", [3, 4], places, True
+        )
+        self.assertEqual((list(answer.sent), list(answer.no_route)), ([3], [4]))
+        self.assertEqual(answer.message, "ordered 1 of 2 drones; no route yet to drone 4")
+        order = self.orders[-1]
+        self.assertEqual([order.ID for order in self.orders], [4, 3])
+        self.assertEqual((order.latitude, order.longitude, order.height), (1.5, 2.5, 3))
+        for drones, name, why in (
+            ([3, 3], "a", "each once"),
+            ([3], "a", "a place for each"),
+            ([3, 254], "a", "invalid drone id 254"),
+            ([3, 4], "a\n", "printable"),
+        ):
+            with self.assertRaisesRegex(rospy.ServiceException, why):
+                call("/DroneManager/orderFormation", OrderFormation, name, drones, places, True)
 
     def test_what_is_no_order_is_refused_with_a_reason(self) -> None:
         self.listen()

@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import signal
 import subprocess
+import tempfile
 import unittest
+from pathlib import Path
 
 import actionlib
 import rospy
@@ -107,6 +111,10 @@ class StandingLayoutsTest(unittest.TestCase):
         done = run("layout", "1")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("1 of 1 at their place", done.stdout)
+        drawn = run("layout", "--file", self.drawing())
+        self.assertEqual(drawn.returncode, 0, drawn.stdout + drawn.stderr)
+        self.assertIn("2 of 2 at their places", drawn.stdout)
+        self.mesh.wait_at(9, -2.0, 3.0, within_s=5.0)
         layout = subprocess.Popen(  # 17 is off and elsewhere, since the test before
             ["rosrun", "drone_mesh", "layout", "17"], stdout=subprocess.PIPE, text=True
         )
@@ -120,6 +128,24 @@ class StandingLayoutsTest(unittest.TestCase):
             refused = run(*wrong)
             self.assertEqual(refused.returncode, 2)
             self.assertIn("invalid value", refused.stderr)
+
+    def drawing(self) -> str:
+        """A file of another program: a place for drone 1, and one for the nearest, which is 9."""
+        features = [
+            {
+                "type": "Feature",
+                "properties": {"name": name},
+                "geometry": {"type": "Point", "coordinates": place},
+            }
+            for name, place in (
+                ("drone 1", [5.1213562, 52.0907270]),  # x -3, y 3
+                ("the old oak", [5.1213708, 52.0907270]),  # x -2, y 3
+            )
+        ]
+        path = Path(tempfile.mkdtemp()) / "field.geojson"
+        path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+        self.addCleanup(shutil.rmtree, path.parent)
+        return str(path)
 
     def open(self) -> list[LayoutProgress]:
         return [progress for progress in self.progress.values() if not progress.over]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol, Sequence
 
 from drone_mesh.errors import MeshError
+from drone_mesh.layouts import Order
 from drone_mesh.missions import Mission
 from drone_mesh.state.formation_preview import FormationPreview
 
@@ -25,6 +26,8 @@ class MeshControls(Protocol):
     ) -> str: ...
 
     def layout(self, case: int) -> str: ...
+
+    def formation(self, name: str, orders: Sequence[Order]) -> str: ...
 
     def preview(self, case: int) -> FormationPreview: ...
 
@@ -52,6 +55,9 @@ class RecordingControls:
         raise OrderRefused(RECORDED)
 
     def layout(self, case: int) -> str:  # noqa: D102
+        raise OrderRefused(RECORDED)
+
+    def formation(self, name: str, orders: Sequence[Order]) -> str:  # noqa: D102
         raise OrderRefused(RECORDED)
 
     def preview(self, case: int) -> FormationPreview:  # noqa: D102

@@ -7,6 +7,7 @@ from typing import Any, Sequence
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.errors import MeshError
+from drone_mesh.layouts import Order
 from drone_mesh.missions import Mission
 from drone_mesh.state.formation_preview import FormationPreview
 from drone_mesh.web.json_client import NoAnswer, ask_json
@@ -48,7 +49,7 @@ class GatewayClient:
             raise GatewayGone(str(error)) from error
 
 
-ONLY_SIMULATED = "layouts exist only in the simulation"
+ONLY_SIMULATED = "layouts and formations exist only in the simulation"
 OWN_AUTOPILOT = "the missions of real drones belong to their autopilots"
 
 
@@ -74,6 +75,10 @@ class GatewayControls:
 
     def layout(self, case: int) -> str:
         """Refused."""
+        raise OrderRefused(ONLY_SIMULATED)
+
+    def formation(self, name: str, orders: Sequence[Order]) -> str:
+        """Refused: the page orders each drone."""
         raise OrderRefused(ONLY_SIMULATED)
 
     def preview(self, case: int) -> FormationPreview:

@@ -15,9 +15,10 @@ from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.drone.goal import MAX_COORDINATE_M, MAX_HEIGHT_M
+from drone_mesh.drone.location import Location
 from drone_mesh.earth_files import MAX_CHARACTERS, Placemarks, is_earth_file, read_placemarks
 from drone_mesh.errors import ConfigurationError
-from drone_mesh.layouts import MAX_CASE, Order, read_layout
+from drone_mesh.layouts import MAX_CASE, MAX_NAME, Order, read_layout
 from drone_mesh.missions import MAX_SPEED_M_S, MOST_WAYPOINTS, Mission
 
 MAX_LAYOUT_CHARACTERS = 30_000  # three times what 254 drones need
@@ -31,9 +32,14 @@ LIMITS = {  # for the page's forms; metres, and the largest id
 NodeId = Annotated[int, Field(ge=0, le=MAX_NODE_ID)]
 NodeOrNone = Optional[NodeId]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
+Height = Annotated[float, Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)]
 NodeIds = Annotated[List[NodeId], Field(min_length=1, max_length=MAX_DRONES)]
 Waypoints = Annotated[
     List[Tuple[Coordinate, Coordinate]], Field(min_length=1, max_length=MOST_WAYPOINTS)
+]
+Places = Annotated[
+    List[Tuple[NodeId, Coordinate, Coordinate, Height]],
+    Field(min_length=1, max_length=MAX_DRONES),
 ]
 MomentOrNone = Optional[Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]]  # simulated s
 HeardOrNone = Optional[Annotated[float, Field(allow_inf_nan=False)]]  # `at` of the last "alive"
@@ -101,7 +107,7 @@ class _Fly(PageOrder):
     node: NodeId
     x: Coordinate
     y: Coordinate
-    z: float = Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)
+    z: Height
     allow_shared_place: bool = False  # also to the place of another drone
 
     def carry_out(self, controls: MeshControls) -> str:
@@ -120,6 +126,21 @@ class _Layout(PageOrder):
 
     def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
         return [place[0] for offer in layouts if offer.case == self.case for place in offer.places]
+
+
+class _Formation(PageOrder):
+    """Send these drones to places of their own."""
+
+    do: Literal["formation"]
+    name: str = Field(min_length=1, max_length=MAX_NAME)
+    places: Places
+
+    def carry_out(self, controls: MeshControls) -> str:
+        orders = [Order(drone, Location(y, x, z)) for drone, x, y, z in self.places]
+        return controls.formation(self.name, orders)
+
+    def drones(self, layouts: Sequence[LayoutOffer]) -> Sequence[int]:
+        return [place[0] for place in self.places]
 
 
 class _Speed(PageOrder):
@@ -158,7 +179,7 @@ class _Mission(PageOrder):
     do: Literal["mission"]
     nodes: NodeIds
     waypoints: Waypoints
-    z: float = Field(ge=0, le=MAX_HEIGHT_M, allow_inf_nan=False)
+    z: Height
     speed: float = Field(gt=0, le=MAX_SPEED_M_S, allow_inf_nan=False)
     loop: bool
 
@@ -276,6 +297,7 @@ _REQUESTS: TypeAdapter[Request] = TypeAdapter(
             _Power,
             _Fly,
             _Layout,
+            _Formation,
             _Speed,
             NeighbourWatch,
             PacketWatch,

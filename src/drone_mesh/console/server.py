@@ -70,7 +70,8 @@ EVENT_WITHIN_S = 5.0  # wall, our choice: after the answer to an order; hosts re
 ALIVE_PERIOD_S = 0.5  # our choice: a page takes two seconds without a message for silence
 MOST_LATE_S = 3.0  # our choice: an order of a page that has heard nothing for longer is refused
 ALL_ACTIONS = (
-    "fly", "power", "layout", "speed", "add", "remove", "mission", "demonstrate", "packets",
+    "fly", "power", "layout", "formation", "speed", "add", "remove", "mission",
+    "demonstrate", "packets",
 )  # fmt: skip
 COOKIE = "drone_mesh_token"
 POLICY_VIOLATION = 1008  # RFC 6455, 7.4.1

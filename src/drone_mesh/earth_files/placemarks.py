@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
-from typing import NamedTuple, Sequence
+from typing import Mapping, NamedTuple, Sequence
 
 from drone_mesh.drone.fleet import MAX_DRONES
 from drone_mesh.drone.geodesy import EarthPlace, Origin
@@ -43,6 +43,28 @@ class Placemarks:
         if drone is not None and any(point.drone == drone for point in self.points):
             raise ConfigurationError(f"drone {drone} has two places")
         self.points.append(Point(drone, place))
+
+    def goals(self, at: Mapping[int, Location]) -> dict[int, Location]:
+        """The place of each drone; one without a number is for the nearest of those `at` places.
+
+        Drones without a known place and without a point are not sent. Raises ConfigurationError if
+        there are more places than drones.
+        """
+        goals = {point.drone: point.place for point in self.points if point.drone is not None}
+        free = [point.place for point in self.points if point.drone is None]
+        ways = sorted(
+            (place.distance_m(at[drone]), drone, number)
+            for drone in at.keys() - goals.keys()
+            for number, place in enumerate(free)
+        )
+        taken: set[int] = set()
+        for _way_m, drone, number in ways:
+            if drone not in goals and number not in taken:
+                goals[drone] = free[number]
+                taken.add(number)
+        if len(taken) < len(free):
+            raise ConfigurationError(f"{len(free)} points for any drone, and {len(taken)} drones")
+        return goals
 
 
 def drone_named(name: str | None) -> int | None:

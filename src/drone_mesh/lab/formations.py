@@ -53,7 +53,7 @@ class Formations:
         self.given_s, self.reached_s = status.stamp_s, None
         self._at_once = at_once
         self._plan(status, self._reach())
-        self._number = self._orders.give(case, self._goals, status.stamp_s, at_once)
+        self._number = self._orders.give(f"layout {case}", self._goals, status.stamp_s, at_once)
 
     def _plan(self, status: MeshStatus, reach: Collection[int]) -> None:
         standing = self._orders.goals(status)

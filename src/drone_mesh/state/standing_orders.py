@@ -85,7 +85,7 @@ class StandingProgress:
     """How far one standing order has come: ids, ascending, by state."""
 
     number: int
-    case: int
+    name: str
     drones: Mapping[PartState, Sequence[int]]
     reasons: Mapping[int, str] = field(default_factory=dict)  # of the refused drones
 
@@ -113,18 +113,18 @@ class StandingProgress:
 
 
 class _StandingOrder:
-    """One layout that was ordered."""
+    """One layout or formation that was ordered."""
 
     def __init__(
         self,
         number: int,
-        case: int,
+        name: str,
         goals: Mapping[int, Location],
         given_s: float,
         at_once: bool,
     ) -> None:
         self.number = number
-        self.case = case
+        self.name = name
         self.given_s = given_s
         self.at_once = at_once
         self.parts = {drone: _Part(goal) for drone, goal in goals.items()}
@@ -141,7 +141,7 @@ class _StandingOrder:
             for state in PartState
         }
         reasons = {drone: self.parts[drone].reason for drone in by_state[PartState.REFUSED]}
-        return StandingProgress(self.number, self.case, by_state, reasons)
+        return StandingProgress(self.number, self.name, by_state, reasons)
 
 
 class StandingOrders:
@@ -155,17 +155,18 @@ class StandingOrders:
         self._last_number = 0
 
     def give(
-        self, case: int, goals: Mapping[int, Location], now_s: float, at_once: bool = False
+        self, name: str, goals: Mapping[int, Location], now_s: float, at_once: bool = False
     ) -> int:
-        """A layout is being ordered; returns its number. It replaces earlier goals of its drones.
+        """These drones are being ordered; returns the number. It replaces their earlier goals.
 
-        `now_s`: simulated time. `at_once`: all drones set out together, whatever becomes of the
-        mesh and whomever they meet. The first orders are those of the next `update`.
+        `name`: such as "layout 202"; `now_s`: simulated time. `at_once`: all drones set out
+        together, whatever becomes of the mesh and whomever they meet. The first orders are those of
+        the next `update`.
         """
         self.replace(goals)
         self._last_number += 1
         self._orders[self._last_number] = _StandingOrder(
-            self._last_number, case, goals, now_s, at_once
+            self._last_number, name, goals, now_s, at_once
         )
         return self._last_number
 
@@ -308,7 +309,7 @@ class StandingOrders:
         return [
             {
                 "number": order.number,
-                "case": order.case,
+                "name": order.name,
                 "at_once": order.at_once,
                 "goals": {
                     str(drone): list(part.goal)
@@ -325,7 +326,7 @@ class StandingOrders:
             goals = {int(drone): Location(*goal) for drone, goal in entry["goals"].items()}
             number = int(entry["number"])
             self._orders[number] = _StandingOrder(
-                number, int(entry["case"]), goals, -math.inf, bool(entry["at_once"])
+                number, str(entry["name"]), goals, -math.inf, bool(entry["at_once"])
             )
             self._last_number = max(self._last_number, number)
 

@@ -15,6 +15,8 @@ from drone_mesh.console.orders import (
     number_of,
     parse_request,
 )
+from drone_mesh.drone.location import Location
+from drone_mesh.layouts import Order
 from drone_mesh.missions import Mission
 
 
@@ -34,6 +36,10 @@ class Notebook:
 
     def layout(self, case: int) -> str:
         self.done.append(("layout", case))
+        return "done"
+
+    def formation(self, name: str, orders: Sequence[Order]) -> str:
+        self.done.append(("formation", name, *orders))
         return "done"
 
     def speed(self, paused: bool, factor: float) -> str:
@@ -97,6 +103,10 @@ def test_an_invalid_mission_is_refused(wrong: dict[str, object]) -> None:
             ("fly", 2, 1.0, 2.0, 0.0, "shared"),
         ),
         ({"do": "layout", "case": 202}, ("layout", 202)),
+        (
+            {"do": "formation", "name": "a ring", "places": [[3, 1.5, -2, 4]]},
+            ("formation", "a ring", Order(3, Location(latitude=-2.0, longitude=1.5, height=4.0))),
+        ),
         ({"do": "speed", "paused": True, "factor": 0}, ("speed", True, 0.0)),
         ({"do": "add", "x": 1.5, "y": -2}, ("add", None, False, 1.5, -2.0)),
         (

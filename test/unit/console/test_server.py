@@ -139,7 +139,10 @@ def run(scenario: Callable[[ConsoleServer, FrameStore], Awaitable[None]]) -> Non
     asyncio.run(main())
 
 
-ACTIONS = ["fly", "power", "layout", "speed", "add", "remove", "mission", "demonstrate", "packets"]
+ACTIONS = [
+    "fly", "power", "layout", "formation", "speed", "add", "remove", "mission", "demonstrate",
+    "packets",
+]  # fmt: skip
 KINDS = ["heartbeat", "introduction", "position", "repair", "order", "report", "data", "other"]
 
 

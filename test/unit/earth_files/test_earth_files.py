@@ -64,6 +64,15 @@ def test_points_of_geojson_are_for_the_drones_that_they_name():
     assert [(point.drone, point.place.height) for point in points] == [(3, 0), (4, 2.5), (None, 12)]
 
 
+def test_points_without_a_number_are_for_the_nearest_of_the_other_drones():
+    east, west, north = Location(0, 9, 0), Location(0, -9, 0), Location(9, 0, 0)
+    found = Placemarks([Point(None, east), Point(None, west), Point(1, north)])
+    at = {1: east, 2: Location(0, 8, 0), 3: Location(0, 7, 0), 4: Location(0, 0, 0)}
+    assert found.goals(at) == {1: north, 2: east, 4: west}
+    with pytest.raises(ConfigurationError, match="2 points for any drone, and 1 drones"):
+        found.goals({1: east, 2: west})
+
+
 def test_heights_of_kml_are_as_their_mode_says():
     def mark(mode: str) -> str:
         return f"<Point>{mode}<coordinates>5.1214,52.0907,30</coordinates></Point>"

@@ -36,7 +36,7 @@ def words(orders):
 
 def test_a_drone_without_a_route_is_ordered_as_soon_as_it_has_one():
     orders = StandingOrders()
-    orders.give(7, {4: EAST}, now_s=0.0)
+    orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(state(6.0, drone(4, connected=False))) == []
     assert words(orders) == ["0 of 1 at their place, 1 without a route: 4"]
     assert orders.update(state(7.0, drone(4))) == [(4, EAST)]
@@ -44,14 +44,14 @@ def test_a_drone_without_a_route_is_ordered_as_soon_as_it_has_one():
 
 def test_an_order_that_a_drone_does_not_carry_out_is_repeated_less_and_less_often():
     orders = StandingOrders()
-    orders.give(7, {4: EAST}, now_s=0.0)
+    orders.give("layout 7", {4: EAST}, now_s=0.0)
     ordered = [s for s in range(100) if orders.update(state(float(s), drone(4)))]
     assert ordered == [0, 5, 15, 35, 75]
 
 
 def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there():
     orders = StandingOrders()
-    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     flying = state(20.0, drone(4, to=EAST), drone(5, to=NORTH))
     assert orders.update(flying) == []
     assert words(orders) == ["0 of 2 at their places, 2 flying"]
@@ -62,7 +62,7 @@ def test_a_drone_that_flies_to_its_place_is_left_alone_until_it_is_there():
 
 def test_a_drone_that_flies_elsewhere_is_ordered_when_it_has_landed():
     orders = StandingOrders()
-    orders.give(7, {4: EAST}, now_s=0.0)
+    orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(state(6.0, drone(4, to=NORTH))) == []
     assert words(orders) == ["0 of 1 at their place, 1 waiting to set out: 4"]
     assert orders.update(state(7.0, drone(4, at=NORTH))) == [(4, EAST)]
@@ -70,7 +70,7 @@ def test_a_drone_that_flies_elsewhere_is_ordered_when_it_has_landed():
 
 def test_at_once_a_drone_is_ordered_on_the_way_elsewhere_and_without_a_route():
     orders = StandingOrders()
-    orders.give(7, {3: EAST, 4: EAST, 5: NORTH}, now_s=0.0, at_once=True)
+    orders.give("layout 7", {3: EAST, 4: EAST, 5: NORTH}, now_s=0.0, at_once=True)
     present = drone(3), drone(4, to=NORTH), drone(5, connected=False)
     assert orders.update(state(6.0, *present)) == [(5, NORTH), (4, EAST), (3, EAST)]
 
@@ -78,9 +78,9 @@ def test_at_once_a_drone_is_ordered_on_the_way_elsewhere_and_without_a_route():
 def test_a_drone_that_may_still_set_out_is_not_met_by_another_one():
     orders = StandingOrders()
     there, across = drone(4), drone(5, at=Location(3.0, 3.0, 0.0))
-    orders.give(7, {4: EAST}, now_s=0.0)
+    orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.update(state(1.0, gateway(), there, across)) == [(4, EAST)]
-    orders.give(8, {5: Location(-3.0, 3.0, 0.0)}, now_s=2.0)  # crosses the other path
+    orders.give("layout 8", {5: Location(-3.0, 3.0, 0.0)}, now_s=2.0)  # crosses the other path
     assert orders.update(state(3.0, gateway(), there, across)) == []
     arrived = drone(4, at=EAST)
     assert orders.update(state(9.0, gateway(), arrived, across)) == [(5, Location(-3.0, 3.0, 0.0))]
@@ -88,14 +88,14 @@ def test_a_drone_that_may_still_set_out_is_not_met_by_another_one():
 
 def test_a_drone_that_has_arrived_once_is_not_ordered_back_after_a_repair():
     orders = StandingOrders()
-    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     orders.update(state(10.0, drone(4, at=EAST), drone(5)))
     assert orders.update(state(60.0, drone(4, at=HOME), drone(5))) == [(5, NORTH)]
 
 
 def test_a_drone_that_found_no_mesh_at_its_place_is_ordered_back_once_it_is_connected():
     orders = StandingOrders()
-    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     orders.update(state(0.0, drone(4), drone(5)))
     late = drone(5, to=NORTH)
     orders.update(state(9.0, drone(4, at=EAST, connected=False), late))
@@ -109,7 +109,7 @@ def test_a_drone_brought_back_from_a_place_out_of_reach_is_named_until_that_is_i
     aside = drone(5, at=NORTH, to=NORTH._replace(longitude=3.0))
     others = [gateway(), *(drone(n, at=Location(n - 10.0, -3.0, 0.0)) for n in range(10, 20))]
     orders = StandingOrders()
-    orders.give(7, {4: far, 5: EAST}, now_s=0.0)
+    orders.give("layout 7", {4: far, 5: EAST}, now_s=0.0)
     orders.update(state(0.0, drone(4), north, *others))
     orders.update(state(9.0, drone(4, at=far, connected=False), aside, *others))
     assert orders.update(state(60.0, back, aside, *others)) == []
@@ -120,7 +120,7 @@ def test_a_drone_brought_back_from_a_place_out_of_reach_is_named_until_that_is_i
 
 def test_a_drone_that_finds_no_mesh_at_its_place_is_not_ordered_back_when_nobody_else_comes():
     orders = StandingOrders()
-    orders.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    orders.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     off = drone(5, connected=False)
     orders.update(state(0.0, drone(4), off))
     orders.update(state(9.0, drone(4, at=EAST, connected=False), off))
@@ -130,8 +130,8 @@ def test_a_drone_that_finds_no_mesh_at_its_place_is_not_ordered_back_when_nobody
 
 def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
     orders = StandingOrders()
-    orders.give(7, {4: EAST, 5: EAST}, now_s=0.0)
-    orders.give(8, {4: NORTH}, now_s=3.0)
+    orders.give("layout 7", {4: EAST, 5: EAST}, now_s=0.0)
+    orders.give("layout 8", {4: NORTH}, now_s=3.0)
     ordered = orders.update(state(60.0, drone(4), drone(5)))
     assert ordered == [(4, NORTH), (5, EAST)]
     assert "1 replaced by a later order: 4" in words(orders)[0]
@@ -139,7 +139,7 @@ def test_a_later_layout_replaces_the_goals_of_its_drones_and_no_others():
 
 def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
     orders = StandingOrders()
-    orders.give(7, {4: NORTH}, now_s=10.0)
+    orders.give("layout 7", {4: NORTH}, now_s=10.0)
     sent = "order 3 to x 0.00 m, y 6.00 m, z 1 m"
     elsewhere = "order 4 to x 9.00 m, y 0.00 m, z 0 m"
     orders.take(EventRecord(5.0, 0, "order sent", (4,), elsewhere))  # an older one
@@ -151,7 +151,7 @@ def test_a_flight_ordered_at_a_gateway_replaces_the_drones_goal():
 
 def test_a_refusal_is_shown_with_its_reason_and_tried_again():
     orders = StandingOrders()
-    orders.give(7, {4: EAST}, now_s=0.0)
+    orders.give("layout 7", {4: EAST}, now_s=0.0)
     orders.take(
         EventRecord(
             1.0, 0, "order refused", (4,), "order 3 to x 6.00 m, y 0.00 m, z 0 m: battery at 9 %"
@@ -163,7 +163,7 @@ def test_a_refusal_is_shown_with_its_reason_and_tried_again():
 
 def test_drones_that_do_not_exist_are_named():
     orders = StandingOrders()
-    orders.give(7, {4: EAST, 9: EAST}, now_s=0.0)
+    orders.give("layout 7", {4: EAST, 9: EAST}, now_s=0.0)
     orders.update(state(1.0, drone(4, at=EAST)))
     assert words(orders) == ["1 of 2 at their places, 1 not in this fleet: 9"]
     assert orders.all_progress()[0].is_over
@@ -171,7 +171,7 @@ def test_drones_that_do_not_exist_are_named():
 
 def test_a_withdrawn_layout_orders_nothing_more():
     orders = StandingOrders()
-    number = orders.give(7, {4: EAST}, now_s=0.0)
+    number = orders.give("layout 7", {4: EAST}, now_s=0.0)
     assert orders.withdraw(number).drones[PartState.WAITING] == (4,)
     assert orders.update(state(60.0, drone(4))) == []
     assert orders.withdraw(number) is None
@@ -179,11 +179,11 @@ def test_a_withdrawn_layout_orders_nothing_more():
 
 def test_what_is_left_to_do_survives_a_restart():
     before, after = StandingOrders(), StandingOrders()
-    before.give(7, {4: EAST, 5: NORTH}, now_s=0.0)
+    before.give("layout 7", {4: EAST, 5: NORTH}, now_s=0.0)
     before.update(state(10.0, drone(4, at=EAST), drone(5)))
     after.restore(before.saved())
     assert after.update(state(11.0, drone(4), drone(5))) == [(5, NORTH)]
-    assert after.give(8, {4: EAST}, now_s=11.0) == 2
+    assert after.give("layout 8", {4: EAST}, now_s=11.0) == 2
 
 
 LAYOUTS = Layouts.shipped()
@@ -193,7 +193,7 @@ def order_layout(network, orders, case):
     """As the DroneManager does it: the first orders at once, the far end first."""
     present = {node.id for node in network.status().nodes}
     wanted = [(n, goal) for n, goal in LAYOUTS.orders(case) if n in present]
-    orders.give(case, dict(wanted), network.now_s())
+    orders.give(f"layout {case}", dict(wanted), network.now_s())
     for node_id, goal in wanted:
         network.order(node_id, goal.longitude, goal.latitude, int(goal.height))
 
@@ -235,8 +235,8 @@ def test_the_last_layout_ordered_is_reached_whatever_was_ordered_before(seed, pa
 
 def test_no_drone_is_sent_to_the_place_of_one_that_stays_there():
     orders = StandingOrders()
-    orders.give(7, {4: EAST}, now_s=0.0)
-    orders.give(8, {5: NORTH}, now_s=0.0, at_once=True)
+    orders.give("layout 7", {4: EAST}, now_s=0.0)
+    orders.give("layout 8", {5: NORTH}, now_s=0.0, at_once=True)
     there = drone(6, at=EAST), drone(7, at=NORTH)
     assert orders.update(state(1.0, drone(4), drone(5), *there)) == []
     refused = "0 of 1 at their place, {} refused: drone {} is in the way"

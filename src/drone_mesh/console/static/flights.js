@@ -5,6 +5,7 @@ import { agreed } from "./confirm.js";
 
 const HOLD_MS = 5000;
 const FAR_M = 50;
+const MAX_NAME = 100; // of a formation
 
 const byId = (id) => document.getElementById(id);
 
@@ -28,7 +29,7 @@ export class Flights extends EventTarget {
    * Orders these drones [{id, x, y, z}] to fly after HOLD_MS, unless the user undoes it.
    * `what` describes them; `send` sends all the orders.
    */
-  async hold(moves, what = names(moves), send = () => this.#order(moves)) {
+  async hold(moves, what = names(moves), send = () => this.#order(moves, what)) {
     this.#release();
     if (!(await this.#agreed(moves, what))) return;
     this.#hold(moves, send);
@@ -75,11 +76,23 @@ export class Flights extends EventTarget {
     send?.();
   }
 
+  /** Several drones go as one standing order, if somebody keeps those. */
+  async #order(moves, what) {
+    if (moves.length === 1 || !this.mesh.actions.includes("formation")) return this.#orderEach(moves);
+    const places = moves.map(({ id, x, y, z }) => [id, metres(x), metres(y), z]);
+    const request = { do: "formation", name: what.slice(0, MAX_NAME), places };
+    try {
+      this.toast(await this.order(request), false);
+    } catch (error) {
+      this.toast(error.message, true);
+    }
+  }
+
   /**
    * The drones farthest from the gateway first, so that relays leave last. A place that another of these drones leaves is
    * free; for the place of any other drone, the user is asked.
    */
-  async #order(moves) {
+  async #orderEach(moves) {
     const hops = ({ id }) => this.mesh.nodes.get(id)?.hops ?? 0;
     const leaving = new Set(moves.map((move) => move.id));
     const failed = [];

@@ -9,11 +9,12 @@ import rospy
 from drone_mesh.communication.observer import MeshEventKind
 from drone_mesh.drone.flight_path import Vector
 from drone_mesh.drone.location import Location
+from drone_mesh.layouts import Order
 from drone_mesh.msg import DroneInfo, MeshState, NodeState, Obstacle, RequestGatewayDroneFlight
 from drone_mesh.msg import Location as LocationMsg
 from drone_mesh.msg import MeshEvent as MeshEventMsg
 from drone_mesh.ros.graph import names
-from drone_mesh.srv import RequestGPSResponse
+from drone_mesh.srv import OrderFormationRequest, RequestGPSResponse
 from drone_mesh.state.model import EventRecord, MeshStatus, NodeStatus
 
 _CODES = {kind.value: number for number, kind in enumerate(MeshEventKind)}  # as in MeshEvent.msg
@@ -44,6 +45,14 @@ def whole_metres(height: float) -> int:
 def location_of(message: PlaceMsg) -> Location:
     """The position in a message."""
     return Location(message.latitude, message.longitude, float(message.height))
+
+
+def formation_request(
+    name: str, orders: Sequence[Order], at_once: bool = False
+) -> OrderFormationRequest:
+    """Asks the drone manager to send these drones to their places."""
+    places = [location_msg(*goal) for _drone, goal in orders]
+    return OrderFormationRequest(name, [drone for drone, _goal in orders], places, at_once)
 
 
 def location_msg(latitude: float, longitude: float, height: float) -> LocationMsg:

@@ -16,12 +16,14 @@ MESSAGES_SERVICE = "SignalSimulator/messages"
 BROADCAST_SERVICE = "SignalSimulator/broadcast"
 
 LAYOUTS_PARAM = "DroneManager/casus"  # the file of the layouts; empty or not set: the package's
+ORIGIN_PARAM = "drone_mesh/origin"  # LAT,LON,ALT: where the world is on the earth; empty: nowhere
 GATEWAY_TOPIC = "gateway"  # RequestGatewayDroneFlight: DroneManager -> each gateway
 SHARED_PLACE_TOPIC = "gateway/shared_place"  # the same, also to places of other drones
 GATEWAY_ANSWERS_TOPIC = "gateway/answers"  # FlightOrderAnswer: each gateway -> DroneManager
 REQUEST_MOVEMENT_SERVICE = "DroneManager/requestDroneMovement"
 SET_TO_CASUS_SERVICE = "DroneManager/SetToCasus"
 ORDER_FLIGHT_SERVICE = "DroneManager/orderFlight"  # OrderFlight
+ORDER_FORMATION_SERVICE = "DroneManager/orderFormation"  # OrderFormation
 ORDER_LAYOUT_SERVICE = "DroneManager/orderLayout"  # OrderLayout
 PREVIEW_LAYOUT_SERVICE = "DroneManager/previewLayout"  # PreviewLayout
 WITHDRAW_LAYOUT_SERVICE = "DroneManager/withdrawLayout"  # WithdrawLayout

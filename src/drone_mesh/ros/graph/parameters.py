@@ -12,6 +12,8 @@ import rospy
 from drone_mesh.air.obstacle_file import read_obstacles
 from drone_mesh.air.obstacles import Obstacles
 from drone_mesh.configuration import FactoryConfiguration, load_configuration
+from drone_mesh.drone.geodesy import Origin
+from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import Layouts
 from drone_mesh.missions import Mission, read_missions
@@ -73,6 +75,25 @@ def manager_layouts(parameter: str = names.LAYOUTS_PARAM) -> Layouts:
     Raises ConfigurationError.
     """
     return _read(parameter, "casus.yaml", Layouts.load)
+
+
+def earth_origin(given: str, is_live: bool = True) -> Origin | None:
+    """Where x 0, y 0 is on the earth: as given, or as the running simulation says (`is_live`).
+
+    None: nowhere. Raises ConfigurationError.
+    """
+    text = given or (str(rospy.get_param(names.ORIGIN_PARAM, "")) if is_live else "")
+    if not text:
+        return None
+    with naming_argument("origin:=", "origin"):
+        origin = Origin.parse(text)
+    try:
+        origin.to_earth(Location(0.0, 0.0, 0.0))
+    except ImportError as error:
+        raise ConfigurationError(
+            f"an origin needs the Python package {error.name}: pip install {error.name}"
+        ) from error
+    return origin
 
 
 def _read(parameter: str, default: str, read: Callable[[Path], Result]) -> Result:

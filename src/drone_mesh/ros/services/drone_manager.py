@@ -14,7 +14,7 @@ from drone_mesh.communication.interfaces import MAX_NODE_ID
 from drone_mesh.drone.fleet import ids_in_words
 from drone_mesh.drone.goal import check_goal
 from drone_mesh.errors import GoalRefused
-from drone_mesh.layouts import Layouts, Order, UnknownCase
+from drone_mesh.layouts import MAX_NAME, Layouts, Order, UnknownCase
 from drone_mesh.msg import FlightOrderAnswer, RequestGatewayDroneFlight
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import start_node
@@ -34,6 +34,9 @@ from drone_mesh.srv import (
     OrderFlight,
     OrderFlightRequest,
     OrderFlightResponse,
+    OrderFormation,
+    OrderFormationRequest,
+    OrderFormationResponse,
     OrderLayout,
     OrderLayoutRequest,
     OrderLayoutResponse,
@@ -67,8 +70,8 @@ class DroneManager:
     Services:   /DroneManager/requestDroneMovement (RequestDroneFlight), /DroneManager/SetToCasus
                 (Casus), also as /requestDroneMovement and /SetToCasus;
                 /DroneManager/orderFlight (OrderFlight), /DroneManager/orderLayout (OrderLayout),
-                /DroneManager/previewLayout (PreviewLayout), /DroneManager/withdrawLayout
-                (WithdrawLayout)
+                /DroneManager/orderFormation (OrderFormation), /DroneManager/previewLayout
+                (PreviewLayout), /DroneManager/withdrawLayout (WithdrawLayout)
     Standing orders: see StandingLayouts
     """
 
@@ -84,7 +87,7 @@ class DroneManager:
         )
         self._answers = OrderAnswers()
         self._standing = StandingLayouts(
-            functools.partial(self._publish, allow_shared_place=True), self._carry_out
+            functools.partial(self._publish, allow_shared_place=True), self._order_case
         )
         for name in (names.REQUEST_MOVEMENT_SERVICE, names.SHORT_REQUEST_MOVEMENT_SERVICE):
             rospy.Service(name, RequestDroneFlight, self._request_movement)
@@ -92,6 +95,7 @@ class DroneManager:
             rospy.Service(name, Casus, self._set_to_casus)
         rospy.Service(names.ORDER_FLIGHT_SERVICE, OrderFlight, self._order_flight)
         rospy.Service(names.ORDER_LAYOUT_SERVICE, OrderLayout, self._order_layout)
+        rospy.Service(names.ORDER_FORMATION_SERVICE, OrderFormation, self._order_formation)
         rospy.Service(names.PREVIEW_LAYOUT_SERVICE, PreviewLayout, self._preview_layout)
         rospy.Service(names.WITHDRAW_LAYOUT_SERVICE, WithdrawLayout, self._withdraw_layout)
 
@@ -116,9 +120,7 @@ class DroneManager:
     def _order_one(self, order: Order, allow_shared_place: bool) -> str:
         """Why the order was not sent; empty if it was. Raises GoalRefused if it was refused."""
         drone, goal = order
-        check_goal(*goal)
-        if drone > MAX_NODE_ID:
-            raise GoalRefused(f"invalid drone id {drone}: must be 0..{MAX_NODE_ID}")
+        _check(order)
         fleet = drones_if_known()
         if fleet is not None and drone not in fleet.roles:
             raise GoalRefused(
@@ -137,22 +139,21 @@ class DroneManager:
         return f"no gateway has a route to drone {drone}"
 
     def _set_to_casus(self, request: CasusRequest) -> CasusResponse:
-        self._carry_out(request.caseID, at_once=True)
+        self._order_case(request.caseID, at_once=True)
         return CasusResponse()
 
     def _order_layout(self, request: OrderLayoutRequest) -> OrderLayoutResponse:
-        number, summary = self._carry_out(request.caseID, request.at_once)
-        return OrderLayoutResponse(
-            number,
-            summary.sent,
-            summary.later,
-            summary.no_route,
-            summary.not_in_fleet,
-            summary.in_words(),
-        )
+        return OrderLayoutResponse(*self._order_case(request.caseID, request.at_once))
+
+    def _order_formation(self, request: OrderFormationRequest) -> OrderFormationResponse:
+        try:
+            orders = _formation(request)
+        except GoalRefused as error:
+            raise rospy.ServiceException(str(error)) from None
+        return OrderFormationResponse(*self._carry_out(request.name, orders, request.at_once))
 
     def _preview_layout(self, request: PreviewLayoutRequest) -> PreviewLayoutResponse:
-        known, missing = self._drones_of(request.caseID, drones_if_known())
+        known, missing = _in_fleet(self._orders_of(request.caseID), drones_if_known())
         found = self._standing.preview(known, request.at_once)
         if found is None:
             raise rospy.ServiceException("the state of the mesh is not known")
@@ -173,24 +174,40 @@ class DroneManager:
             return WithdrawLayoutResponse(False, f"there is no standing order {request.id}")
         return WithdrawLayoutResponse(True, words)
 
-    def _carry_out(
+    def _order_case(
         self, case: int, at_once: bool, handle: actionlib.ServerGoalHandle | None = None
-    ) -> tuple[int, OrderSummary]:
-        """Order a layout; returns the number of its standing order, and its first outcome."""
+    ) -> tuple[object, ...]:
+        """Order a layout."""
+        return self._carry_out(f"layout {case}", self._orders_of(case), at_once, handle)
+
+    def _carry_out(
+        self,
+        name: str,
+        orders: Sequence[Order],
+        at_once: bool,
+        handle: actionlib.ServerGoalHandle | None = None,
+    ) -> tuple[object, ...]:
+        """Make a standing order of these; returns the fields of OrderLayout's answer."""
         fleet = drones_if_known()
-        known, missing = self._drones_of(case, fleet)
+        known, missing = _in_fleet(orders, fleet)
         if not self._gateway_is_there():
             raise rospy.ServiceException("no gateway is running")
-        given = self._standing.give(case, self._layouts.orders(case), at_once, handle)
+        given = self._standing.give(name, orders, at_once, handle)
         if given.is_followed:
             summary = self._order_first(given, fleet, missing)
         else:
             summary = self._order_all(known, fleet, missing)
         complete = len(summary.sent) + len(summary.later) == len(known) + len(missing)
-        _log.log(
-            logging.INFO if complete else logging.WARNING, "case %d: %s", case, summary.in_words()
+        words = summary.in_words()
+        _log.log(logging.INFO if complete else logging.WARNING, "%s: %s", name, words)
+        return (
+            given.progress.number,
+            summary.sent,
+            summary.later,
+            summary.no_route,
+            summary.not_in_fleet,
+            words,
         )
-        return given.progress.number, summary
 
     def _order_first(
         self, given: Given, fleet: PresentDrones | None, missing: Sequence[int]
@@ -205,14 +222,11 @@ class DroneManager:
         later = [drone for drone in drones[PartState.LATER] if drone not in ordered]
         return OrderSummary(outcomes.sent, outcomes.no_route + no_route, missing, reasons, later)
 
-    def _drones_of(self, case: int, fleet: PresentDrones | None) -> tuple[list[Order], list[int]]:
-        """The orders of a layout, and the ids in it that are not in the fleet."""
+    def _orders_of(self, case: int) -> list[Order]:
         try:
-            orders = self._layouts.orders(case)
+            return self._layouts.orders(case)
         except UnknownCase as error:
             raise rospy.ServiceException(str(error)) from None
-        known = [o for o in orders if fleet is None or o.node_id in fleet.roles]
-        return known, [order.node_id for order in orders if order not in known]
 
     def _publish(self, orders: Sequence[Order], allow_shared_place: bool = False) -> None:
         checked = not (allow_shared_place and self._sharing.get_num_connections())
@@ -273,6 +287,34 @@ class DroneManager:
                 return False
             time.sleep(POLL_PERIOD_S)
         return False
+
+
+def _in_fleet(
+    orders: Sequence[Order], fleet: PresentDrones | None
+) -> tuple[list[Order], list[int]]:
+    """The orders for drones of the fleet, and the other ids."""
+    known = [o for o in orders if fleet is None or o.node_id in fleet.roles]
+    return known, [order.node_id for order in orders if order not in known]
+
+
+def _formation(request: OrderFormationRequest) -> list[Order]:
+    """The orders by descending id, as those of a layout. Raises GoalRefused."""
+    if not (request.name.isprintable() and 0 < len(request.name) <= MAX_NAME):
+        raise GoalRefused(f"invalid name: must be 1..{MAX_NAME} printable characters")
+    goals = dict(zip(request.drones, map(location_of, request.places)))
+    if not len(goals) == len(request.drones) == len(request.places) > 0:
+        raise GoalRefused("a formation needs drones, each once, and a place for each of them")
+    orders = [Order(*item) for item in sorted(goals.items(), reverse=True)]
+    for order in orders:
+        _check(order)
+    return orders
+
+
+def _check(order: Order) -> None:
+    """Raises GoalRefused for an order that no drone can be given."""
+    if order.node_id > MAX_NODE_ID:
+        raise GoalRefused(f"invalid drone id {order.node_id}: must be 0..{MAX_NODE_ID}")
+    check_goal(*order.goal)
 
 
 def main() -> None:

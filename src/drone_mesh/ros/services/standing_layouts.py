@@ -39,7 +39,7 @@ def progress_msg(progress: StandingProgress, over: bool) -> LayoutProgress:
     ids = {state: bytes(drones) for state, drones in progress.drones.items()}
     return LayoutProgress(
         id=progress.number,
-        case_id=progress.case,
+        name=progress.name,
         arrived=ids[PartState.ARRIVED],
         flying=ids[PartState.FLYING],
         later=ids[PartState.LATER],
@@ -106,7 +106,7 @@ class StandingLayouts:
 
     def give(
         self,
-        case: int,
+        name: str,
         orders: Sequence[Order],
         at_once: bool,
         handle: actionlib.ServerGoalHandle | None,
@@ -118,7 +118,7 @@ class StandingLayouts:
         """
         rules = flight_rules()
         with self._lock:
-            number = self._orders.give(case, dict(orders), rospy.get_time(), at_once)
+            number = self._orders.give(name, dict(orders), rospy.get_time(), at_once)
             if handle is not None:
                 self._handles[number] = handle
             first = orders
@@ -222,7 +222,7 @@ class StandingLayouts:
     ) -> None:
         self._publisher.publish(progress_msg(progress, progress.is_over))
         if progress.is_over:
-            _log.info("case %d: %s", progress.case, progress.in_words())
+            _log.info("%s: %s", progress.name, progress.in_words())
         if handle is not None:
             _tell(handle, progress)
 
@@ -233,7 +233,7 @@ class StandingLayouts:
         self._publisher.publish(progress_msg(progress, over=True))
         if handle is not None:
             handle.set_canceled(LayoutResult(progress.number, False, words), words)
-        _log.info("case %d: withdrawn: %s", progress.case, words)
+        _log.info("%s: withdrawn: %s", progress.name, words)
 
     # At the start ----------------------------------------------------------------------------
 
@@ -245,7 +245,7 @@ class StandingLayouts:
             _log.warning("parameter %s is ignored: %s", names.STANDING_PARAM, error)
             return
         for progress in self._orders.all_progress():
-            _log.info("case %d: goes on: %s", progress.case, progress.in_words())
+            _log.info("%s: goes on: %s", progress.name, progress.in_words())
 
 
 def _log_failure(report: Future[None]) -> None:

@@ -9,9 +9,11 @@ import rospy
 
 from drone_mesh.console.controls import OrderRefused
 from drone_mesh.drone.location import Location as Place
+from drone_mesh.layouts import Order
 from drone_mesh.missions import Mission
 from drone_mesh.msg import Location
 from drone_mesh.ros.graph import names
+from drone_mesh.ros.graph.conversions import formation_request
 from drone_mesh.ros.graph.fleet_parameter import drones_if_known
 from drone_mesh.ros.graph.persistent_service import (
     Request,
@@ -27,8 +29,11 @@ from drone_mesh.srv import (
     AddDroneRequest,
     FlyMission,
     FlyMissionRequest,
+    OrderFormation,
+    OrderFormationResponse,
     OrderLayout,
     OrderLayoutRequest,
+    OrderLayoutResponse,
     PowerSwitch,
     PowerSwitchRequest,
     PreviewLayout,
@@ -63,9 +68,13 @@ class RosControls:
         """Order all drones of a layout to their positions."""
         request = OrderLayoutRequest(caseID=case)
         answer = _call(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
-        if not (answer.sent or answer.later):
-            raise OrderRefused(f"layout {case}: {answer.message}")
-        return f"layout {case}: {answer.message}"
+        return _outcome(f"layout {case}", answer)
+
+    def formation(self, name: str, orders: Sequence[Order]) -> str:
+        """Order these drones to their positions, as those of a layout."""
+        request = formation_request(name, orders)
+        answer = _call(names.ORDER_FORMATION_SERVICE, OrderFormation, request)
+        return _outcome(name, answer)
 
     def preview(self, case: int) -> FormationPreview:
         """What would happen if this layout were ordered now."""
@@ -143,6 +152,12 @@ _ACTIONS = {
     "stop": FlyMissionRequest.STOP,
 }
 _DONE = {"pause": "paused", "resume": "resumed", "stop": "ended"}
+
+
+def _outcome(name: str, answer: OrderLayoutResponse | OrderFormationResponse) -> str:
+    if not (answer.sent or answer.later):
+        raise OrderRefused(f"{name}: {answer.message}")
+    return f"{name}: {answer.message}"
 
 
 def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:

@@ -22,8 +22,6 @@ from drone_mesh.console.page_token import PageToken
 from drone_mesh.console.runner import ConsoleRunner
 from drone_mesh.console.server import ConsoleServer
 from drone_mesh.console.tiles import open_tiles
-from drone_mesh.drone.geodesy import Origin
-from drone_mesh.drone.location import Location
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.layouts import FIELD_CASE, GRID_CASE, Layouts
 from drone_mesh.msg import MeshEvent, MeshState, PacketSample
@@ -31,7 +29,7 @@ from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import run_tool, start_node
 from drone_mesh.ros.graph.conversions import event_record, mesh_status
 from drone_mesh.ros.graph.logs import show_library_logs_on_rosout
-from drone_mesh.ros.graph.parameters import manager_layouts
+from drone_mesh.ros.graph.parameters import earth_origin, manager_layouts
 from drone_mesh.ros.views.console_controls import RosControls
 from drone_mesh.ros.views.recording import Recording
 from drone_mesh.ros.views.state_source import OLD_STATE_S
@@ -147,9 +145,9 @@ def main() -> None:
     without it, a random one is made and printed if other machines can reach the address; ~demo
     (str): "repair" shows a repair as soon as a page is open; ~recording (str): path of the bag that
     is played; its page takes no orders; ~origin (str): LAT,LON,ALT, where the world's origin
-    is on the earth, in degrees and metres above sea level; ~tiles (str): a map, see
-    open_tiles.
-    /DroneManager/casus (str): the file of the layouts.
+    is on the earth, in degrees and metres above sea level, by default that of the running
+    simulation; ~tiles (str): a map, see open_tiles.
+    /DroneManager/casus (str): the file of the layouts; /drone_mesh/origin (str).
     """
     start_node(main.__doc__, "mesh_console")
     run_tool("console", _run)
@@ -164,7 +162,7 @@ def _run() -> int:
     if demo not in ("", REPAIR_DEMO):
         raise ConfigurationError(f"invalid demo {demo!r}: must be {REPAIR_DEMO} or empty")
     recording = str(rospy.get_param("~recording", ""))
-    origin = _origin(str(rospy.get_param("~origin", "")))
+    origin = earth_origin(str(rospy.get_param("~origin", "")), is_live=not recording)
     whole = History(math.inf, math.inf) if recording else None
     given = str(rospy.get_param("~tiles", ""))
     if given and origin is None:
@@ -215,20 +213,6 @@ def _token(address: str) -> PageToken:
     with naming_argument("token_file:=", path):
         given = read_secret(Path(path), "token") if path else ""
     return PageToken.needed(address, given, path)
-
-
-def _origin(given: str) -> Origin | None:
-    if not given:
-        return None
-    with naming_argument("origin:=", "origin"):
-        origin = Origin.parse(given)
-    try:
-        origin.to_earth(Location(0.0, 0.0, 0.0))
-    except ImportError as error:
-        raise ConfigurationError(
-            f"origin:= needs the Python package {error.name}: pip install {error.name}"
-        ) from error
-    return origin
 
 
 def _port(value: object) -> int:

@@ -6,24 +6,40 @@ import argparse
 import queue
 import signal
 import sys
+from pathlib import Path
 
 import rospy
 
 from drone_mesh.arguments import whole
+from drone_mesh.drone.location import Location
+from drone_mesh.drone.roles import Role
+from drone_mesh.earth_files import is_earth_file, read_placemarks
 from drone_mesh.errors import MeshError
-from drone_mesh.layouts import MAX_CASE
+from drone_mesh.layouts import MAX_CASE, MAX_NAME, Order, read_layout
 from drone_mesh.msg import LayoutProgress
 from drone_mesh.ros.graph import names
 from drone_mesh.ros.graph.command_line import join_graph, run_tool
+from drone_mesh.ros.graph.conversions import formation_request
+from drone_mesh.ros.graph.parameters import earth_origin
 from drone_mesh.ros.graph.persistent_service import ServiceGone, ServiceRefused, call_once
-from drone_mesh.srv import OrderLayout, OrderLayoutRequest, WithdrawLayout, WithdrawLayoutRequest
+from drone_mesh.ros.views.state_source import live_state
+from drone_mesh.srv import (
+    OrderFormation,
+    OrderFormationResponse,
+    OrderLayout,
+    OrderLayoutRequest,
+    OrderLayoutResponse,
+    WithdrawLayout,
+    WithdrawLayoutRequest,
+)
+from drone_mesh.state.model import position_is_known
 from drone_mesh.stopping import StopRequest
+from drone_mesh.yaml_file import read_text
 
 
 def main() -> None:
     """Entry point of nodes/layout."""
-    options = _parser().parse_args(rospy.myargv()[1:])
-    run_tool("layout", lambda: _run(options.case, options.at_once))
+    run_tool("layout", lambda: _run(_parser().parse_args(rospy.myargv()[1:])))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -35,20 +51,42 @@ def _parser() -> argparse.ArgumentParser:
         "layout; drones in flight fly on.",
         epilog="Exit code: 0 all drones are at their places, 1 some are not, 2 not ordered.",
     )
-    parser.add_argument("case", type=whole(0, MAX_CASE), help="its number, such as 0 or 202")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument(
+        "case", nargs="?", type=whole(0, MAX_CASE), help="its number, such as 0 or 202"
+    )
+    what.add_argument(
+        "--file",
+        type=Path,
+        help="a drawn one instead: points in GeoJSON or KML, whose names may say which drone they "
+        "are for, or a layout file with one case",
+    )
+    parser.add_argument(
+        "--origin",
+        default="",
+        metavar="LAT,LON,ALT",
+        help="where x 0, y 0 is on the earth, for points in degrees (default: origin:= of the "
+        "running simulation)",
+    )
     parser.add_argument("--at-once", action="store_true", help="all drones set out together")
     return parser
 
 
-def _run(case: int, at_once: bool) -> int:
+def _run(options: argparse.Namespace) -> int:
     join_graph("order_layout")
     heard: queue.Queue[LayoutProgress] = queue.Queue()
+    orders = [] if options.file is None else _drawn(options.file, options.origin)
     rospy.Subscriber(names.LAYOUTS_TOPIC, LayoutProgress, heard.put)
     with StopRequest() as stop:  # from here on Ctrl-C finds a layout that it can withdraw
         signal.signal(signal.SIGINT, lambda _number, _frame: stop.make())
         try:
-            request = OrderLayoutRequest(case, at_once)
-            answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
+            answer: OrderLayoutResponse | OrderFormationResponse
+            if options.file is None:
+                request = OrderLayoutRequest(options.case, options.at_once)
+                answer = call_once(names.ORDER_LAYOUT_SERVICE, OrderLayout, request)
+            else:
+                drawn = formation_request(options.file.name[:MAX_NAME], orders, options.at_once)
+                answer = call_once(names.ORDER_FORMATION_SERVICE, OrderFormation, drawn)
         except ServiceGone as error:
             raise MeshError(f"{error}: is the simulation running?") from None
         except ServiceRefused as error:
@@ -63,6 +101,25 @@ def _run(case: int, at_once: bool) -> int:
         ).message
     print(f"withdrawn, drones in flight fly on: {words}", file=sys.stderr)
     raise KeyboardInterrupt
+
+
+def _drawn(file: Path, origin: str) -> list[Order]:
+    """The orders in a file. Raises MeshError."""
+    text = read_text(file)
+    if not is_earth_file(file.name):
+        return read_layout(text, str(file))
+    found = read_placemarks(text, str(file), earth_origin(origin))
+    if not found.points:
+        raise MeshError(f"{file}: has lines and no points: a layout is made of points")
+    places = {
+        node.id: Location.from_vector(node.position)
+        for node in live_state().nodes
+        if node.role == Role.ROUTER and position_is_known(node)
+    }
+    try:
+        return [Order(*goal) for goal in found.goals(places).items()]
+    except MeshError as error:
+        raise MeshError(f"{file}: {error}") from error
 
 
 def _follow(

@@ -162,7 +162,7 @@ class MeshStatePublisher:
             self._repair_strategy,
             self._obstacles,
             self._shape,
-            [f"layout {p.case_id}: {p.message}" for p in self._layouts.values()],
+            [f"{p.name}: {p.message}" for p in self._layouts.values()],
         )
         self._latest = mesh
         self._state.publish(state_msg(mesh))
