@@ -144,7 +144,7 @@ def test_several_drones_are_moved_together(page):
     page.undo_next()  # there is no toast to undo; it notes the texts of all
     drag(page, 17, 9.0, 3.0)  # and 16 to (3, 3)
     page.wait_for("both fly", lambda: all(page.row(n, STATE) == "flying" for n in (16, 17)))
-    page.wait_for_toasts("ordered 2 of 2 drones")
+    page.wait_for_toasts("2 drones: ordered 2 of 2 drones")
 
 
 def test_a_link_selects_a_node_and_a_selection_makes_a_link(start_console, visit):

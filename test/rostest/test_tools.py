@@ -212,6 +212,22 @@ class ToolsTest(unittest.TestCase):
         self.assertIn("disconnected", (self.folder / "events.csv").read_text(encoding="utf-8"))
         trace = run("flight_trace", str(record), f"{self.folder}/flown.csv")
         self.assertIn("2 drones, 4.0 s", trace.stdout, trace.stderr)
+        tracks = self.folder / "flown.geojson"
+        refused = run("flight_trace", str(record), str(tracks))
+        self.assertIn("needs --origin", refused.stderr)
+        lines = [{**json.loads(line), "origin": [52.0, 5.0, 3.0]} for line in gateway_record()]
+        known = self.folder / "known.jsonl"
+        known.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+        for given in ([str(known)], [str(record), "--origin", "52,5,3"]):
+            written = run("flight_trace", *given[:1], str(tracks), *given[1:])
+            self.assertEqual(written.returncode, 0, written.stderr)
+            (track,) = json.loads(tracks.read_text(encoding="utf-8"))["features"]
+            self.assertEqual(track["properties"]["drone"], 3)
+            self.assertEqual(track["properties"]["times_s"], [0.0, 1.0, 2.0, 3.0, 4.0])
+            longitude, latitude, height = track["geometry"]["coordinates"][0]
+            self.assertAlmostEqual(longitude, 5.0005824, delta=1e-6)
+            self.assertAlmostEqual(latitude, 52.0000809, delta=1e-6)
+            self.assertAlmostEqual(height, 4.0, delta=0.01)
         bag = playable(record)
         self.assertEqual(bag, self.folder / "flight.jsonl.bag")
         self.assertEqual(topics_in_bag(bag), ("/", {"/mesh/state", "/mesh/events"}))

@@ -15,12 +15,10 @@ from drone_mesh.console.frames import FrameStore
 from drone_mesh.console.history import History, unpacked
 from drone_mesh.drone.location import Location
 from drone_mesh.drone.roles import Role
-from drone_mesh.earth_files import WRITERS, Path, Placemarks, Point
-from drone_mesh.state.model import MeshStatus, position_is_known
+from drone_mesh.earth_files import WRITERS, Placemarks, Point, tracks_of
+from drone_mesh.state.model import MeshStatus, known_positions, position_is_known
 
-STEP_M = 0.5  # our choice: a track has a place whenever the drone has moved so far
 MOST_STATES = 600  # of the history; our choice: 254 drones then take some seconds
-MOST_PLACES = 20_000  # of all tracks
 T = TypeVar("T")
 
 _TYPES = {"geojson": "application/geo+json", "kml": "application/vnd.google-earth.kml+xml"}
@@ -43,7 +41,7 @@ class EarthFiles:
         if what == "places":
             found = places_of(self._mesh_at(request.query_params.get("t", "")))
         else:
-            found = await self._in_worker(tracks_of, self._history.spread(MOST_STATES))
+            found = await self._in_worker(_tracks_in, self._history.spread(MOST_STATES))
         text = await self._in_worker(WRITERS[ending], found, origin)
         name = {"Content-Disposition": f'attachment; filename="{what}.{ending}"'}
         return Response(text, media_type=_TYPES[ending], headers=name)
@@ -71,25 +69,5 @@ def places_of(mesh: MeshStatus | None) -> Placemarks:
     return found
 
 
-def tracks_of(states: Sequence[bytes]) -> Placemarks:
-    """Where each node has been; a node that never moved has no track."""
-    times: dict[int, list[float]] = {}
-    places: dict[int, list[Location]] = {}
-    for mesh in map(unpacked, states):
-        for node in mesh.nodes:
-            if not position_is_known(node):
-                continue
-            track = places.setdefault(node.id, [])
-            place = Location.from_vector(node.position)
-            if not track or place.distance_m(track[-1]) >= STEP_M:
-                track.append(place)
-                times.setdefault(node.id, []).append(round(mesh.stamp_s, 2))
-    total = sum(len(track) for track in places.values() if len(track) > 1)
-    step = max(1, math.ceil(total / MOST_PLACES))
-    return Placemarks(
-        paths=[
-            Path(node, [*track[:-1:step], track[-1]], [*times[node][:-1:step], times[node][-1]])
-            for node, track in sorted(places.items())
-            if len(track) > 1
-        ]
-    )
+def _tracks_in(states: Sequence[bytes]) -> Placemarks:
+    return tracks_of(known_positions(map(unpacked, states)))

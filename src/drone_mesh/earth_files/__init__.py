@@ -9,6 +9,7 @@ from drone_mesh.drone.geodesy import Origin
 from drone_mesh.earth_files.geojson import geojson_of, read_geojson
 from drone_mesh.earth_files.kml import kml_of, read_kml
 from drone_mesh.earth_files.placemarks import Path, Placemarks, Point
+from drone_mesh.earth_files.tracks import tracks_of
 from drone_mesh.errors import ConfigurationError
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Point",
     "is_earth_file",
     "read_placemarks",
+    "tracks_of",
 ]
 
 MAX_CHARACTERS = 300_000  # our choice: 254 places of a program that writes a style for each

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Sequence
+from typing import Iterable, Iterator, Sequence
 
 from drone_mesh.air.reach import MAX_DISTANCE_M
 from drone_mesh.communication.interfaces import NO_ROUTE
@@ -141,3 +141,11 @@ def another_radio(node: int) -> str:
 def position_is_known(node: NodeStatus) -> bool:
     """Whether the world or the node itself has reported where the node is."""
     return math.isfinite(node.position[0])
+
+
+def known_positions(states: Iterable[MeshStatus]) -> Iterator[tuple[float, int, Sequence[float]]]:
+    """Stamp (s), node, and x, y, z (m), of each node whose position is known, in each state."""
+    for mesh in states:
+        for node in mesh.nodes:
+            if position_is_known(node):
+                yield mesh.stamp_s, node.id, node.position

@@ -12,7 +12,8 @@ import rosbag
 import rospy
 
 from drone_mesh.console.dots import RecordedDots, make_dots
-from drone_mesh.console.real_mesh import events_of, real_mesh
+from drone_mesh.console.real_mesh import events_of, origin_of, real_mesh
+from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import MeshError
 from drone_mesh.mobility.gateway_record import FIRST_BYTE, answers
 from drone_mesh.ros.graph import names
@@ -62,6 +63,13 @@ def read_packets(path: Path) -> Iterator[RecordedDots]:
         for _topic, message, time in bag.read_messages([_namespace(bag) + names.PACKETS_TOPIC]):
             dots = make_dots(message.senders, message.receivers, message.types, message.ages)
             yield RecordedDots.of(time.to_sec(), message.carried, dots)
+
+
+def origin_in(path: Path) -> Origin | None:
+    """Where the mesh of a gateway's record is on the earth; None: a bag does not say."""
+    if not is_gateway_record(path):
+        return None
+    return next(filter(None, map(origin_of, _answers(path))), None)
 
 
 def is_gateway_record(path: Path) -> bool:
