@@ -143,14 +143,22 @@ class DroneManager:
         return CasusResponse()
 
     def _order_layout(self, request: OrderLayoutRequest) -> OrderLayoutResponse:
-        return OrderLayoutResponse(*self._order_case(request.caseID, request.at_once))
+        return self._order_case(request.caseID, request.at_once)
 
     def _order_formation(self, request: OrderFormationRequest) -> OrderFormationResponse:
         try:
             orders = _formation(request)
         except GoalRefused as error:
             raise rospy.ServiceException(str(error)) from None
-        return OrderFormationResponse(*self._carry_out(request.name, orders, request.at_once))
+        answer = self._carry_out(request.name, orders, request.at_once)
+        return OrderFormationResponse(
+            answer.id,
+            answer.sent,
+            answer.later,
+            answer.no_route,
+            answer.not_in_fleet,
+            answer.message,
+        )
 
     def _preview_layout(self, request: PreviewLayoutRequest) -> PreviewLayoutResponse:
         known, missing = _in_fleet(self._orders_of(request.caseID), drones_if_known())
@@ -176,7 +184,7 @@ class DroneManager:
 
     def _order_case(
         self, case: int, at_once: bool, handle: actionlib.ServerGoalHandle | None = None
-    ) -> tuple[object, ...]:
+    ) -> OrderLayoutResponse:
         """Order a layout."""
         return self._carry_out(f"layout {case}", self._orders_of(case), at_once, handle)
 
@@ -186,8 +194,8 @@ class DroneManager:
         orders: Sequence[Order],
         at_once: bool,
         handle: actionlib.ServerGoalHandle | None = None,
-    ) -> tuple[object, ...]:
-        """Make a standing order of these; returns the fields of OrderLayout's answer."""
+    ) -> OrderLayoutResponse:
+        """Make a standing order of these."""
         fleet = drones_if_known()
         known, missing = _in_fleet(orders, fleet)
         if not self._gateway_is_there():
@@ -200,7 +208,7 @@ class DroneManager:
         complete = len(summary.sent) + len(summary.later) == len(known) + len(missing)
         words = summary.in_words()
         _log.log(logging.INFO if complete else logging.WARNING, "%s: %s", name, words)
-        return (
+        return OrderLayoutResponse(
             given.progress.number,
             summary.sent,
             summary.later,

@@ -62,7 +62,7 @@ def _run(bag: Path, trace: Path, given: str) -> int:
         if write_earth and origin is not None:
             trace.write_text(write_earth(tracks_of(positions), origin), encoding="utf-8")
         else:
-            write_csv(trace, ((at_s, node, *place) for at_s, node, place in positions))
+            write_csv(trace, ((at_s, node, x, y, z) for at_s, node, (x, y, z) in positions))
     except OSError as error:
         raise CannotWrite(f"{trace}: {error.strerror}") from error
     drones = len({node for _at_s, node, _place in positions})
