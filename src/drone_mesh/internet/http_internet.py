@@ -8,6 +8,7 @@ from typing import Any, Callable
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.geodesy import Origin
 from drone_mesh.internet.api import make_api
+from drone_mesh.internet.asked_watch import AskedWatch
 from drone_mesh.internet.asking import GatewayDesk, Submit
 from drone_mesh.internet.http_server import HttpServer
 from drone_mesh.internet.http_settings import HttpSettings
@@ -34,17 +35,22 @@ class HttpInternet(IInternetConnection):
         status: ReadStatus | None = None,
         mesh: Callable[[int], dict[str, Any]] | None = None,
         users: UsersDesk | None = None,
+        silence_s: float | None = None,
     ) -> None:
         """Open the port.
 
         `submit` runs a function on the thread that owns the gateway. With an `origin`, goals may be
-        given in degrees; the node's `users` desk sends and receives messages. Raises
+        given in degrees; the node's `users` desk sends and receives messages. After `silence_s`
+        (wall) without a request the gateway says that it has no internet; None: never. Raises
         ConfigurationError for an address that is not available, or that other machines can reach
         without a token.
         """
         self._desk = GatewayDesk(submit, answer_within_s)
         api = make_api(self._desk, http.access(), origin, status, mesh, users)
-        self._server = HttpServer(api, http)
+        self._submit = submit
+        self._commands: IGatewayCommands | None = None
+        self._watch = None if silence_s is None else AskedWatch(api, silence_s, self._asked)
+        self._server = HttpServer(self._watch or api, http)
         self.port = self._server.port
 
     @property
@@ -55,10 +61,24 @@ class HttpInternet(IInternetConnection):
     def connect(self, commands: IGatewayCommands) -> None:
         """Answer requests through `commands` until `disconnect`. Call it only once."""
         self._desk.open(commands)
+        self._commands = commands
         self._server.start()
+        if self._watch is not None:
+            self._server.in_loop(self._watch.begin)
         _log.info("gateway %d: orders over HTTP at %s/docs", commands.get_node_id(), self.url)
 
     def disconnect(self) -> None:
         """Refuse waiting requests, stop the server and release the port."""
         self._desk.close()
         self._server.stop()
+
+    def _asked(self, works: bool) -> None:
+        commands = self._commands
+        if commands is None:
+            return
+        node = commands.get_node_id()
+        if works:
+            _log.info("gateway %d: asked over HTTP again", node)
+        else:
+            _log.warning("gateway %d: not asked over HTTP: it says that it has no internet", node)
+        self._submit(lambda now_s: commands.set_internet(works, now_s))

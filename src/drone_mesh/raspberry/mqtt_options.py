@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Mapping
 
+from drone_mesh.arguments import decimal
 from drone_mesh.errors import ConfigurationError, naming_argument
 from drone_mesh.internet.mqtt_topics import PASSWORD_VARIABLE, Broker, parse_broker
 from drone_mesh.secret_file import read_secret
@@ -45,11 +46,18 @@ def add_mqtt_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--internet",
-        choices=("none", "mqtt"),
+        choices=("none", "mqtt", "http"),
         default="none",
-        help="what tells whether this gateway has internet: mqtt: while the broker does not answer "
-        "it says that it has none, and its routers move to another gateway (default: none, it "
-        "always says that it has internet)",
+        help="what tells whether this gateway has internet: while the broker does not answer "
+        "(mqtt), or after --silence without a request (http), it says that it has none, and its "
+        "routers move to another gateway (default: none, it always says that it has internet)",
+    )
+    group.add_argument(
+        "--silence",
+        type=decimal(1.0, 86400.0),
+        default=60.0,
+        metavar="SECONDS",
+        help="of --internet http (default: %(default)g)",
     )
 
 

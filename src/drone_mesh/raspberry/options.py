@@ -85,6 +85,7 @@ class Options:
     http: HttpSettings | None  # None: a router without --http
     keys: MeshKey | NodeKeys | None = None  # None: packets are not sealed
     mqtt: MqttOptions | None = None
+    silence_s: float | None = None  # without a request, after which a gateway has no internet
     debug_period_s: float = DEBUG_PERIOD_S  # 0: no such lines
     record: Path | None = None  # of a gateway
 
@@ -356,10 +357,16 @@ def _options(
             http=http_options(parsed, environment) if parsed.http else None,
             keys=_keys(parsed),
             mqtt=mqtt_options(parsed, environment) if parsed.gateway else None,
+            silence_s=_silence_s(parsed) if parsed.gateway else None,
             record=parsed.record if parsed.gateway else None,
         )
     except MeshError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")
+
+
+def _silence_s(parsed: argparse.Namespace) -> float | None:
+    silence_s: float = parsed.silence
+    return silence_s if parsed.internet == "http" else None
 
 
 def _keys(parsed: argparse.Namespace) -> MeshKey | NodeKeys | None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Callable, Iterator, Sequence
 
 from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
 from drone_mesh.drone.engines import create_engine
-from drone_mesh.drone.geodesy import Origin
 from drone_mesh.errors import MeshError
 from drone_mesh.internet.http_settings import HttpSettings
 from drone_mesh.internet.on_demand import http_internet, mqtt_internet, status_server
@@ -244,20 +243,21 @@ def _internet(options: Options) -> MakeInternet:
             node.events.others.add(to_broker.observe)
             connections.append(to_broker)
         if http is not None:
-            connections.append(_http(node, http, options.flight.origin))
+            connections.append(_http(node, http, options))
         return SeveralInternets(*connections)
 
     return make
 
 
-def _http(node: RadioNode, http: HttpSettings, origin: Origin | None) -> IInternetConnection:
+def _http(node: RadioNode, http: HttpSettings, options: Options) -> IInternetConnection:
     return http_internet(
         node.submit,
         http,
-        origin=origin,
+        origin=options.flight.origin,
         status=node.status,
         mesh=node.mesh,
         users=node.users,
+        silence_s=options.silence_s,
     )
 
 

@@ -185,3 +185,21 @@ def wait_until(condition, otherwise):
     while not condition():
         assert time.monotonic() < deadline, otherwise
         time.sleep(0.01)
+
+
+def test_a_gateway_that_nobody_asks_has_no_internet_until_somebody_does(make_mesh):
+    mesh = make_mesh(token="0123456789abcdef0123", silence_s=0.5)
+
+    def wait_until(has_internet: bool) -> None:
+        deadline_s = time.monotonic() + PATIENCE_S
+        while mesh.gateway.get_connected_to_gateway() is not has_internet:
+            assert time.monotonic() < deadline_s
+            time.sleep(0.01)
+
+    wait_until(has_internet=False)
+    refused = httpx.get(f"{mesh.internet.url}/nodes", verify=False)
+    assert refused.status_code == 401
+    assert not mesh.gateway.get_connected_to_gateway()
+    assert mesh.client.get("/ready").status_code == 200
+    wait_until(has_internet=True)
+    wait_until(has_internet=False)

@@ -249,3 +249,9 @@ def test_help_names_the_defaults_and_ends_with_status_0(capsys, parse):
         parse(["--help"], {})
     assert ended.value.code == 0
     assert "pin 22 of the header" in capsys.readouterr().out.replace("\n" + " " * 24, " ")
+
+
+def test_a_gateway_may_have_no_internet_while_nobody_asks_over_http():
+    assert parse_gateway(["--silence", "5"], {}).silence_s is None
+    assert parse_gateway(["--internet", "http"], {}).silence_s == 60.0
+    assert parse_gateway(["--internet", "http", "--silence", "5"], {}).silence_s == 5.0
