@@ -2,78 +2,72 @@
 
 from __future__ import annotations
 
-from typing import Protocol, Sequence
+from typing import ClassVar, Mapping, Sequence
 
 from drone_mesh.errors import MeshError
 from drone_mesh.layouts import Order
 from drone_mesh.missions import Mission
 from drone_mesh.state.formation_preview import FormationPreview
 
-RECORDED = "this is a recording: it cannot be changed"
-
 
 class OrderRefused(MeshError):
     """An order was not carried out; the text is the reason, in words for the page."""
 
 
-class MeshControls(Protocol):
-    """Executes orders. Each call may block for seconds and raises OrderRefused with a reason."""
+class MeshControls:
+    """Executes orders. Each call may block for seconds and raises OrderRefused with a reason.
 
-    def power(self, node: int, on: bool) -> str: ...
+    What a subclass does not implement is refused.
+    """
 
-    def fly(
-        self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False
-    ) -> str: ...
-
-    def layout(self, case: int) -> str: ...
-
-    def formation(self, name: str, orders: Sequence[Order]) -> str: ...
-
-    def preview(self, case: int) -> FormationPreview: ...
-
-    def speed(self, paused: bool, factor: float) -> str: ...
-
-    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str: ...
-
-    def remove(self, node: int) -> str: ...
-
-    def mission(self, nodes: Sequence[int], mission: Mission) -> str: ...
-
-    def pilots(self, action: str) -> str: ...
-
-
-class RecordingControls:
-    """The MeshControls of a recording: nothing can be ordered."""
+    WHY_NOT: ClassVar[Mapping[str, str]] = {}  # by order
+    WHY_NOTHING: ClassVar[str] = "there is nothing to control"  # for the orders without a reason
 
     def power(self, node: int, on: bool) -> str:
-        """Refused, like everything below."""
-        raise OrderRefused(RECORDED)
+        """Switch the antenna of a node."""
+        raise self._refusal("power")
 
-    def fly(  # noqa: D102
-        self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False
-    ) -> str:
-        raise OrderRefused(RECORDED)
+    def fly(self, node: int, x: float, y: float, z: float, allow_shared_place: bool = False) -> str:
+        """Order a drone to a place, through the mesh."""
+        raise self._refusal("fly")
 
-    def layout(self, case: int) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def layout(self, case: int) -> str:
+        """Order all drones of a layout to their positions."""
+        raise self._refusal("layout")
 
-    def formation(self, name: str, orders: Sequence[Order]) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def formation(self, name: str, orders: Sequence[Order]) -> str:
+        """Order drones to the places of a formation with this name."""
+        raise self._refusal("formation")
 
-    def preview(self, case: int) -> FormationPreview:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def preview(self, case: int) -> FormationPreview:
+        """What would happen if this layout were ordered now."""
+        raise self._refusal("preview")
 
-    def speed(self, paused: bool, factor: float) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def speed(self, paused: bool, factor: float) -> str:
+        """Pause or resume simulated time, or change its speed."""
+        raise self._refusal("speed")
 
-    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
+        """Add a drone to the simulation; None: it gets the lowest free id."""
+        raise self._refusal("add")
 
-    def remove(self, node: int) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def remove(self, node: int) -> str:
+        """Remove a drone from the simulation."""
+        raise self._refusal("remove")
 
-    def mission(self, nodes: Sequence[int], mission: Mission) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def mission(self, nodes: Sequence[int], mission: Mission) -> str:
+        """Let the pilots of these drones fly this mission."""
+        raise self._refusal("mission")
 
-    def pilots(self, action: str) -> str:  # noqa: D102
-        raise OrderRefused(RECORDED)
+    def pilots(self, action: str) -> str:
+        """Pause, resume or stop all missions."""
+        raise self._refusal("pilots")
+
+    def _refusal(self, order: str) -> OrderRefused:
+        return OrderRefused(self.WHY_NOT.get(order, self.WHY_NOTHING))
+
+
+class RecordingControls(MeshControls):
+    """The MeshControls of a recording: nothing can be ordered."""
+
+    WHY_NOTHING = "this is a recording: it cannot be changed"

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Sequence
+from types import MappingProxyType
+from typing import Any
 
-from drone_mesh.console.controls import OrderRefused
+from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.errors import MeshError
-from drone_mesh.layouts import Order
-from drone_mesh.missions import Mission
-from drone_mesh.state.formation_preview import FormationPreview
 from drone_mesh.web.json_client import NoAnswer, ask_json
 
 ANSWER_WITHIN_S = 5.0  # our choice: the gateway itself answers within two seconds
@@ -53,10 +51,23 @@ ONLY_SIMULATED = "layouts and formations exist only in the simulation"
 OWN_AUTOPILOT = "the missions of real drones belong to their autopilots"
 
 
-class GatewayControls:
+class GatewayControls(MeshControls):
     """The MeshControls of a real mesh: it can fly drones and nothing else."""
 
     ACTIONS = ("fly",)
+    WHY_NOT = MappingProxyType(
+        {
+            "power": "a real node can only be switched at its battery",
+            "layout": ONLY_SIMULATED,
+            "formation": ONLY_SIMULATED,  # the page orders each drone
+            "preview": ONLY_SIMULATED,
+            "speed": "the speed of a real mesh cannot be changed",
+            "add": "a real drone joins when it is switched on",
+            "remove": "a real drone leaves when it is switched off",
+            "mission": OWN_AUTOPILOT,
+            "pilots": OWN_AUTOPILOT,
+        }
+    )
 
     def __init__(self, client: GatewayClient) -> None:
         self._client = client
@@ -68,39 +79,3 @@ class GatewayControls:
         except GatewayGone as error:
             raise OrderRefused(str(error)) from error
         return f"ordered drone {node} to x {x:g}, y {y:g}, z {round(z)} m"
-
-    def power(self, node: int, on: bool) -> str:
-        """Refused."""
-        raise OrderRefused("a real node can only be switched at its battery")
-
-    def layout(self, case: int) -> str:
-        """Refused."""
-        raise OrderRefused(ONLY_SIMULATED)
-
-    def formation(self, name: str, orders: Sequence[Order]) -> str:
-        """Refused: the page orders each drone."""
-        raise OrderRefused(ONLY_SIMULATED)
-
-    def preview(self, case: int) -> FormationPreview:
-        """Refused."""
-        raise OrderRefused(ONLY_SIMULATED)
-
-    def speed(self, paused: bool, factor: float) -> str:
-        """Refused."""
-        raise OrderRefused("the speed of a real mesh cannot be changed")
-
-    def add(self, node: int | None, gateway: bool, x: float, y: float) -> str:
-        """Refused."""
-        raise OrderRefused("a real drone joins when it is switched on")
-
-    def remove(self, node: int) -> str:
-        """Refused."""
-        raise OrderRefused("a real drone leaves when it is switched off")
-
-    def mission(self, nodes: Sequence[int], mission: Mission) -> str:
-        """Refused."""
-        raise OrderRefused(OWN_AUTOPILOT)
-
-    def pilots(self, action: str) -> str:
-        """Refused."""
-        raise OrderRefused(OWN_AUTOPILOT)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import dataclasses
-import functools
 import json
 import logging
 import math
@@ -19,7 +18,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import MappingProxyType
-from typing import Mapping, Sequence
+from typing import Callable, Mapping, Sequence, TypeVar
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -58,6 +57,8 @@ from drone_mesh.view.palette import DARK, LIGHT, css_variables
 from drone_mesh.web.access import Access, AccessDenied, TooManyGuesses
 
 log = logging.getLogger(__name__)
+
+T = TypeVar("T")
 
 STATIC = Path(__file__).resolve().parent / "static"
 FRAME_PERIOD_S = 0.2  # 5 Hz
@@ -287,12 +288,6 @@ class ConsoleServer:
         except OrderRefused as error:
             await self._answer(page, number_of(text), False, str(error))
             return
-        if isinstance(request, (PageOrder, Demonstrate)) and request.heard is not None:
-            late_s = asyncio.get_running_loop().time() - request.heard
-            if late_s > MOST_LATE_S:  # it was queued while page and console did not hear each other
-                why = f"sent {late_s:.0f} s after the page last heard the console: not carried out"
-                await self._answer(page, request.number, False, why)
-                return
         if isinstance(request, NeighbourWatch):
             page.watching = request.node
             if request.node is not None:
@@ -301,64 +296,64 @@ class ConsoleServer:
             page.move(request)
         elif isinstance(request, PacketWatch):
             page.packets.wanted = request.on
-        elif isinstance(request, ReadPlaces):
-            await self._read_places(page, request)
-        elif isinstance(request, PreviewLayout):
-            await self._preview(page, request)
-        elif isinstance(request, Acknowledge):
-            seen = self._store.acknowledge(request.text)
-            await self._answer(page, request.number, True, f"acknowledged {seen}")
-        elif isinstance(request, Demonstrate):
+        else:
             try:
-                if request.plan:
-                    text = self._stage.plan()
-                else:
-                    text = self._stage.begin() if request.on else self._stage.end()
+                await self._do(page, request)
             except OrderRefused as error:
                 await self._answer(page, request.number, False, str(error))
+
+    async def _do(
+        self,
+        page: Page,
+        request: PageOrder | ReadPlaces | PreviewLayout | Acknowledge | Demonstrate,
+    ) -> None:
+        """Do what has an answer. Raises OrderRefused."""
+        if isinstance(request, (PageOrder, Demonstrate)) and request.heard is not None:
+            late_s = asyncio.get_running_loop().time() - request.heard
+            if late_s > MOST_LATE_S:  # it was queued while page and console did not hear each other
+                raise OrderRefused(
+                    f"sent {late_s:.0f} s after the page last heard the console: not carried out"
+                )
+        about: Mapping[str, object] = {}
+        if isinstance(request, ReadPlaces):
+            content = await self._in_worker(request.content, self._store.origin)
+            text, about = "a layout", content._asdict()
+        elif isinstance(request, PreviewLayout):
+            found = await self._in_worker(self._controls.preview, request.case)
+            text, about = found.in_words(), {"preview": dataclasses.asdict(found)}
+        elif isinstance(request, Acknowledge):
+            text = f"acknowledged {self._store.acknowledge(request.text)}"
+        elif isinstance(request, Demonstrate):
+            if request.plan:
+                text = self._stage.plan()
             else:
-                await self._answer(page, request.number, True, text)
+                text = self._stage.begin() if request.on else self._stage.end()
         elif len(page.orders) >= MOST_ORDERS_WAITING:
-            await self._answer(page, request.number, False, "too many orders at once")
+            raise OrderRefused("too many orders at once")
         else:
             task = asyncio.ensure_future(self._carry_out(page, request))
             page.orders.add(task)
             task.add_done_callback(page.orders.discard)
+            return
+        await self._answer(page, request.number, True, text, about)
 
     async def _carry_out(self, page: Page, order: PageOrder) -> None:
-        loop = asyncio.get_running_loop()
         # Before it is carried out: its first event may come before its answer.
         ticket = self._store.expect_orders(order.drones(self._layouts))
         try:
-            text = await loop.run_in_executor(self._workers, order.carry_out, self._controls)
+            text = await self._in_worker(order.carry_out, self._controls)
         except OrderRefused as error:
             self._store.forget_expected(ticket)
             await self._answer(page, order.number, False, str(error))
         else:
+            loop = asyncio.get_running_loop()
             loop.call_later(EVENT_WITHIN_S, self._store.forget_expected, ticket)
             await self._answer(page, order.number, True, text)
             for other in self._pages - {page}:
                 other.tell(text)
 
-    async def _read_places(self, page: Page, request: ReadPlaces) -> None:
-        loop = asyncio.get_running_loop()
-        try:
-            read = functools.partial(request.content, self._store.origin)
-            content = await loop.run_in_executor(self._workers, read)
-        except OrderRefused as error:
-            await self._answer(page, request.number, False, str(error))
-        else:
-            await self._answer(page, request.number, True, "a layout", content._asdict())
-
-    async def _preview(self, page: Page, request: PreviewLayout) -> None:
-        loop = asyncio.get_running_loop()
-        try:
-            found = await loop.run_in_executor(self._workers, self._controls.preview, request.case)
-        except OrderRefused as error:
-            await self._answer(page, request.number, False, str(error))
-        else:
-            about = {"preview": dataclasses.asdict(found)}
-            await self._answer(page, request.number, True, found.in_words(), about)
+    async def _in_worker(self, work: Callable[..., T], *what: object) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._workers, work, *what)
 
     async def _answer(
         self,

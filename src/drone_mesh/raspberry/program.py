@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from types import FrameType
 from typing import TYPE_CHECKING, Callable, Iterator, Sequence
 
-from drone_mesh.communication.interfaces import IGatewayCommands, IInternetConnection
+from drone_mesh.communication.interfaces import IInternetConnection
 from drone_mesh.drone.engines import create_engine
 from drone_mesh.errors import MeshError
 from drone_mesh.internet.http_settings import HttpSettings
@@ -267,19 +267,9 @@ def _status_server(node: RadioNode, http: HttpSettings) -> StatusServer:
     return server
 
 
-class _NoInternet(IInternetConnection):
-    """No connection: the gateway beside emulated routers receives no orders."""
-
-    def connect(self, commands: IGatewayCommands) -> None:
-        pass
-
-    def disconnect(self) -> None:
-        pass
-
-
 def without_internet(_node: RadioNode) -> IInternetConnection:
     """For a gateway that receives no orders."""
-    return _NoInternet()
+    return SeveralInternets()
 
 
 class _Watch:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from typing import Sequence
+from typing import Protocol, Sequence
 
 import rospy
 
-from drone_mesh.console.controls import OrderRefused
+from drone_mesh.console.controls import MeshControls, OrderRefused
 from drone_mesh.drone.location import Location as Place
 from drone_mesh.layouts import Order
 from drone_mesh.missions import Mission
@@ -48,8 +48,8 @@ from drone_mesh.state.formation_preview import FormationPreview
 log = logging.getLogger(__name__)
 
 
-class RosControls:
-    """A MeshControls. Any thread; each call opens a connection of its own and closes it."""
+class RosControls(MeshControls):
+    """Any thread; each call opens a connection of its own and closes it."""
 
     def power(self, node: int, on: bool) -> str:
         """Switch the antenna of a node."""
@@ -91,9 +91,7 @@ class RosControls:
     def speed(self, paused: bool, factor: float) -> str:
         """Pause or resume simulated time, or change its speed."""
         request = SetSpeedRequest(paused=paused, real_time_factor=factor)
-        answer = _call(names.SPEED_SERVICE, SetSpeed, request)
-        if not answer.success:
-            raise OrderRefused(answer.message)
+        _done(_call(names.SPEED_SERVICE, SetSpeed, request))
         if paused:
             return "paused"
         return (
@@ -106,17 +104,11 @@ class RosControls:
         """Add a drone to the simulation; None: it gets the lowest free id."""
         wanted = AddDroneRequest.LOWEST_FREE if node is None else node
         request = AddDroneRequest(id=wanted, gateway=gateway, latitude=y, longitude=x)
-        answer = _call(names.ADD_DRONE_SERVICE, AddDrone, request)
-        if not answer.success:
-            raise OrderRefused(answer.message)
-        return answer.message
+        return _done(_call(names.ADD_DRONE_SERVICE, AddDrone, request))
 
     def remove(self, node: int) -> str:
         """Remove a drone from the simulation."""
-        answer = _call(names.REMOVE_DRONE_SERVICE, RemoveDrone, RemoveDroneRequest(id=node))
-        if not answer.success:
-            raise OrderRefused(answer.message)
-        return answer.message
+        return _done(_call(names.REMOVE_DRONE_SERVICE, RemoveDrone, RemoveDroneRequest(id=node)))
 
     def mission(self, nodes: Sequence[int], mission: Mission) -> str:
         """Let the pilots of these drones fly this mission."""
@@ -127,9 +119,7 @@ class RosControls:
             FlyMissionRequest.FLY, waypoints, mission.speed_m_s, mission.loop
         )
         for node in nodes:
-            answer = _call(names.mission_service(node), FlyMission, request)
-            if not answer.success:
-                raise OrderRefused(answer.message)
+            _done(_call(names.mission_service(node), FlyMission, request))
         who = f"drone {nodes[0]}" if len(nodes) == 1 else f"{len(nodes)} drones"
         return f"the mission of {who} has begun"
 
@@ -158,6 +148,18 @@ def _outcome(name: str, answer: OrderLayoutResponse | OrderFormationResponse) ->
     if not (answer.sent or answer.later):
         raise OrderRefused(f"{name}: {answer.message}")
     return f"{name}: {answer.message}"
+
+
+class _Answer(Protocol):
+    success: bool
+    message: str
+
+
+def _done(answer: _Answer) -> str:
+    """The words of an answer. Raises OrderRefused with them if the order was not carried out."""
+    if not answer.success:
+        raise OrderRefused(answer.message)
+    return answer.message
 
 
 def _call(name: str, service_class: ServiceClass[Request, Response], request: Request) -> Response:
